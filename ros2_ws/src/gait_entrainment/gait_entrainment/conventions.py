@@ -1,0 +1,49 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Vocabulary that every part shares: sides, kinds of gait events, and nanosecond stamps."""
+
+import enum
+
+NANOSECONDS_PER_SECOND = 1_000_000_000
+
+
+class Side(enum.IntEnum):
+    """A leg, or the joint, foot and torque that belong to it."""
+
+    LEFT = 0
+    RIGHT = 1
+
+    @property
+    def other(self) -> "Side":
+        """The opposite leg."""
+        return Side(1 - self)
+
+
+class EventKind(enum.IntEnum):
+    """What happened at a gait event."""
+
+    HEEL_STRIKE = 0
+    TOE_OFF = 1
+
+
+def nanoseconds(seconds: float) -> int:
+    """
+    Quantize seconds since the start of the run to the integer nanoseconds of a stamp.
+
+    A double that counts from the start of a run resolves far less than a nanosecond; one that
+    counts from 1970 resolves only 0.2 microseconds. So the core quantizes before the node adds
+    the start stamp.
+    """
+    return round(seconds * NANOSECONDS_PER_SECOND)
