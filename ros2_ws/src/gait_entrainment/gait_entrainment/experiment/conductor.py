@@ -1,0 +1,176 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The conductor of an experiment: a pure function from received stamps to pulses and promises.
+
+It is told which gait events happened and up to which instant all of them are known, and answers
+with a horizon, the promise to request no pulse that begins earlier. It plans the pulses one
+stride ahead, at the strike that starts the last baseline stride, so that a robot has its lead
+time, and so that a walker that never computes past the promises is never held back by the very
+event that is waited for.
+"""
+
+import enum
+import math
+import statistics
+from dataclasses import dataclass
+
+from gait_entrainment.conventions import EventKind, nanoseconds
+from gait_entrainment.device import PulseTrain
+from gait_entrainment.events import GaitEvent, StrideTracker
+from gait_entrainment.protocol import Protocol, ProtocolError
+
+
+class Phase(enum.IntEnum):
+    """Part of the protocol that is under way."""
+
+    WAITING = 0
+    BASELINE = 1
+    PULSES = 2
+    WASHOUT = 3
+    FINISHED = 4
+    FAILED = 5
+
+
+@dataclass(frozen=True)
+class Horizon:
+    """No new pulse begins before ``until`` [ns]; the run ends there where ``last`` is set."""
+
+    until: int
+    last: bool
+
+
+class Conductor:
+    """
+    Conducts one protocol.
+
+    Parameters
+    ----------
+    protocol
+        What to do.
+    longest_lookahead
+        Upper bound of the lookahead [s]. In lock-step it is a stride, which is where the speed
+        comes from; in real time a short one leaves more to be decided late.
+
+    Attributes
+    ----------
+    train
+        The planned pulses; None until the strike that starts the last baseline stride.
+    measured_period, measured_period_error
+        Mean stride period over the baseline [s] and its standard error; NaN until known.
+
+    """
+
+    def __init__(self, protocol: Protocol, longest_lookahead: float = math.inf) -> None:
+        self.protocol = protocol
+        self.train: PulseTrain | None = None
+        self.measured_period = math.nan
+        self.measured_period_error = math.nan
+        self._tracker = StrideTracker(protocol.side)
+        self._periods: list[float] = []  # of the complete baseline strides [s]
+        self._longest_lookahead = longest_lookahead
+        self._lookahead = min(_shortest_stride(protocol), longest_lookahead)
+        self._longest_promise = self._lookahead
+        self._closing_strike: int | None = None  # strike that closes the last stride [ns]
+
+    @property
+    def strides(self) -> int:
+        """Strides of the perturbed leg completed so far."""
+        return max(self._tracker.stride_in_progress - 1, 0)
+
+    def phase(self, known_until: int) -> Phase:
+        """Return the part of the protocol that is under way at an instant [ns]."""
+        train = self.train
+        if self._closing_strike is not None:
+            return Phase.FINISHED
+        if train is None or known_until < train.first_onset:
+            return Phase.BASELINE
+        return Phase.PULSES if known_until < train.end(train.count - 1) else Phase.WASHOUT
+
+    def add_event(self, event: GaitEvent) -> PulseTrain | None:
+        """
+        Take one gait event; return the pulses to request, if this event lets them be planned.
+
+        Raises
+        ------
+        ProtocolError
+            where pulses at the period that follows from the measured one would overlap.
+
+        """
+        stride = self._tracker.add(event)
+        if event.side is not self.protocol.side or event.kind is not EventKind.HEEL_STRIKE:
+            return None
+        if stride is not None and self.train is None:
+            self._periods.append(stride.period)
+            # A promise must end before the next strike can be an onset's reference: see horizon.
+            self._lookahead = min(self._longest_lookahead, *self._periods)
+            self._longest_promise = max(self._longest_promise, self._lookahead)
+        started = self._tracker.stride_in_progress
+        if started > self.protocol.strides and self._closing_strike is None:
+            self._closing_strike = event.stamp
+        if started < self.protocol.baseline or self.train is not None:
+            return None
+        self.train = self._plan(event.stamp)
+        return self.train
+
+    def horizon(self, known_until: int) -> Horizon:
+        """
+        Return how far to promise, all events up to ``known_until`` [ns] having been added.
+
+        The first onset lies (1 + P) measured periods after a strike that was not yet known when
+        the promise before was made, and no lookahead is longer than the shortest stride that
+        entered the measured period: so no promise ever covers an onset that is not yet planned.
+        The run ends at a fixed distance after its closing strike, one that no promise made before
+        that strike can have passed: the end does not depend on how the run was cut into grants.
+        """
+        if self._closing_strike is not None:
+            return Horizon(self._closing_strike + nanoseconds(self._longest_promise), last=True)
+        return Horizon(known_until + nanoseconds(self._lookahead), last=False)
+
+    def _plan(self, strike: int) -> PulseTrain:
+        """Plan the pulses at the strike [ns] that starts the last baseline stride."""
+        protocol, plan = self.protocol, self.protocol.pulses
+        if self._periods:
+            self.measured_period = statistics.fmean(self._periods)
+        elif plan.period is not None:  # no complete stride was asked for: the best guess there is
+            self.measured_period = plan.period
+        else:
+            raise ProtocolError(
+                "baseline: no complete stride was seen from which period_offset could be measured"
+            )
+        if len(self._periods) > 1:
+            spread = statistics.stdev(self._periods, self.measured_period)
+            self.measured_period_error = spread / math.sqrt(len(self._periods))
+        delay = (1 + plan.initial_phase) * self.measured_period
+        return PulseTrain(
+            side=protocol.side,
+            first_onset=strike + nanoseconds(delay),
+            period=plan.period_for(self.measured_period),
+            count=plan.count,
+            torque=protocol.pulse_torque,
+            duration=plan.width,
+        )
+
+
+def _shortest_stride(protocol: Protocol) -> float:
+    """
+    Return a period [s] that no stride undercuts, for promises made before one is measured.
+
+    A foot stays on the ground only while the leg turns slower than sqrt(g / L), and a stride
+    turns it by 4 alpha. An absolute pulse period stands in where nothing will be measured.
+    """
+    walker = protocol.walker
+    stride = 4 * walker.leg_angle * math.sqrt(walker.leg_length / walker.gravity)
+    return stride if protocol.pulses.period is None else min(stride, protocol.pulses.period)
