@@ -1,0 +1,42 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Bags: recording into MCAP with rosbag2's rules, reading, checking, rescuing, exporting."""
+
+from gait_entrainment.bags.definitions import Definition, find_definition
+from gait_entrainment.bags.errors import (
+    BagError,
+    BagExistsError,
+    BagWriteError,
+    DefinitionMissingError,
+    DiskFullError,
+    UnreadableBagError,
+)
+from gait_entrainment.bags.metadata import INFINITE, QosProfile, TopicInfo
+from gait_entrainment.bags.writer import BagWriter
+
+__all__ = [
+    "BagWriter",
+    "TopicInfo",
+    "QosProfile",
+    "INFINITE",
+    "Definition",
+    "find_definition",
+    "BagError",
+    "BagExistsError",
+    "UnreadableBagError",
+    "DefinitionMissingError",
+    "BagWriteError",
+    "DiskFullError",
+]
