@@ -1,0 +1,324 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Parameters of the ankle-actuated walker (Table 1 of Ahn and Hogan 2012), and what follows from them.
+
+A walker exists only where the linkage closes and a period-one gait vaults over each step without
+flying off the ground. Its construction checks that, and an error says by how much it fails. The
+gait's speed follows from energy alone (Eq. 7, 8), so all of this is in closed form but for two
+one-dimensional searches over double stance, which the paper left to simulation.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from typing import Any
+
+from gait_entrainment import geometry
+
+
+class ParameterError(ValueError):
+    """A value is out of its range; the message is one line: field, value, range, what to do."""
+
+
+def _parameter(default: float, meaning: str, unit: str, symbol: str) -> Any:
+    return field(default=default, metadata={"meaning": meaning, "unit": unit, "symbol": symbol})
+
+
+# Points of the search over double stance. The functions searched are smooth on that scale, and
+# the best point is then refined, so the result does not depend on it.
+_SEARCH_POINTS = 257
+
+
+def greatest(function: Callable[[float], float], lower: float, upper: float) -> float:
+    """Greatest value of a smooth function on [lower, upper]: scan, then golden section."""
+    step = (upper - lower) / (_SEARCH_POINTS - 1)
+    values = [function(lower + i * step) for i in range(_SEARCH_POINTS)]
+    best = max(range(_SEARCH_POINTS), key=values.__getitem__)
+    a = lower + max(best - 1, 0) * step
+    b = lower + min(best + 1, _SEARCH_POINTS - 1) * step
+    ratio = (math.sqrt(5.0) - 1.0) / 2.0
+    # At a smooth maximum the value no longer depends on the place once this is sqrt(epsilon).
+    while b - a > 1e-9:
+        inner, outer = b - ratio * (b - a), a + ratio * (b - a)
+        if function(inner) < function(outer):
+            a = inner
+        else:
+            b = outer
+    return max(values[best], function(0.5 * (a + b)))
+
+
+@dataclass(frozen=True)
+class WalkerParameters:
+    """
+    The walker of Table 1: point mass, two massless legs with feet, a spring at the trailing ankle.
+
+    Raises ParameterError at construction where a value is not a number or out of range, or where
+    the walker has no period-one gait.
+    """
+
+    mass: float = _parameter(80.0, "mass", "kg", "m")
+    leg_length: float = _parameter(1.0, "leg length", "m", "L")
+    foot_length: float = _parameter(0.2, "foot length", "m", "l")
+    gravity: float = _parameter(9.81, "gravitational acceleration", "m/s^2", "g")
+    leg_angle: float = _parameter(math.pi / 6, "angle of the leg at heel strike", "rad", "alpha")
+    max_plantarflexion: float = _parameter(
+        2.576, "maximal plantarflexion of the ankle, where toe-off is", "rad", "mu"
+    )
+    ankle_stiffness: float = _parameter(87.3, "ankle actuation constant", "N m/rad", "k")
+
+    def __post_init__(self) -> None:
+        """Check every field, the linkage, and that the period-one gait exists."""
+        for item in fields(self):
+            value = getattr(self, item.name)
+            number = isinstance(value, int | float) and not isinstance(value, bool)
+            if not number or not math.isfinite(value) or value <= 0:
+                raise ParameterError(
+                    f"{item.name} {value!r} is not a positive, finite number of"
+                    f" {item.metadata['unit']}"
+                )
+            object.__setattr__(self, item.name, float(value))
+        self._check_linkage()
+        self._check_gait()
+
+    def _check_linkage(self) -> None:
+        """Refuse angles at which the feet do not separate or the toe cannot leave the ground."""
+        # cos(2 alpha) > 0: above pi/4 the collision would throw the mass back.
+        least, most = math.asin(min(1.0, self.foot_length / (2 * self.leg_length))), math.pi / 4
+        if least >= most:
+            raise ParameterError(
+                f"foot_length {self.foot_length:g} m is too long for legs of {self.leg_length:g} m:"
+                f" allowed: below {2 * self.leg_length * math.sin(most):g} m"
+            )
+        if not least < self.leg_angle < most:
+            raise ParameterError(
+                f"leg_angle {self.leg_angle:.6g} rad is out of range by"
+                f" {max(least - self.leg_angle, self.leg_angle - most):.3g} rad;"
+                f" allowed: {least:.6g} to {most:.6g} rad"
+                " (2 L sin(alpha) > l, and the collision must not reverse the motion)"
+            )
+        cosine = geometry.ankle_cosine(
+            -math.sin(self.leg_angle), self.leg_length, self.foot_length, self.toe_separation
+        )
+        least, most = self.double_stance_start, math.acos(max(-1.0, cosine))
+        if not least < self.max_plantarflexion < most:
+            raise ParameterError(
+                f"max_plantarflexion {self.max_plantarflexion:.6g} rad is out of range by"
+                f" {max(least - self.max_plantarflexion, self.max_plantarflexion - most):.3g} rad;"
+                f" allowed: {least:.6g} to {most:.6g} rad"
+                " (above pi/2 - alpha, and toe-off before the next heel strike)"
+            )
+
+    def _check_gait(self) -> None:
+        """Refuse a stiffness with which the period-one gait falls or flies off."""
+        least, most = self.just_vault_over_stiffness, self.just_fly_off_stiffness
+        if least >= most:
+            raise ParameterError(
+                f"leg_angle {self.leg_angle:.6g} rad with max_plantarflexion"
+                f" {self.max_plantarflexion:.6g} rad leaves no gait: the walker falls below an"
+                f" ankle_stiffness of {least:.4g} N m/rad and flies off above {most:.4g} N m/rad"
+            )
+        allowed = f"allowed: {least:.4g} to {most:.4g} N m/rad"
+        if self.ankle_stiffness <= least:
+            raise ParameterError(
+                f"ankle_stiffness {self.ankle_stiffness:g} N m/rad is not above the"
+                f" just-vault-over stiffness: the walker falls for want of"
+                f" {-self.least_kinetic_energy:.3g} J; {allowed}"
+            )
+        if self.ankle_stiffness >= most:
+            raise ParameterError(
+                f"ankle_stiffness {self.ankle_stiffness:g} N m/rad is not below the just-fly-off"
+                f" stiffness: the walker flies off, its leading leg would have to pull with"
+                f" {-self.least_leading_force:.3g} N; {allowed}"
+            )
+
+    # Linkage
+
+    @property
+    def toe_separation(self) -> float:
+        """Distance d [m] from the trailing toe to the leading heel in double stance."""
+        return 2 * self.leg_length * math.sin(self.leg_angle) - self.foot_length
+
+    @property
+    def step_length(self) -> float:
+        """Distance [m] from heel to heel, 2 L sin(alpha)."""
+        return 2 * self.leg_length * math.sin(self.leg_angle)
+
+    @property
+    def double_stance_start(self) -> float:
+        """Angle psi [rad] of the trailing ankle at heel strike: its foot flat, its leg at -alpha."""
+        return math.pi / 2 - self.leg_angle
+
+    @property
+    def toe_off_angle(self) -> float:
+        """Angle theta [rad] of the leading leg at toe-off, where psi = mu."""
+        return math.asin(self._leg_sine(self.max_plantarflexion))
+
+    def _leg_sine(self, ankle: float) -> float:
+        return geometry.leg_sine(
+            math.cos(ankle), self.leg_length, self.foot_length, self.toe_separation
+        )
+
+    # Energy of the period-one gait
+
+    @property
+    def restitution(self) -> float:
+        """Speed after a collision over the speed before it, cos(2 alpha)."""
+        return math.cos(2 * self.leg_angle)
+
+    @property
+    def floquet_multiplier(self) -> float:
+        """Slope of the step-to-step function at the period-one gait, cos(2 alpha)^2 (Eq. 10)."""
+        return self.restitution**2
+
+    @property
+    def push_off_work(self) -> float:
+        """Work [J] of the ankle spring over one double stance (Eq. 7)."""
+        return self.ankle_stiffness * self._work_per_stiffness(self.max_plantarflexion)
+
+    @property
+    def peak_torque(self) -> float:
+        """Torque [N m] of the ankle spring at heel strike, its greatest."""
+        return geometry.spring_torque(
+            self.double_stance_start, self.ankle_stiffness, self.max_plantarflexion
+        )
+
+    @property
+    def collision_speed(self) -> float:
+        """Speed [m/s] of the mass just before a collision in the period-one gait (Eq. 8)."""
+        return math.sqrt(2 * self.push_off_work / (self.mass * (1 - self.floquet_multiplier)))
+
+    @property
+    def speed_after_collision(self) -> float:
+        """Speed [m/s] of the mass just after a collision in the period-one gait."""
+        return self.restitution * self.collision_speed
+
+    def _work_per_stiffness(self, ankle: float) -> float:
+        """Work of the spring from heel strike to psi, per unit of stiffness [rad^2]."""
+        start = self.double_stance_start
+        return geometry.torque_work(ankle - start, self.max_plantarflexion - start, 1.0)
+
+    def _energy_per_stiffness(self, ankle: float) -> float:
+        """
+        Part of the kinetic energy at psi that grows with k, per unit of stiffness [rad^2].
+
+        The gait's kinetic energy after a collision is what is left of the push-off work once the
+        collision has taken as much as the push-off gives.
+        """
+        whole = self._work_per_stiffness(self.max_plantarflexion)
+        kept = self.floquet_multiplier / (1 - self.floquet_multiplier)
+        return kept * whole + self._work_per_stiffness(ankle)
+
+    def _height(self, ankle: float) -> float:
+        """Height [m] of the mass at psi above its height at heel strike."""
+        sine, struck = self._leg_sine(ankle), math.sin(self.leg_angle)
+        below = geometry.drop(sine, math.sqrt(1 - sine * sine))
+        return self.leg_length * (geometry.drop(struck, math.cos(self.leg_angle)) - below)
+
+    @property
+    def _apex_height(self) -> float:
+        return self.leg_length * geometry.drop(math.sin(self.leg_angle), math.cos(self.leg_angle))
+
+    def _over_double_stance(self, function: Callable[[float], float]) -> float:
+        return greatest(function, self.double_stance_start, self.max_plantarflexion)
+
+    @cached_property
+    def just_vault_over_stiffness(self) -> float:
+        """
+        Stiffness k_C [N m/rad] below which the period-one gait does not vault over.
+
+        Eq. 9 takes the barrier at the apex of single stance; here double stance counts too, which
+        decides where toe-off comes after the apex.
+        """
+        weight = self.mass * self.gravity
+
+        def needed(ankle: float) -> float:
+            return weight * self._height(ankle) / self._energy_per_stiffness(ankle)
+
+        stiffness = self._over_double_stance(needed)
+        if self.toe_off_angle > 0:
+            whole = self._energy_per_stiffness(self.max_plantarflexion)
+            stiffness = max(stiffness, weight * self._apex_height / whole)
+        return stiffness
+
+    @property
+    def least_kinetic_energy(self) -> float:
+        """Kinetic energy [J] at the barrier of the period-one gait; negative if it would fall."""
+        weight = self.mass * self.gravity
+
+        def lacking(ankle: float) -> float:
+            gained = self.ankle_stiffness * self._energy_per_stiffness(ankle)
+            return weight * self._height(ankle) - gained
+
+        energy = -self._over_double_stance(lacking)
+        if self.toe_off_angle > 0:
+            whole = self._energy_per_stiffness(self.max_plantarflexion)
+            energy = min(energy, self.ankle_stiffness * whole - weight * self._apex_height)
+        return energy
+
+    # Ground reaction of the period-one gait: what holds the leading leg down, minus k times what
+    # lifts it.
+
+    def _hold(self, ankle: float) -> float:
+        """Force [N] on the leading leg at psi of a walker that rises and falls without a push."""
+        sine = self._leg_sine(ankle)
+        lost = 2 * self.gravity * self._height(ankle) / self.leg_length**2
+        return geometry.pendulum_force(
+            math.sqrt(1 - sine * sine), -lost, self.mass, self.gravity, self.leg_length
+        )
+
+    def _lift_per_stiffness(self, ankle: float) -> float:
+        """Force on the leading leg that push and speed take off at psi, per unit of stiffness."""
+        arm = geometry.unloading_arm(
+            math.sin(ankle),
+            self._leg_sine(ankle),
+            self.leg_length,
+            self.foot_length,
+            self.toe_separation,
+        )
+        push = arm * (self.max_plantarflexion - ankle)
+        return push + 2 * self._energy_per_stiffness(ankle) / self.leg_length
+
+    @property
+    def _hold_before_collision(self) -> float:
+        return self.mass * self.gravity * math.cos(self.leg_angle)
+
+    @property
+    def _lift_before_collision(self) -> float:
+        return 2 * self._energy_per_stiffness(self.max_plantarflexion) / self.leg_length
+
+    @cached_property
+    def just_fly_off_stiffness(self) -> float:
+        """
+        Stiffness [N m/rad] above which the leading leg of the period-one gait lifts off.
+
+        The least over double stance, its ends included, and the end of single stance.
+        """
+        stiffness = -self._over_double_stance(
+            lambda ankle: -self._hold(ankle) / self._lift_per_stiffness(ankle)
+        )
+        return min(stiffness, self._hold_before_collision / self._lift_before_collision)
+
+    @property
+    def least_leading_force(self) -> float:
+        """Smallest ground reaction [N] of the leading leg over the period-one gait."""
+        force = -self._over_double_stance(
+            lambda ankle: (
+                self.ankle_stiffness * self._lift_per_stiffness(ankle) - self._hold(ankle)
+            )
+        )
+        struck = self._hold_before_collision - self.ankle_stiffness * self._lift_before_collision
+        return min(force, struck)
