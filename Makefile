@@ -1,0 +1,44 @@
+# Two commands suffice: `make demo` runs the main job, `make test` every test. Each first sets up
+# and builds what is missing. The work is done in scripts/; a particular Python is chosen by
+# `make PYTHON=python3.12 ...`.
+
+SHELL := /bin/bash
+export PYTHON
+
+in_env = source ./env.bash &&
+
+.PHONY: help demo test lint format bench setup build lock clean distclean
+
+help: ## list the targets
+	@grep -E '^[a-z]+:.*##' Makefile | sed -E 's/^([a-z]+):.*## /\1\t/' | expand -t 12
+
+demo: build ## set up, build, then simulate a walk and entrain it: entrain run
+	@$(in_env) entrain run
+
+test: build ## set up, build, then run every test (PYTEST_ARGS="-k name" for some)
+	@$(in_env) pytest $(PYTEST_ARGS)
+
+lint: build ## ruff, mypy, import-linter, licence headers
+	@$(in_env) scripts/lint.sh
+
+format: setup ## let ruff rewrite the sources
+	@.venv/bin/ruff check --fix . ; .venv/bin/ruff format .
+
+bench: build ## measure the speeds in the README, each beside its baseline
+	@$(in_env) pytest -s -m benchmark tests/benchmarks
+
+setup: ## ROS 2 Jazzy and pinned Python packages in .venv
+	@scripts/setup.sh
+
+build: setup ## build the workspace with colcon
+	@scripts/build.sh
+
+lock: ## resolve requirements/*.in again (needs uv)
+	@scripts/lock.sh
+
+clean: ## remove what was built
+	rm -rf ros2_ws/build ros2_ws/install ros2_ws/log
+	find ros2_ws/src tests scripts -name __pycache__ -type d -exec rm -rf {} +
+
+distclean: clean ## remove the environment too
+	rm -rf .venv

@@ -1,0 +1,41 @@
+#!/usr/bin/env bash
+# Build the workspace with colcon where something that needs building has changed.
+#
+# Python modules are linked, not copied, so editing one needs no build; a changed message, launch
+# file, entry point or package.xml does.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+fingerprint=$({
+    cat .venv/complete scripts/build.sh
+    find ros2_ws/src -type f \( -not -name '*.py' -o -name setup.py \) -not -name '*.pyc' \
+        -not -path '*/__pycache__/*' -not -path '*/.*' -not -path '*.egg-info/*' -print0 |
+        sort -z | xargs -0 sha256sum
+} | sha256sum)
+
+if [ "$(cat ros2_ws/install/complete 2> /dev/null)" != "$fingerprint" ]; then
+    echo "build: colcon builds the packages ..."
+    start=$SECONDS
+    # What another environment has built names that environment's Python.
+    if [ "$(cat ros2_ws/build/environment 2> /dev/null)" != "$(cat .venv/complete)" ]; then
+        rm -rf ros2_ws/build ros2_ws/install ros2_ws/log
+    fi
+    rm -f ros2_ws/install/complete
+    (
+        # A shell that has sourced env.bash already stands on the last build: build without it.
+        for variable in AMENT_PREFIX_PATH CMAKE_PREFIX_PATH PYTHONPATH LD_LIBRARY_PATH; do
+            value=$(tr : '\n' <<< "${!variable:-}" | grep -v "^$PWD/" | paste -sd :)
+            if [ -n "$value" ]; then export "$variable=$value"; else unset "$variable"; fi
+        done
+        unset COLCON_PREFIX_PATH
+        root=$PWD
+        source scripts/underlay.bash
+        cd ros2_ws
+        colcon --log-level error --log-base log build --symlink-install --event-handlers console_direct- \
+            --cmake-args -DPython3_EXECUTABLE="$(command -v python)" \
+            -DPython3_FIND_VIRTUALENV=ONLY -DBUILD_TESTING=OFF --no-warn-unused-cli
+    )
+    cp .venv/complete ros2_ws/build/environment
+    echo "$fingerprint" > ros2_ws/install/complete
+    echo "build: done in $((SECONDS - start)) s"
+fi

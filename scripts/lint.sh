@@ -1,0 +1,17 @@
+#!/usr/bin/env bash
+# Every check that reads the sources without running them. Goes through all of them, then fails.
+set -uo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+failed=0
+check() {
+    echo "lint: $*"
+    "$@" || failed=1
+}
+
+check ruff check --quiet .
+check ruff format --check --quiet .
+check mypy
+check lint-imports --no-cache
+check python scripts/check_licence_headers.py
+exit $failed
