@@ -19,7 +19,8 @@ import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-HEADER = "".join(pathlib.Path(__file__).read_text(encoding="utf-8").partition("\n\n")[:1])
+SELF = pathlib.Path(__file__).resolve()
+HEADER = SELF.read_text(encoding="utf-8").partition("\n\n")[0]
 
 
 def main() -> int:
@@ -31,13 +32,14 @@ def main() -> int:
         capture_output=True,
         text=True,
     ).stdout.split("\0")
+    sources = {name: ROOT / name for name in listed if name and (ROOT / name).exists()}
     bare = [
         name
-        for name in filter(None, listed)
-        if (text := (ROOT / name).read_text(encoding="utf-8")) and not text.startswith(HEADER)
+        for name, path in sources.items()
+        if path.stat().st_size and not path.read_text(encoding="utf-8").startswith(HEADER)
     ]
     for name in bare:
-        print(f"{name}: starts without the licence header (copy it from scripts/{pathlib.Path(__file__).name})")
+        print(f"{name}: no licence header: begin it like scripts/{SELF.name}")
     return bool(bare)
 
 

@@ -9,9 +9,9 @@ check() {
     "$@" || failed=1
 }
 
-check ruff check --quiet .
+check ruff check --quiet --output-format concise .
 check ruff format --check --quiet .
 check mypy
-check lint-imports --no-cache
+check lint-imports --no-logo --no-cache
 check python scripts/check_licence_headers.py
 exit $failed

