@@ -47,7 +47,7 @@ class IdealAnkleRobot:
         self.limits = limits or DeviceLimits()
         self.promised_until = start  # everything before this instant is promised [ns]
         self.delivered = 0  # pulses of the train whose onset has been promised
-        self._train: PulseTrain | None = None
+        self.train: PulseTrain | None = None  # the one scheduled last
 
     def schedule(self, train: PulseTrain) -> None:
         """
@@ -68,18 +68,23 @@ class IdealAnkleRobot:
         if train.first_onset < self.promised_until:
             late = (self.promised_until - train.first_onset) / 1e9
             raise LimitError(f"first_onset: lies {late:g} s inside what is already promised")
-        self._train = train
+        self.train = train
         self.delivered = 0
 
     @property
     def busy(self) -> bool:
         """Whether some pulse of the train has not been promised to its end."""
-        train = self._train
+        train = self.train
         return train is not None and train.end(train.count - 1) > self.promised_until
+
+    @property
+    def committed(self) -> bool:
+        """Whether torque may still come: of a train under way, or promised and not yet over."""
+        return self.train is not None
 
     def cancel(self) -> None:
         """Forget the train: profiles from now on hold no torque."""
-        self._train = None
+        self.train = None
 
     def promise(self, until: int) -> TorqueProfile:
         """
@@ -110,7 +115,7 @@ class IdealAnkleRobot:
 
     def _pulses(self, begin: int, until: int) -> Iterator[tuple[int, int, float]]:
         """Yield onset, end and torque of every pulse that is on somewhere in [begin, until)."""
-        train = self._train
+        train = self.train
         if train is None:
             return
         # The pulse promised last may still be on at the beginning of this stretch.

@@ -1,0 +1,83 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Options that name a protocol and change single fields of it, for every command that runs one."""
+
+import argparse
+from dataclasses import fields
+
+from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment.protocol import Protocol, read_protocol
+
+# Option -> (field of the protocol, type, what it says in the help)
+_OPTIONS = {
+    "--period-offset": ("pulses.period_offset", float, "pulse period minus stride period [s]"),
+    "--period": ("pulses.period", float, "pulse period [s], instead of an offset"),
+    "--initial-phase": (
+        "pulses.initial_phase",
+        float,
+        "first pulse, as a fraction of a stride after the baseline [0, 1)",
+    ),
+    "--torque": ("pulses.torque", float, "height of the pulses [N m], plantarflexion positive"),
+    "--torque-fraction": (
+        "pulses.torque_fraction",
+        float,
+        "the same as a fraction of the peak ankle torque",
+    ),
+    "--width": ("pulses.width", float, "duration of a pulse [s]"),
+    "--baseline": ("baseline", int, "strides before the pulses"),
+    "--pulses": ("pulses.count", int, "number of pulses"),
+    "--washout": ("washout", int, "strides after the strides of the pulses"),
+    "--side": ("side", str, "the perturbed leg: left or right"),
+    "--name": ("name", str, "name of the experiment"),
+    "--driver": ("driver", str, "ankle robot driver"),
+    "--seed": ("seed", int, "seed of whatever is random"),
+    **{
+        "--" + f.name.replace("_", "-"): (
+            f"walker.{f.name}",
+            float,
+            f"{f.metadata['meaning']} [{f.metadata['unit']}]",
+        )
+        for f in fields(WalkerParameters)
+    },
+}
+
+
+def add_protocol_options(parser: argparse.ArgumentParser) -> None:
+    """Add the protocol file and the options that override its fields."""
+    parser.add_argument(
+        "protocol", nargs="?", metavar="PROTOCOL.yaml", help="default: the paper's example"
+    )
+    group = parser.add_argument_group("fields of the protocol")
+    for option, (field, kind, text) in _OPTIONS.items():
+        group.add_argument(option, dest=field, type=kind, help=text, metavar=kind.__name__.upper())
+
+
+def chosen_protocol(options: argparse.Namespace) -> Protocol:
+    """
+    Return the protocol that the options name.
+
+    Raises
+    ------
+    ProtocolError
+        One line: place, field, what is allowed.
+
+    """
+    given = vars(options)
+    overrides = {
+        field: (given[field], option)
+        for option, (field, _, _) in _OPTIONS.items()
+        if given[field] is not None
+    }
+    return read_protocol(options.protocol, overrides)

@@ -1,0 +1,71 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""entrain simulate: the experiment in one process, without ROS."""
+
+import argparse
+import json
+import math
+import sys
+from typing import Any
+
+from gait_entrainment.commands.protocol_options import add_protocol_options, chosen_protocol
+from gait_entrainment.device import LimitError
+from gait_entrainment.protocol import ProtocolError
+from gait_entrainment.report.summary import outcome_of, summary
+
+_EXAMPLES = """examples:
+  entrain simulate                              the paper's example
+  entrain simulate --period-offset -0.07        pulses 70 ms faster than the walker
+  entrain simulate my_protocol.yaml --json      one JSON object with every stride and pulse
+"""
+
+
+def add_command(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser = commands.add_parser(
+        "simulate",
+        help="the experiment in one process, without ROS",
+        description="Conduct a protocol on the simulated walker, in one process.",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add_protocol_options(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Simulate and print; 1 where the walker falls or flies off, 2 for a protocol that is wrong."""
+    # Imported here: the compiled walker takes a while, and other commands do without it.
+    from gait_entrainment.simulation import simulate
+
+    try:
+        protocol = chosen_protocol(options)
+        simulation = simulate(protocol)
+    except (ProtocolError, LimitError) as error:
+        print(f"entrain simulate: {error}", file=sys.stderr)
+        return 2
+    outcome = outcome_of(
+        protocol,
+        simulation.analysis,
+        simulation.events,
+        simulation.measured_period,
+        simulation.train.period if simulation.train else math.nan,
+    )
+    print(json.dumps(outcome) if options.json else summary(outcome))
+    if simulation.ending is not None:
+        print(f"entrain simulate: {simulation.ending.message}", file=sys.stderr)
+        return 1
+    return 0

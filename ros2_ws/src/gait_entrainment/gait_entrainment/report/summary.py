@@ -1,0 +1,133 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The outcome of an experiment, as one mapping for machines and a few lines for people."""
+
+import math
+import statistics
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from gait_entrainment.analysis import Analysis, Verdict
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind
+from gait_entrainment.events import GaitEvent
+from gait_entrainment.protocol import Protocol
+
+# Pulses whose lags make up the final one: the paper's locked gait repeats itself exactly.
+FINAL_PULSES = 5
+
+
+def outcome_of(
+    protocol: Protocol,
+    analysis: Analysis,
+    events: Sequence[GaitEvent],
+    measured_period: float,
+    pulse_period: float,
+) -> dict[str, Any]:
+    """
+    Return what ``--json`` prints; times in seconds, None where something is not known.
+
+    Parameters
+    ----------
+    protocol
+        What was conducted.
+    analysis, events
+        What came of it.
+    measured_period, pulse_period
+        Stride period over the baseline and period of the pulses [s], NaN where never planned.
+
+    """
+    strides = [s for s in analysis.strides if s.number <= protocol.strides]
+    start = strides[0].start if strides else 0
+    last = analysis.entrainments[-1] if analysis.entrainments else None
+    verdict = last.verdict if last else Verdict.UNDECIDED
+    entrained = verdict is Verdict.ENTRAINED
+    lags = [p.phase_lag for p in analysis.pulses[-FINAL_PULSES:]]
+    toe_off = analysis.pulses[-1].toe_off if analysis.pulses else None
+    parameters = asdict(protocol)
+    parameters["side"] = protocol.side.name.lower()
+    parameters["pulses"]["torque"] = protocol.pulse_torque
+    return _without_nan(
+        {
+            "unperturbed_stride_period": measured_period,
+            "perturbation_period": pulse_period,
+            "stride_period": [stride.period for stride in strides],
+            "pulses": [
+                {
+                    "onset": (pulse.onset - start) / NANOSECONDS_PER_SECOND,
+                    "phase": pulse.phase,
+                    "phase_lag": pulse.phase_lag,
+                }
+                for pulse in analysis.pulses
+            ],
+            "verdict": verdict.name.lower(),
+            "entrained": entrained,
+            "entrained_since_stride": last.entrained_since_stride if last and entrained else None,
+            "final_phase_lag": statistics.median(lags) if lags else math.nan,
+            "double_stance": _double_stance(events, toe_off),
+            "parameters": parameters,
+        }
+    )
+
+
+def summary(outcome: dict[str, Any]) -> str:
+    """Return the outcome in a few lines."""
+    parameters = outcome["parameters"]
+    strides, pulses = outcome["stride_period"], outcome["pulses"]
+    unperturbed, period = outcome["unperturbed_stride_period"], outcome["perturbation_period"]
+    lines = [f"strides          {len(strides)}, pulses placed in them: {len(pulses)}"]
+    if unperturbed is not None:
+        lines.append(f"stride period    {unperturbed:.4f} s unperturbed, {strides[-1]:.4f} s last")
+    if period is not None:
+        torque, width = parameters["pulses"]["torque"], parameters["pulses"]["width"]
+        lines.append(
+            f"pulses           {torque:.2f} N m for {width:g} s every {period:.4f} s"
+            f" ({(period - unperturbed) * 1e3:+.1f} ms)"
+        )
+    verdict = outcome["verdict"]
+    if outcome["entrained"]:
+        verdict += f" since stride {outcome['entrained_since_stride']}"
+    lines.append(f"verdict          {verdict}")
+    lag, double_stance = outcome["final_phase_lag"], outcome["double_stance"]
+    if lag is not None and outcome["entrained"]:
+        lines.append(f"final phase lag  {lag * 1e3:+.1f} ms: {_place(lag, double_stance)}")
+    return "\n".join(lines)
+
+
+def _place(lag: float, double_stance: float | None) -> str:
+    """Say where in the gait cycle a phase lag [s] lies."""
+    if lag >= 0:
+        return "after toe-off"
+    if double_stance is None or -lag > double_stance:
+        return "before double stance"
+    percent = 100 * (1 + lag / double_stance)
+    return f"the pulse begins {percent:.0f} % into double stance ({double_stance:.3f} s)"
+
+
+def _double_stance(events: Sequence[GaitEvent], toe_off: int | None) -> float:
+    """Return the duration [s] of the double stance that a toe-off ends; NaN if unknown."""
+    if toe_off is None:
+        return math.nan
+    strikes = [e.stamp for e in events if e.kind is EventKind.HEEL_STRIKE and e.stamp < toe_off]
+    return (toe_off - max(strikes)) / NANOSECONDS_PER_SECOND if strikes else math.nan
+
+
+def _without_nan(value: Any) -> Any:
+    """Replace NaN, which JSON does not have, by None."""
+    if isinstance(value, dict):
+        return {key: _without_nan(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_without_nan(item) for item in value]
+    return None if isinstance(value, float) and math.isnan(value) else value

@@ -1,0 +1,86 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The whole experiment in one process, without ROS: the same parts in the same chain of promises.
+
+Conductor, ankle robot and walker are the objects that the nodes hold, driven in the order in
+which a lock-step run drives them. So both give the same events to the nanosecond.
+"""
+
+from dataclasses import dataclass
+
+from gait_entrainment.analysis import Analysis, VerdictSettings, analyze
+from gait_entrainment.device import DeviceLimits, IdealAnkleRobot, PulseTrain
+from gait_entrainment.events import GaitEvent
+from gait_entrainment.experiment import Conductor
+from gait_entrainment.protocol import Protocol
+from gait_entrainment.walker import Ending, WalkerRun
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """What came of a simulated experiment; stamps are nanoseconds since its start."""
+
+    protocol: Protocol
+    events: tuple[GaitEvent, ...]
+    onsets: tuple[int, ...]  # of the pulses that were delivered
+    train: PulseTrain | None  # as planned; None where the walker did not come so far
+    measured_period: float  # mean stride period over the baseline [s]; NaN without a plan
+    ending: Ending | None  # fall or fly-off; None where every stride was walked
+    analysis: Analysis
+
+
+def simulate(
+    protocol: Protocol,
+    limits: DeviceLimits | None = None,
+    settings: VerdictSettings | None = None,
+) -> Simulation:
+    """
+    Conduct a protocol on the simulated walker with the ideal ankle robot.
+
+    Raises
+    ------
+    LimitError
+        where the pulses are outside the limits of the device.
+    ProtocolError
+        where the pulses would overlap at the measured period.
+
+    """
+    robot = IdealAnkleRobot(protocol.side, 0, limits)
+    robot.limits.check_pulse(protocol.pulse_torque, protocol.pulses.width)
+    conductor = Conductor(protocol)
+    run = WalkerRun(protocol.walker, first_heel_strike=protocol.side, sample_rate=None)
+    events: list[GaitEvent] = []
+    onsets: list[int] = []
+    while not run.ended:
+        horizon = conductor.horizon(run.reached)
+        profile = robot.promise(horizon.until)
+        onsets += profile.onsets
+        run.accept(profile)
+        for transition in run.advance(horizon.until, last=horizon.last).transitions:
+            event = GaitEvent(transition.stamp, transition.kind, transition.side, transition.step)
+            events.append(event)
+            train = conductor.add_event(event)
+            if train is not None:
+                robot.schedule(train)
+    return Simulation(
+        protocol=protocol,
+        events=tuple(events),
+        onsets=tuple(onsets),
+        train=conductor.train,
+        measured_period=conductor.measured_period,
+        ending=run.ending,
+        analysis=analyze(events, onsets, protocol.side, settings),
+    )

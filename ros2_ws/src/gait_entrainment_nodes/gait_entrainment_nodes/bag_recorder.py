@@ -1,0 +1,308 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+bag_recorder: records topics into an MCAP bag that rosbag2 opens, and says what it missed.
+
+Messages are taken and written as bytes, never decoded. In lock-step it sends the walker's
+progress back once everything that it covers is written. At the end of a run it holds its counts
+against those of the publishers.
+"""
+
+import importlib
+import json
+import os
+import struct
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.qos import (
+    DurabilityPolicy,
+    HistoryPolicy,
+    QoSProfile,
+    ReliabilityPolicy,
+)
+from rclpy.serialization import deserialize_message
+
+from gait_entrainment.bags import (
+    BagError,
+    BagWriter,
+    Definition,
+    DefinitionMissingError,
+    TopicInfo,
+    find_definition,
+)
+from gait_entrainment.bags import QosProfile as OfferedQos
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
+from gait_entrainment_msgs.msg import Progress, PublishedCounts
+from gait_entrainment_nodes.node import Participant, declare, run_node
+from gait_entrainment_nodes.topics import (
+    ANKLE_TORQUE,
+    GAIT_EVENTS,
+    GROUND_REACTION,
+    JOINT_STATES,
+    PUBLISHED_COUNTS,
+    RECORDER_PROGRESS,
+    WALKER_PROGRESS,
+)
+
+# How often new topics are looked for and data is brought to the file [s].
+CARE_PERIOD = 0.2
+# How long to wait, after the end of a run, for messages and counts still on their way [s].
+CLOSING_TIMEOUT = 5.0
+# A message whose first field is a header or a stamp has it behind four bytes of CDR header.
+_STAMP = struct.Struct("<iI")
+_STAMPED = ("std_msgs/Header ", "builtin_interfaces/Time ")
+
+
+class BagRecorder(Participant, Node):
+    """ROS side of the bag writer. See the module's docstring."""
+
+    def __init__(self) -> None:
+        super().__init__("bag_recorder")
+        output = declare(self, "output", "", "folder of the bag, which must not exist yet")
+        if not output:
+            raise ValueError("output: is empty; give the folder of the bag to make")
+        chosen = declare(
+            self, "topics", [""], "topics to record, fully qualified; empty records all"
+        )
+        self.chosen = {topic for topic in chosen if topic}
+        expected = declare(
+            self,
+            "publishers",
+            [""],
+            "nodes whose final counts end the recording; empty records until stopped",
+        )
+        self.expected = {name for name in expected if name}
+        custom_data = declare(
+            self, "custom_data", "{}", "what else belongs to the record: a JSON object of texts"
+        )
+        self.begin_participation()
+        try:
+            self.bag = BagWriter(
+                output,
+                ros_distro=os.environ.get("ROS_DISTRO", "jazzy"),
+                custom_data=json.loads(custom_data),
+            )
+        except BagError as error:
+            raise ValueError(f"output: {error}") from None
+        self.acknowledge = self.create_publisher(
+            RECORDER_PROGRESS.type, RECORDER_PROGRESS.name, RECORDER_PROGRESS.qos
+        )
+        self.resolved = {
+            topic: self.resolve_topic_name(topic.name)
+            for topic in (
+                GAIT_EVENTS, JOINT_STATES, ANKLE_TORQUE, *GROUND_REACTION,
+                WALKER_PROGRESS, PUBLISHED_COUNTS, RECORDER_PROGRESS,
+            )
+        }
+        self.seen: set[str] = set()  # topics that are recorded, or cannot be
+        self.progress: Progress | None = None  # not acknowledged yet
+        self.published: dict[str, dict[str, int]] = {}  # by node: final count by topic
+        self.final_at: float | None = None  # steady time at which the end of the run was heard of
+        self._care_at = time.monotonic()
+
+    # Topics
+
+    def subscribe_to_new_topics(self) -> None:
+        """Subscribe to every topic that has a publisher and is not recorded yet."""
+        for name, types in self.get_topic_names_and_types():
+            hidden = "/_" in name or name == self.resolved[RECORDER_PROGRESS]
+            chosen = not self.chosen or name in self.chosen
+            if name in self.seen or hidden or not chosen or not self.count_publishers(name):
+                continue
+            self.seen.add(name)
+            try:
+                definition = find_definition(types[0])
+                message_type = _message_type(types[0])
+            except (DefinitionMissingError, ImportError, AttributeError) as error:
+                self.get_logger().error(f"{name} is not recorded: {error}")
+                continue
+            self.record(name, message_type, definition)
+
+    def record(self, name: str, message_type: Any, definition: Definition) -> None:
+        """Subscribe to one topic, in the quality that its publishers offer."""
+        offers = [info.qos_profile for info in self.get_publishers_info_by_topic(name)]
+        self.bag.add_topic(
+            TopicInfo(
+                name=name,
+                type=definition.type,
+                schema_text=definition.schema_text,
+                type_hash=definition.type_hash,
+                qos_profiles=tuple(_offered(offer) for offer in offers),
+            )
+        )
+        reliable = all(o.reliability == ReliabilityPolicy.RELIABLE for o in offers)
+        lasting = all(o.durability == DurabilityPolicy.TRANSIENT_LOCAL for o in offers)
+        self.create_subscription(
+            message_type,
+            name,
+            self.writer_for(name, definition),
+            QoSProfile(
+                history=HistoryPolicy.KEEP_ALL,
+                reliability=(
+                    ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
+                ),
+                durability=(
+                    DurabilityPolicy.TRANSIENT_LOCAL if lasting else DurabilityPolicy.VOLATILE
+                ),
+            ),
+            raw=True,
+        )
+
+    def writer_for(self, name: str, definition: Definition) -> Callable[[bytes], None]:
+        """Return the callback that writes the messages of one topic."""
+        stamped = _first_field(definition.schema_text).startswith(_STAMPED)
+        write, wall_clock, unpack = self.bag.write, time.time_ns, _STAMP.unpack_from
+        then = {
+            self.resolved[WALKER_PROGRESS]: self.on_progress,
+            self.resolved[PUBLISHED_COUNTS]: self.on_counts,
+        }.get(name)
+
+        def record(data: bytes) -> None:
+            received = wall_clock()
+            logged = 0
+            if stamped:
+                sec, nanosec = unpack(data, 4)
+                logged = sec * NANOSECONDS_PER_SECOND + nanosec
+            if logged <= 0:
+                logged = self.get_clock().now().nanoseconds
+            try:
+                write(name, data, logged, received)
+            except BagError as error:
+                self.failure = str(error)
+                return
+            if then is not None:
+                then(data)
+            if self.progress is not None:
+                self.acknowledge_progress()
+
+        return record
+
+    # Lock-step
+
+    def on_progress(self, data: bytes) -> None:
+        """Keep a progress message until everything that it covers is written."""
+        self.progress = deserialize_message(data, Progress)
+        if self.progress.state != Progress.WALKING:
+            self.final_at = time.monotonic()
+
+    def acknowledge_progress(self) -> None:
+        """Send the progress back once everything that it covers is written."""
+        progress, counts = self.progress, self.bag.counts
+        assert progress is not None
+        if counts.get(self.resolved[GAIT_EVENTS], progress.events) < progress.events:
+            return
+        for topic in (JOINT_STATES, ANKLE_TORQUE, *GROUND_REACTION):
+            if counts.get(self.resolved[topic], progress.samples) < progress.samples:
+                return
+        self.progress = None
+        self.acknowledge.publish(progress)
+
+    # The end
+
+    def on_counts(self, data: bytes) -> None:
+        """Take a publisher's final counts."""
+        message = deserialize_message(data, PublishedCounts)
+        node = message.node.rpartition("/")[2]
+        self.published[node] = dict(zip(message.topics, message.counts, strict=True))
+
+    def lost(self) -> dict[str, int]:
+        """Return how many messages each topic lacks against its publisher's count."""
+        lacking = {}
+        for counts in self.published.values():
+            for topic, count in counts.items():
+                if topic in self.bag.counts and self.bag.counts[topic] < count:
+                    lacking[topic] = count - self.bag.counts[topic]
+        return lacking
+
+    def next_deadline(self) -> float:
+        """Return when topics and the file are looked after next."""
+        return self._care_at
+
+    def on_deadline(self) -> None:
+        """Look for new topics, bring data to the file, end where everything is there."""
+        self._care_at = time.monotonic() + (CARE_PERIOD if self.final_at is None else 0.01)
+        try:
+            self.subscribe_to_new_topics()
+            self.bag.flush()
+        except BagError as error:
+            self.failure = str(error)
+            return
+        if self.final_at is None or not self.expected:
+            return
+        if self.expected <= self.published.keys() and not self.lost():
+            self.finished = True
+        elif time.monotonic() - self.final_at > CLOSING_TIMEOUT:
+            silent = sorted(self.expected - self.published.keys())
+            missing = [f"no final count from {', '.join(silent)}"] if silent else []
+            missing += [f"{count} of {topic} lost" for topic, count in self.lost().items()]
+            self.failure = "the record is incomplete: " + "; ".join(missing)
+
+    def not_ready(self) -> str:
+        """Return what is still waited for: nothing, once new topics have been looked for."""
+        self.subscribe_to_new_topics()
+        return super().not_ready()
+
+    def on_stop(self) -> None:
+        """Close the bag, with what was lost written into it."""
+        uncounted = sorted(self.expected - self.published.keys())
+        self.bag.custom_data["messages_lost"] = json.dumps(self.lost())
+        self.bag.custom_data["publishers_without_final_count"] = json.dumps(uncounted)
+        try:
+            self.bag.close()
+        except BagError as error:
+            self.failure = self.failure or str(error)
+
+
+def _message_type(name: str) -> Any:
+    """Return the Python class of a message type such as sensor_msgs/msg/JointState."""
+    package, kind, message = name.split("/")
+    return getattr(importlib.import_module(f"{package}.{kind}"), message)
+
+
+def _first_field(schema_text: str) -> str:
+    """Return the first line of a message definition that declares a field."""
+    for line in schema_text.splitlines():
+        declaration = line.split("#")[0].strip()
+        if declaration and "=" not in declaration:
+            return declaration
+    return ""
+
+
+def _offered(profile: QoSProfile) -> OfferedQos:
+    """Return the quality that a publisher offers in the terms of a bag."""
+    return OfferedQos(
+        history=profile.history.name.lower(),
+        depth=profile.depth,
+        reliability=profile.reliability.name.lower(),
+        durability=profile.durability.name.lower(),
+        deadline=profile.deadline.nanoseconds,
+        lifespan=profile.lifespan.nanoseconds,
+        liveliness=profile.liveliness.name.lower(),
+        liveliness_lease_duration=profile.liveliness_lease_duration.nanoseconds,
+        avoid_ros_namespace_conventions=profile.avoid_ros_namespace_conventions,
+    )
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node(BagRecorder, sys.argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

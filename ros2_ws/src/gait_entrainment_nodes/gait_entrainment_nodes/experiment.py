@@ -1,0 +1,447 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+experiment: conducts a protocol over the running nodes.
+
+It brings the participants together, starts the walker, and from then on answers every progress
+of the walker with a horizon. What to perturb and when is the core's Conductor; who is waited
+for, and for how long, is decided here.
+"""
+
+import sys
+import time
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
+from rclpy.node import Node
+from rclpy.task import Future
+from std_srvs.srv import Trigger
+
+from gait_entrainment.conventions import EventKind, Side
+from gait_entrainment.device import PulseTrain
+from gait_entrainment.events import GaitEvent
+from gait_entrainment.experiment import Conductor, Phase
+from gait_entrainment.protocol import ProtocolError, read_protocol
+from gait_entrainment_msgs import msg
+from gait_entrainment_msgs.action import DeliverPulseTrain, RunProtocol
+from gait_entrainment_msgs.srv import StartRun
+from gait_entrainment_nodes.node import Participant, declare, run_node
+from gait_entrainment_nodes.stamps import header, to_nanoseconds, to_time
+from gait_entrainment_nodes.topics import (
+    EXPERIMENT_STATE,
+    GAIT_EVENTS,
+    HORIZON,
+    RECORDER_PROGRESS,
+    TORQUE_PROFILE,
+    WALKER_PROGRESS,
+)
+
+# How often waiting is looked after [s].
+TICK = 0.02
+
+
+class ExperimentFailed(Exception):
+    """The experiment cannot go on; the message says why and names who."""
+
+
+class Experiment(Participant, Node):
+    """ROS side of the conductor. See the module's docstring."""
+
+    def __init__(self) -> None:
+        super().__init__("experiment")
+        self.participants: list[str] = declare(
+            self,
+            "participants",
+            ["walker_sim", "perturbator", "gait_analyzer"],
+            "nodes that must be ready before a run starts",
+        )
+        self.lookahead = declare(
+            self,
+            "longest_lookahead",
+            10.0,
+            "upper bound of the horizon's lead, which never exceeds a stride; "
+            "short in real time, so that more can be decided late",
+            unit="s",
+            minimum=0.05,
+            maximum=10.0,
+        )
+        self.silence_timeout = declare(
+            self,
+            "silence_timeout",
+            3.0,
+            "a participant that owes an answer for so long ends the run",
+            unit="s",
+            minimum=0.1,
+            maximum=60.0,
+        )
+        self.ready_timeout = declare(
+            self,
+            "ready_timeout",
+            30.0,
+            "how long to wait for the participants before a run",
+            unit="s",
+            minimum=1.0,
+            maximum=600.0,
+        )
+        self.begin_participation()
+        self.horizons = self.publisher(HORIZON)
+        self.states = self.publisher(EXPERIMENT_STATE)
+
+        self.run_number = 0
+        self.conductor: Conductor | None = None  # of the run that goes on
+        self._goal: Any = None
+        self._tick_at = time.monotonic() + TICK
+        self._waits: list[tuple[Future, float, str]] = []  # what, until when, why it matters
+        self._ticks: list[Future] = []
+
+        self.subscription(GAIT_EVENTS, self.on_event)
+        self.subscription(WALKER_PROGRESS, self.on_progress)
+        self.subscription(TORQUE_PROFILE, self.on_profile)
+        self.subscription(RECORDER_PROGRESS, self.on_recorder_progress)
+        self._start = self.create_client(StartRun, "walker_sim/start")
+        self._change_state = self.create_client(ChangeState, "perturbator/change_state")
+        self._deliver = ActionClient(self, DeliverPulseTrain, "perturbator/deliver_pulse_train")
+        # Ready services are looked up by name: a participant may be any node that offers one.
+        self._ready = {p: self.create_client(Trigger, f"{p}/ready") for p in self.participants}
+        self._server = ActionServer(
+            self,
+            RunProtocol,
+            "~/run_protocol",
+            execute_callback=self.execute,
+            goal_callback=lambda _: (
+                GoalResponse.REJECT if self._goal is not None else GoalResponse.ACCEPT
+            ),
+            cancel_callback=lambda _: CancelResponse.ACCEPT,
+        )
+
+    # The run
+
+    async def execute(self, goal: Any) -> RunProtocol.Result:
+        """Conduct one protocol; the result says how it ended."""
+        self._goal = goal
+        self.run_number += 1
+        self.begin_run()
+        result = RunProtocol.Result(run=self.run_number, outcome=RunProtocol.Result.FAILED)
+        try:
+            protocol = read_protocol(goal.request.protocol)
+            await self.participants_ready()
+            await self.transition(Transition.TRANSITION_CONFIGURE)
+            await self.transition(Transition.TRANSITION_ACTIVATE)
+            conductor = Conductor(protocol, self.lookahead)
+            start = await self.start_walker()
+            self.conductor = conductor
+            self.publish_horizon(start)
+            final = await self.ended
+            result.outcome = RunProtocol.Result.FINISHED
+            result.reproducible = final.reproducible
+            result.message = final.message or "every stride of the protocol was walked"
+            if final.state != msg.Progress.FINISHED:
+                raise ExperimentFailed(final.message or "the walker ended the run")
+            self.publish_state(Phase.FINISHED, result.message)
+            await self.transition(Transition.TRANSITION_DEACTIVATE)
+            goal.succeed()
+        except (ExperimentFailed, ProtocolError) as failure:
+            result.message = str(failure)
+            cancelled = goal.is_cancel_requested
+            result.outcome = (
+                RunProtocol.Result.CANCELLED if cancelled else RunProtocol.Result.FAILED
+            )
+            self.publish_state(Phase.FAILED, result.message)
+            self.diagnose(self.known_until, DiagnosticStatus.ERROR, result.message)
+            self._change_state.call_async(_transition(Transition.TRANSITION_DEACTIVATE))
+            goal.canceled() if cancelled else goal.abort()
+        self.publish_counts(self.run_number, self.known_until)
+        self.conductor = self._goal = None
+        return result
+
+    def begin_run(self) -> None:
+        """Forget the run before."""
+        self.ended = Future()  # final progress of the walker, or why the run failed
+        self.known_until = 0  # all events up to this instant have been seen [ns since 1970]
+        self.events = 0
+        self.progress: msg.Progress | None = None  # received, not answered yet
+        self.progress_at = self.profile_at = time.monotonic()
+        self.grant = self.recorded_grant = -1
+        self.recorder_heard = False
+        self.horizons_sent = self.profiles_received = 0
+        self.planning = False  # a train has been requested and not been accepted yet
+        self.shown: tuple[Phase, int] | None = None
+
+    # Bringing the participants together
+
+    async def participants_ready(self) -> None:
+        """Wait until every participant runs and all their subscriptions have been matched."""
+        deadline = time.monotonic() + self.ready_timeout
+        waiting = "participants"
+        while waiting:
+            if time.monotonic() > deadline:
+                raise ExperimentFailed(f"not ready within {self.ready_timeout:g} s: {waiting}")
+            self.fail_if_cancelled()
+            waiting = await self.not_ready_yet()
+            if waiting:
+                await self.tick()
+
+    async def not_ready_yet(self) -> str:
+        """Return who is waited for, and for what; an empty text once all are ready."""
+        for name, client in self._ready.items():
+            if not client.service_is_ready():
+                return f"{name} does not answer"
+        if not (self._start.service_is_ready() and self._deliver.server_is_ready()):
+            return "walker_sim or perturbator is not there"
+        if "bag_recorder" in self.participants:
+            for name, _ in self.get_topic_names_and_types():
+                nodes = [i.node_name for i in self.get_subscriptions_info_by_topic(name)]
+                hidden = "/_" in name or name.endswith(RECORDER_PROGRESS.name)
+                if not hidden and self.count_publishers(name) and "bag_recorder" not in nodes:
+                    return f"bag_recorder has not subscribed to {name}"
+        for name, client in self._ready.items():
+            response = await self.within(
+                client.call_async(Trigger.Request()), f"{name} does not answer"
+            )
+            if not response.success:
+                return f"{name} waits for {response.message}"
+        return f"experiment waits for {self.not_ready()}" if self.not_ready() else ""
+
+    async def transition(self, number: int) -> None:
+        """Take the perturbator through one lifecycle transition."""
+        response = await self.within(
+            self._change_state.call_async(_transition(number)), "perturbator does not answer"
+        )
+        if not response.success:
+            raise ExperimentFailed(
+                "perturbator refused to be configured, activated or deactivated; see its log"
+            )
+
+    async def start_walker(self) -> int:
+        """Start the walker; return the instant of heel strike 0 [ns since 1970]."""
+        response = await self.within(
+            self._start.call_async(StartRun.Request(run=self.run_number)),
+            "walker_sim does not answer",
+        )
+        if not response.success:
+            raise ExperimentFailed(f"walker_sim did not start: {response.message}")
+        return to_nanoseconds(response.start)
+
+    # The chain of promises
+
+    def on_event(self, event: msg.GaitEvent) -> None:
+        """Take one gait event; plan the pulses when it is time."""
+        if self.conductor is None or event.run != self.run_number:
+            return
+        self.events += 1
+        try:
+            train = self.conductor.add_event(
+                GaitEvent(
+                    to_nanoseconds(event.header.stamp),
+                    EventKind(event.kind),
+                    Side(event.side),
+                    event.step,
+                )
+            )
+        except ProtocolError as error:
+            self.fail(str(error))
+            return
+        if train is not None:
+            self.request_pulses(train)
+        self.answer_progress()
+
+    def on_progress(self, progress: msg.Progress) -> None:
+        """Take the walker's progress; it is answered once all that it covers is here."""
+        if self.conductor is None or progress.run != self.run_number:
+            return
+        self.progress, self.progress_at, self.grant = progress, time.monotonic(), progress.grant
+        self.answer_progress()
+
+    def answer_progress(self) -> None:
+        """Answer the latest progress with a horizon, unless something is still to come."""
+        progress, conductor = self.progress, self.conductor
+        if progress is None or conductor is None or self.planning:
+            return
+        if self.events < progress.events or self.ended.done():
+            return
+        self.progress = None
+        self.known_until = to_nanoseconds(progress.header.stamp)
+        if progress.state != msg.Progress.WALKING:
+            self.ended.set_result(progress)
+            return
+        self.publish_horizon(self.known_until)
+        shown = (conductor.phase(self.known_until), conductor.strides)
+        if shown != self.shown:
+            self.shown = shown
+            self.publish_state(shown[0], "")
+
+    def publish_horizon(self, known_until: int) -> None:
+        """Promise how far no new pulse will be requested."""
+        assert self.conductor is not None
+        self.known_until = known_until
+        horizon = self.conductor.horizon(known_until)
+        self.horizons.publish(
+            msg.Horizon(
+                header=header(known_until),
+                run=self.run_number,
+                until=to_time(horizon.until),
+                last=horizon.last,
+            )
+        )
+        if self.horizons_sent == self.profiles_received:
+            self.profile_at = time.monotonic()
+        self.horizons_sent += 1
+
+    def request_pulses(self, train: PulseTrain) -> None:
+        """Ask the perturbator for the pulses; no promise goes out until it has accepted."""
+        self.planning = True
+        goal = DeliverPulseTrain.Goal(
+            run=self.run_number,
+            side=train.side,
+            first_onset=to_time(train.first_onset),
+            period=train.period,
+            count=train.count,
+            torque=train.torque,
+            duration=train.duration,
+        )
+        self._deliver.send_goal_async(goal).add_done_callback(self.on_pulses_answered)
+
+    def on_pulses_answered(self, future: Future) -> None:
+        """Go on once the perturbator has accepted the pulses."""
+        train_goal = future.result()
+        if not train_goal.accepted:
+            self.fail("perturbator rejected the pulse train; its reason is in /diagnostics")
+            return
+        # Asked for at once: results expire.
+        train_goal.get_result_async().add_done_callback(self.on_pulses_ended)
+        self.planning = False
+        self.answer_progress()
+
+    def on_pulses_ended(self, future: Future) -> None:
+        """End the run where the pulses were ended before their time."""
+        result = future.result().result
+        if result.outcome in (DeliverPulseTrain.Result.STOPPED, DeliverPulseTrain.Result.CANCELLED):
+            self.fail(f"the pulses were ended: {result.message}")
+
+    def on_profile(self, profile: msg.TorqueProfile) -> None:
+        """Note that the perturbator has answered a horizon."""
+        if profile.run == self.run_number and not profile.stop:
+            self.profiles_received += 1
+            self.profile_at = time.monotonic()
+
+    def on_recorder_progress(self, progress: msg.Progress) -> None:
+        """Note how far the recorder is, to name it where it is what the walker waits for."""
+        if progress.run == self.run_number:
+            self.recorder_heard, self.recorded_grant = True, progress.grant
+
+    # Waiting, on steady time
+
+    def next_deadline(self) -> float:
+        """Return the time of the next tick."""
+        return self._tick_at
+
+    def on_deadline(self) -> None:
+        """Look after everything that is waited for."""
+        now = time.monotonic()
+        self._tick_at = now + TICK
+        waits, self._waits = self._waits, []
+        for future, deadline, reason in waits:
+            if future.done():
+                continue
+            if now > deadline:
+                future.set_exception(ExperimentFailed(reason))
+            else:
+                self._waits.append((future, deadline, reason))
+        ticks, self._ticks = self._ticks, []
+        for future in ticks:
+            future.set_result(None)
+        if self.conductor is not None and not self.ended.done():
+            silent = self.silent_participant(now)
+            if self._goal.is_cancel_requested:
+                self.fail("cancelled by the client")
+            elif silent:
+                self.fail(f"{silent} has been silent for {self.silence_timeout:g} s")
+
+    def silent_participant(self, now: float) -> str:
+        """Return who has owed an answer for too long, or an empty text."""
+        if self.horizons_sent > self.profiles_received:
+            return "perturbator" if now - self.profile_at > self.silence_timeout else ""
+        if now - max(self.progress_at, self.profile_at) <= self.silence_timeout:
+            return ""
+        if self.planning:
+            return "perturbator"
+        return (
+            "bag_recorder"
+            if self.recorder_heard and self.recorded_grant < self.grant
+            else "walker_sim"
+        )
+
+    def fail_if_cancelled(self) -> None:
+        """Raise where the client has cancelled the run."""
+        if self._goal.is_cancel_requested:
+            raise ExperimentFailed("cancelled by the client")
+
+    def fail(self, reason: str) -> None:
+        """End the run that goes on."""
+        if not self.ended.done():
+            self.ended.set_exception(ExperimentFailed(reason))
+
+    async def within(self, future: Future, reason: str) -> Any:
+        """Wait for an answer, at most for the silence timeout."""
+        self._waits.append((future, time.monotonic() + self.silence_timeout, reason))
+        return await future
+
+    async def tick(self) -> None:
+        """Wait for the next tick."""
+        future = Future()
+        self._ticks.append(future)
+        await future
+
+    # Telling people
+
+    def publish_state(self, phase: Phase, message: str) -> None:
+        """Publish phase and progress of the protocol, also as the action's feedback."""
+        state = msg.ExperimentState(
+            header=header(self.known_until),
+            run=self.run_number,
+            phase=phase,
+            message=message,
+            measured_period=float("nan"),
+            measured_period_error=float("nan"),
+            pulse_period=float("nan"),
+        )
+        conductor = self.conductor
+        if conductor is not None:
+            state.stride = min(conductor.strides, conductor.protocol.strides)
+            state.strides = conductor.protocol.strides
+            state.measured_period = conductor.measured_period
+            state.measured_period_error = conductor.measured_period_error
+            if conductor.train is not None:
+                state.pulse_period = conductor.train.period
+                state.first_onset = to_time(conductor.train.first_onset)
+        self.states.publish(state)
+        if self._goal is not None:
+            self._goal.publish_feedback(RunProtocol.Feedback(state=state))
+
+
+def _transition(number: int) -> ChangeState.Request:
+    return ChangeState.Request(transition=Transition(id=number))
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node(Experiment, sys.argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,196 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+gait_analyzer: stride periods, pulse phases and the entrainment verdict, online, from stamps.
+
+A listener: nothing waits for it. What it publishes is a pure function of the events and the
+promised onsets, however their messages interleave.
+"""
+
+import sys
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.node import Node
+
+from gait_entrainment.analysis import Entrainment, GaitAnalyzer, PulsePhase, VerdictSettings
+from gait_entrainment.analysis.analyzer import Result
+from gait_entrainment.conventions import EventKind, Side
+from gait_entrainment.events import GaitEvent, Stride
+from gait_entrainment_msgs import msg
+from gait_entrainment_nodes.node import Participant, declare, declare_fields, run_node
+from gait_entrainment_nodes.stamps import header, to_nanoseconds, to_time
+from gait_entrainment_nodes.topics import (
+    ENTRAINMENT,
+    GAIT_EVENTS,
+    PULSE_PHASES,
+    STRIDES,
+    TORQUE_PROFILE,
+    WALKER_PROGRESS,
+)
+
+
+class GaitAnalyzerNode(Participant, Node):
+    """ROS side of the analyzer."""
+
+    def __init__(self) -> None:
+        super().__init__("gait_analyzer")
+        side = declare(self, "side", "right", "the perturbed leg: left or right")
+        if side not in ("left", "right"):
+            raise ValueError(f"side: {side!r}; allowed: left, right")
+        self.side = Side[side.upper()]
+        self.settings = declare_fields(self, VerdictSettings, "verdict")
+        self.begin_participation()
+        self.strides = self.publisher(STRIDES)
+        self.pulse_phases = self.publisher(PULSE_PHASES)
+        self.entrainment = self.publisher(ENTRAINMENT)
+        self.begin_run(0)
+        self.subscription(GAIT_EVENTS, self.on_event)
+        self.subscription(TORQUE_PROFILE, self.on_profile)
+        self.subscription(WALKER_PROGRESS, self.on_progress)
+
+    def begin_run(self, run: int) -> None:
+        """Forget the run before: every message carries the number of its run."""
+        self.run_number = run
+        self.analyzer = GaitAnalyzer(self.side, self.settings)
+        self.events = 0
+        self.final: msg.Progress | None = None
+        self.doubts: dict[str, int] = {}  # counts of suspicious events, as reported last
+
+    def of_this_run(self, run: int) -> bool:
+        """Whether a message belongs to the run that is analyzed; a newer run begins anew."""
+        if run > self.run_number:
+            self.begin_run(run)
+        return run == self.run_number
+
+    def on_event(self, event: msg.GaitEvent) -> None:
+        """Take one gait event."""
+        if not self.of_this_run(event.run):
+            return
+        self.events += 1
+        stamp = to_nanoseconds(event.header.stamp)
+        results = self.analyzer.add_event(
+            GaitEvent(stamp, EventKind(event.kind), Side(event.side), event.step)
+        )
+        self.publish(results)
+        self.report_doubts(stamp)
+        self.finish_if_complete()
+
+    def on_profile(self, profile: msg.TorqueProfile) -> None:
+        """Take the onsets that are promised, or a stop."""
+        if not self.of_this_run(profile.run):
+            return
+        if profile.stop:
+            self.analyzer.stop(to_nanoseconds(profile.header.stamp))
+            return
+        onsets = [to_nanoseconds(onset) for onset in profile.onsets]
+        self.publish(self.analyzer.add_promise(onsets, to_nanoseconds(profile.valid_until)))
+
+    def on_progress(self, progress: msg.Progress) -> None:
+        """Learn of the end of the run."""
+        if self.of_this_run(progress.run) and progress.state != msg.Progress.WALKING:
+            self.final = progress
+            self.finish_if_complete()
+
+    def finish_if_complete(self) -> None:
+        """Once the run has ended and all its events are here, publish what was waiting."""
+        final = self.final
+        if final is None or self.events < final.events:
+            return
+        self.final = None
+        self.publish(self.analyzer.finish())
+        stamp = to_nanoseconds(final.header.stamp)
+        self.publish_counts(self.run_number, stamp)
+
+    def report_doubts(self, stamp: int) -> None:
+        """Say on /diagnostics when events are missing, doubled, late or contradictory."""
+        counts = self.analyzer.event_counts
+        doubts = {
+            "repeated": counts.repeated,
+            "out_of_order": counts.out_of_order,
+            "late": counts.late,
+            "contradictory": counts.contradictory,
+            "missing": counts.missing,
+            "missed_strides": counts.missed_strides,
+        }
+        if any(doubts.values()) and doubts != self.doubts:
+            self.doubts = doubts
+            self.diagnose(
+                stamp, DiagnosticStatus.WARN, "gait events are not as they should be", **doubts
+            )
+
+    def publish(self, results: list[Result]) -> None:
+        """Publish results in the order in which the core gave them."""
+        for result in results:
+            if isinstance(result, Stride):
+                self.strides.publish(self.stride_message(result))
+            elif isinstance(result, PulsePhase):
+                self.pulse_phases.publish(self.pulse_message(result))
+            else:
+                self.entrainment.publish(self.entrainment_message(result))
+
+    def stride_message(self, stride: Stride) -> msg.Stride:
+        """Convert a stride."""
+        return msg.Stride(
+            header=header(stride.end),
+            run=self.run_number,
+            side=stride.side,
+            number=stride.number,
+            start=to_time(stride.start),
+            period=stride.period,
+            step_periods=stride.step_periods,
+        )
+
+    def pulse_message(self, pulse: PulsePhase) -> msg.PulsePhase:
+        """Convert a pulse phase; the lag is NaN where the toe-off is missing."""
+        return msg.PulsePhase(
+            header=header(pulse.onset),
+            run=self.run_number,
+            side=self.side,
+            number=pulse.number,
+            stride=pulse.stride,
+            phase=pulse.phase,
+            phase_lag=pulse.phase_lag,
+            unwrapped_lag=pulse.unwrapped_lag,
+            toe_off=to_time(pulse.toe_off or 0),
+        )
+
+    def entrainment_message(self, entrainment: Entrainment) -> msg.Entrainment:
+        """Convert a verdict."""
+        return msg.Entrainment(
+            header=header(entrainment.stamp),
+            run=self.run_number,
+            side=self.side,
+            verdict=entrainment.verdict,
+            stride=entrainment.stride,
+            since_stride=entrainment.since_stride,
+            unperturbed_period=entrainment.unperturbed_period,
+            unperturbed_period_error=entrainment.unperturbed_period_error,
+            pulse_period=entrainment.pulse_period,
+            mean_period=entrainment.mean_period,
+            drift=entrainment.drift,
+            drift_interval=entrainment.drift_interval,
+            autocorrelation=entrainment.autocorrelation,
+            phase_locking_value=entrainment.phase_locking_value,
+            entrained_since_stride=entrainment.entrained_since_stride or 0,
+        )
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node(GaitAnalyzerNode, sys.argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,120 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The processes of a run: started together, watched, and stopped together, torque first.
+
+Each process writes to a log of its own. A process that ends before its time is named with the
+last lines of its log; the others are stopped within five seconds.
+"""
+
+import ctypes
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from ament_index_python.packages import get_package_prefix
+
+PACKAGE = "gait_entrainment_nodes"
+# A process has this long to stop by itself [s]; all together have less than five seconds.
+PATIENCE = 1.5
+LOG_LINES = 8
+_PR_SET_PDEATHSIG = 1
+
+
+class Supervisor:
+    """
+    Runs one process per node.
+
+    Parameters
+    ----------
+    folder
+        Where the logs go.
+    environment
+        Of every process.
+
+    """
+
+    def __init__(self, folder: Path, environment: Mapping[str, str]) -> None:
+        self._folder = folder
+        self._environment = dict(environment)
+        self._processes: dict[str, subprocess.Popen[bytes]] = {}
+        self._library = ctypes.CDLL(None)
+
+    def start(self, node: str, arguments: Sequence[str]) -> None:
+        """Start a node of the package; it gets SIGTERM should this process die."""
+        program = Path(get_package_prefix(PACKAGE)) / "lib" / PACKAGE / node
+        with self._log(node).open("wb") as log:
+            self._processes[node] = subprocess.Popen(
+                [str(program), *arguments],
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                env=self._environment,
+                # Ctrl-C reaches this process alone, which then stops the others in order.
+                start_new_session=True,
+                preexec_fn=self._die_with_parent,
+            )
+
+    def ended(self) -> dict[str, int]:
+        """Return the exit codes of the processes that have ended."""
+        codes = {node: process.poll() for node, process in self._processes.items()}
+        return {node: code for node, code in codes.items() if code is not None}
+
+    def wait(self, node: str, timeout: float) -> int | None:
+        """Wait for a process to end by itself; return its exit code, or None after the timeout."""
+        try:
+            return self._processes[node].wait(timeout)
+        except subprocess.TimeoutExpired:
+            return None
+
+    def stop(self, order: Sequence[str]) -> list[str]:
+        """
+        Stop what still runs: SIGTERM in order, SIGKILL for what does not obey.
+
+        The first in order has ended before the next is asked; the rest end side by side. Returns
+        the nodes that had to be killed.
+        """
+        running = [node for node in order if node in self._processes]
+        running = [node for node in running if self._processes[node].poll() is None]
+        killed = []
+        for group in (running[:1], running[1:-1], running[-1:] if running[1:] else []):
+            for node in group:
+                self._processes[node].terminate()
+            deadline = time.monotonic() + PATIENCE
+            for node in group:
+                if self.wait(node, max(deadline - time.monotonic(), 0)) is None:
+                    self._processes[node].send_signal(signal.SIGKILL)
+                    self._processes[node].wait()
+                    killed.append(node)
+        return killed
+
+    def last_lines(self, node: str) -> str:
+        """Return the end of a process's log."""
+        try:
+            lines = self._log(node).read_text(errors="replace").splitlines()
+        except OSError:
+            return ""
+        return "\n".join(f"  {node}| {line}" for line in lines[-LOG_LINES:])
+
+    def _log(self, node: str) -> Path:
+        return self._folder / f"{node}.log"
+
+    def _die_with_parent(self) -> None:
+        self._library.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
+        if os.getppid() == 1:  # the parent died before the line above
+            os.kill(os.getpid(), signal.SIGTERM)

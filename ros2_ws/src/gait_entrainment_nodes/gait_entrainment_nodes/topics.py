@@ -1,0 +1,83 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Every topic of the testbed: its name, type and quality of service, in one table.
+
+Names are relative, so that a namespace or a remapping moves a whole experiment. Quality of
+service: what a run depends on or is judged by is reliable and keeps all, on both ends, so that
+nothing is lost without an error; what tells a late-comer how things stand is transient local.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import WrenchStamped
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock as ClockMessage
+from sensor_msgs.msg import JointState
+
+from gait_entrainment_msgs import msg
+
+# Nothing may be lost: a writer waits for its slowest reader instead of overwriting.
+EVERY_MESSAGE = QoSProfile(
+    history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE, depth=0
+)
+# The latest state matters, also to who joins late.
+LATEST_STATE = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST,
+    depth=1,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+# What rqt and the aggregator expect of /diagnostics.
+DIAGNOSTICS_QOS = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST, depth=100, reliability=ReliabilityPolicy.RELIABLE
+)
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One topic: relative name, message type, quality of service of both ends."""
+
+    name: str
+    type: Any
+    qos: QoSProfile = EVERY_MESSAGE
+
+
+JOINT_STATES = Topic("joint_states", JointState)
+GAIT_EVENTS = Topic("gait_events", msg.GaitEvent)
+ANKLE_TORQUE = Topic("ankle_torque", msg.AnkleTorque)
+GROUND_REACTION = (
+    Topic("ground_reaction/left", WrenchStamped),
+    Topic("ground_reaction/right", WrenchStamped),
+)
+WALKER_PROGRESS = Topic("walker_sim/progress", msg.Progress)
+CLOCK = Topic("/clock", ClockMessage)
+
+TORQUE_PROFILE = Topic("perturbation/torque_profile", msg.TorqueProfile)
+PULSES = Topic("perturbation/pulses", msg.TorquePulse)
+ROBOT_STATE = Topic("perturbator/state", msg.AnkleRobotState)
+
+HORIZON = Topic("experiment/horizon", msg.Horizon)
+EXPERIMENT_STATE = Topic("experiment/state", msg.ExperimentState, LATEST_STATE)
+
+STRIDES = Topic("gait/strides", msg.Stride)
+PULSE_PHASES = Topic("gait/pulse_phases", msg.PulsePhase)
+ENTRAINMENT = Topic("gait/entrainment", msg.Entrainment, LATEST_STATE)
+
+RECORDER_PROGRESS = Topic("bag_recorder/progress", msg.Progress)
+PUBLISHED_COUNTS = Topic("published_counts", msg.PublishedCounts)
+DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, DIAGNOSTICS_QOS)
