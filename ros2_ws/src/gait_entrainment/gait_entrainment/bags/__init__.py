@@ -14,6 +14,7 @@
 
 """Bags: recording into MCAP with rosbag2's rules, reading, checking, rescuing, exporting."""
 
+from gait_entrainment.bags.checks import Finding, Severity, check
 from gait_entrainment.bags.definitions import Definition, find_definition
 from gait_entrainment.bags.errors import (
     BagError,
@@ -23,11 +24,23 @@ from gait_entrainment.bags.errors import (
     DiskFullError,
     UnreadableBagError,
 )
+from gait_entrainment.bags.mcap_file import BagMessage
 from gait_entrainment.bags.metadata import INFINITE, QosProfile, TopicInfo
+from gait_entrainment.bags.reader import BagInfo, BagReader, info
+from gait_entrainment.bags.recovery import Recovery, recover
 from gait_entrainment.bags.writer import BagWriter
 
 __all__ = [
     "BagWriter",
+    "BagReader",
+    "BagMessage",
+    "BagInfo",
+    "info",
+    "check",
+    "Finding",
+    "Severity",
+    "recover",
+    "Recovery",
     "TopicInfo",
     "QosProfile",
     "INFINITE",

@@ -182,6 +182,23 @@ def _dependencies(type_name: str, text: str) -> Iterator[str]:
         yield f"{owner or package}/{nested}/{name}"
 
 
+def missing_definitions(type_name: str, schema_text: str) -> list[str]:
+    """List the types (``package/Type``) that the text of a schema names but does not define."""
+    root, *others = schema_text.split(f"{SEPARATOR}\nMSG: ")
+    defined = {}
+    for other in others:
+        name, _, text = other.partition("\n")
+        defined[name.strip()] = text
+    needed = set()
+    try:
+        for name, text in ((type_name, root), *defined.items()):
+            full = name if name.count("/") == 2 else name.replace("/", "/msg/", 1)
+            needed |= {_short(dependency) for dependency in _dependencies(full, text)}
+    except DefinitionMissingError as error:
+        return [str(error)]
+    return sorted(needed - defined.keys())
+
+
 def _short(type_name: str) -> str:
     package, _, name = _split(type_name)
     return f"{package}/{name}"

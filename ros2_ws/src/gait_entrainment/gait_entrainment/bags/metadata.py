@@ -209,6 +209,44 @@ def offered_qos_text(profiles: Iterable[QosProfile]) -> str:
     return dump_yaml([profile.as_map() for profile in profiles])
 
 
+def parse_qos_profiles(value: object, where: str) -> tuple[QosProfile, ...]:
+    """
+    Read offered QoS profiles: a sequence of maps, or text that holds one.
+
+    Policies may be spelled as in version 9, or as the integers of earlier versions.
+
+    Raises
+    ------
+    UnreadableBagError
+        It is not of that form; the text says which key is wrong.
+
+    """
+    if isinstance(value, str):
+        value = load_yaml(value, where) or []
+    if not isinstance(value, list):
+        raise UnreadableBagError(f"{where}: not a YAML sequence")
+    return tuple(_parse_qos_profile(entry, where) for entry in value)
+
+
+def _parse_qos_profile(entry: object, where: str) -> QosProfile:
+    if not isinstance(entry, dict):
+        raise UnreadableBagError(f"{where}: a profile is not a map")
+    values: dict[str, Any] = {}
+    try:
+        for name in QosProfile.__dataclass_fields__:
+            value = entry[name]
+            if name in QOS_POLICIES and isinstance(value, int):
+                value = QOS_POLICIES[name].get(value, value)
+            elif name in ("deadline", "lifespan", "liveliness_lease_duration"):
+                value = int(value["sec"]) * NANOSECONDS_PER_SECOND + int(value["nsec"])
+            values[name] = value
+        return QosProfile(**values)
+    except KeyError as error:
+        raise UnreadableBagError(f"{where}: key {error} is missing") from None
+    except (TypeError, ValueError) as error:
+        raise UnreadableBagError(f"{where}: {error}") from None
+
+
 def dump_yaml(value: object) -> str:
     """Write YAML with the keys in the order given."""
     return str(yaml.dump(value, Dumper=_DUMPER, sort_keys=False, allow_unicode=True))

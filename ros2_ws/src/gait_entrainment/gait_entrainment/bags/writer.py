@@ -105,11 +105,11 @@ class BagWriter:
                 f"least 0; given {chunk_size}, {flush_interval}, {max_bytes}, {max_duration}"
             )
         self.folder = Path(folder).absolute()
+        self.ros_distro = ros_distro
         self.custom_data = dict(custom_data or {})
         self.counts: dict[str, int] = {}
         """Messages written so far, by topic."""
 
-        self._ros_distro = ros_distro
         self._chunk_size = chunk_size
         self._compression = COMPRESSIONS[compression]
         self._flush_interval = round(flush_interval * NANOSECONDS_PER_SECOND)
@@ -278,7 +278,7 @@ class BagWriter:
         self._require_open()
         self._flush_at = None
         try:
-            self._writer.flush()
+            self._writer.flush()  # type: ignore[no-untyped-call]
             self._file.start_sync()
         except OSError as error:
             raise self._failure(error) from None
@@ -349,9 +349,9 @@ class BagWriter:
         )
 
     def _close_file(self) -> None:
-        self._writer.flush()
+        self._writer.flush()  # type: ignore[no-untyped-call]
         self._writer.add_metadata(RECORD_NAME, self._description().as_record())
-        self._writer.finish()
+        self._writer.finish()  # type: ignore[no-untyped-call]
         self._file.sync()
 
     def _description(self) -> BagDescription:
@@ -363,7 +363,7 @@ class BagWriter:
             topics=tuple((topic, self.counts[topic.name]) for topic in self._topics.values()),
             files=tuple(self._files),
             custom_data=self.custom_data,
-            ros_distro=self._ros_distro,
+            ros_distro=self.ros_distro,
         )
 
     def _write_description(self) -> None:

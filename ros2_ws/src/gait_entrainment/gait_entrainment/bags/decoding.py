@@ -1,0 +1,69 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Decoding messages by the definitions that the bag itself carries, without ROS.
+
+`mcap-ros2-support` does it: it builds a decoder from the text of a schema, needs no installed
+message package, and takes 9 microseconds for a JointState of four joints (`rosbags`: 12). It
+reads neither wide strings nor the names of messages inside services and actions.
+"""
+
+import struct
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+from gait_entrainment.bags.errors import BagError, UnreadableBagError
+from gait_entrainment.bags.metadata import TopicInfo, first_line
+
+CDR_HEADER_SIZE = 4
+
+
+@cache
+def decoder_for(topic: TopicInfo) -> Callable[[bytes], Any]:
+    """
+    Make a decoder: CDR in, an object with one attribute per field out.
+
+    The decoder raises UnreadableBagError for bytes that are no message of the type.
+
+    Raises
+    ------
+    BagError
+        The definition cannot be understood.
+
+    """
+    # Both are slow to import (together some 20 ms), and reading raw messages needs neither.
+    from mcap.records import Schema
+    from mcap_ros2.decoder import DecoderFactory
+
+    schema = Schema(1, topic.schema_text.encode(), "ros2msg", topic.type)
+    try:
+        decode = DecoderFactory().decoder_for("cdr", schema)
+    except Exception as error:  # its parser raises whatever a line of text leads it to
+        raise BagError(
+            f"{topic.name}: the definition of {topic.type} cannot be used: {first_line(error)}"
+        ) from None
+    if decode is None:
+        raise BagError(f"{topic.name}: no decoder for {topic.type}")
+
+    def decode_or_say(data: bytes) -> Any:
+        try:
+            return decode(data)
+        except (struct.error, ValueError, IndexError, NotImplementedError, MemoryError) as error:
+            raise UnreadableBagError(
+                f"{topic.name}: not a {topic.type} in CDR: {first_line(error)}"
+            ) from None
+
+    return decode_or_say
