@@ -18,6 +18,7 @@ Monte Carlo of the entrainment verdict on noisy walkers that are known to lock, 
 Prints the table of docs/analysis.md: python monte_carlo.py [TRIALS]
 """
 
+import statistics
 import sys
 from collections import Counter
 from collections.abc import Iterator
@@ -39,7 +40,7 @@ from synthetic_gait import (
     white,
 )
 
-from gait_entrainment.analysis import Verdict, analyze
+from gait_entrainment.analysis import Verdict, analyze, drift_of
 from gait_entrainment.conventions import Side
 
 
@@ -64,12 +65,14 @@ class Outcome:
     trials: int
     ever_entrained: int  # trials in which any stride was called entrained
     final: Counter[Verdict]  # verdicts at the last pulse
+    since: list[int]  # entrained_since_stride, where entrained at the last pulse
 
     def __str__(self) -> str:
         cells = [rate(self.ever_entrained, self.trials)]
         cells.append(rate(self.final[Verdict.ENTRAINED], self.trials))
         others = [v for v in Verdict if v != Verdict.ENTRAINED]
         cells += [f"{100 * self.final[v] / self.trials:.1f}" for v in others]
+        cells.append(f"{statistics.median(self.since):g}" if self.since else "-")
         return " " + " | ".join(cells) + " |"
 
 
@@ -88,13 +91,27 @@ def rate(successes: int, trials: int) -> str:
 
 def run(case: Case, trials: int, seed: int = 2012) -> Outcome:
     """Run independent trials of one case; the same seed gives the same trials."""
-    ever, final = 0, Counter[Verdict]()
+    ever, final, since = 0, Counter[Verdict](), []
     for rng in np.random.default_rng(seed).spawn(trials):
         events, onsets = noisy_walk(rng, case.response, case.noise, case.variation)
-        verdicts = [e.verdict for e in analyze(events, onsets, Side.RIGHT).entrainments]
-        ever += Verdict.ENTRAINED in verdicts
-        final[verdicts[-1]] += 1
-    return Outcome(trials, ever, final)
+        entrainments = analyze(events, onsets, Side.RIGHT).entrainments
+        ever += any(e.verdict == Verdict.ENTRAINED for e in entrainments)
+        last = entrainments[-1]
+        final[last.verdict] += 1
+        if last.entrained_since_stride is not None:
+            since.append(last.entrained_since_stride)
+    return Outcome(trials, ever, final, since)
+
+
+def coverage(noise: Noise, trials: int, seed: int = 2012) -> float:
+    """Return how often the drift's 95 % interval over 20 strides holds the true slope."""
+    rng, covered = np.random.default_rng(seed), 0
+    strides = np.arange(20.0)
+    for _ in range(trials):
+        lags = 0.02 * strides + 0.04 * noise(rng, len(strides))
+        drift = drift_of(strides.tolist(), lags.tolist(), 0.95, 0.9)
+        covered += abs(drift.slope - 0.02) <= drift.half_width
+    return covered / trials
 
 
 NOISES: tuple[Noise, ...] = (white, autoregressive, long_range)
@@ -115,8 +132,13 @@ if __name__ == "__main__":
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
     print(
         "| walker | noise | CV | ever entrained, % (95 % interval) | at the last pulse: "
-        "entrained, % | undecided, % | drifting, % | lost, % | untestable, % |"
+        "entrained, % | undecided, % | drifting, % | lost, % | untestable, % | entrained since "
+        "stride, median |"
     )
-    print("| --- " * 9 + "|")
+    print("| --- " * 10 + "|")
     for each in cases():
         print(each, run(each, count), sep="", flush=True)
+    for noise in NOISES:
+        print(
+            f"coverage of the drift's interval, {noise.__name__}: {coverage(noise, 4 * count):.3f}"
+        )

@@ -21,6 +21,7 @@ import pytest
 import scipy.stats
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from monte_carlo import coverage
 from synthetic_gait import Noise, autoregressive, white
 
 from gait_entrainment.analysis import drift_of
@@ -90,10 +91,4 @@ def test_too_little_to_tell(x: list[float], y: list[float]) -> None:
     ("noise", "low", "high"), [(white, 0.94, 0.99), (autoregressive, 0.84, 0.92)]
 )
 def test_coverage_of_the_interval(noise: Noise, low: float, high: float) -> None:
-    rng = np.random.default_rng(1)
-    x = [float(k) for k in range(20)]
-    covered = 0
-    for _ in range(2000):
-        drift = drift_of(x, list(0.02 * np.array(x) + 0.04 * noise(rng, 20)), 0.95, 0.9)
-        covered += abs(drift.slope - 0.02) <= drift.half_width
-    assert low < covered / 2000 < high
+    assert low < coverage(noise, 2000) < high
