@@ -35,5 +35,8 @@ setup(
     ],
     install_requires=["setuptools"],
     zip_safe=False,
-    entry_points={"console_scripts": [f"{node} = {NAME}.{node}:main" for node in NODES]},
+    entry_points={
+        "console_scripts": [f"{node} = {NAME}.{node}:main" for node in NODES],
+        "gait_entrainment.commands": [f"run = {NAME}.run_command:add_command"],
+    },
 )

@@ -1,0 +1,149 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Figures of one run: stride period, phase lag, and ankle torque stride by stride.
+
+matplotlib is imported only when a figure is drawn: it takes longer than a whole simulation.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
+from gait_entrainment.report.recorded_run import RecordedRun
+
+# Colours that stay apart for colour-blind readers and in print (Okabe and Ito 2008).
+BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#777777"
+# Strides drawn in the torque figure: more would not be told apart.
+STRIDES_DRAWN = 24
+
+
+def draw_figures(run: RecordedRun, folder: Path) -> list[Path]:
+    """Draw the figures of a run as PNG files into a folder; return their paths."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    figures = {
+        "stride_period.png": _stride_period(run),
+        "phase_lag.png": _phase_lag(run),
+        "ankle_torque.png": _ankle_torque(run),
+    }
+    for name, figure in figures.items():
+        figure.savefig(folder / name, dpi=130)
+    return [folder / name for name in figures]
+
+
+def _axes(height: float = 3.6) -> tuple[Any, Any]:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.2, height), layout="constrained")
+    axes = figure.subplots()
+    axes.spines[["top", "right"]].set_visible(False)
+    return figure, axes
+
+
+def _shade_pulses(run: RecordedRun, axes: Any) -> None:
+    """Shade the strides in which pulses were given."""
+    strides = [p.stride for p in run.analysis.pulses]
+    if strides:
+        axes.axvspan(
+            min(strides) - 0.5, max(strides) + 0.5, color=ORANGE, alpha=0.10, lw=0, label="pulses"
+        )
+
+
+def _stride_period(run: RecordedRun) -> Any:
+    figure, axes = _axes()
+    _shade_pulses(run, axes)
+    for period, text, colour, style in (
+        (run.measured_period, "unperturbed", GREY, "--"),
+        (run.pulse_period, "pulse period", ORANGE, "-."),
+    ):
+        if np.isfinite(period):
+            axes.axhline(period, color=colour, ls=style, lw=1.2, label=f"{text} {period:.4f} s")
+    strides = run.analysis.strides
+    axes.plot([s.number for s in strides], [s.period for s in strides], ".-", color=BLUE, lw=0.8)
+    axes.set(xlabel="stride", ylabel="stride period [s]", title="Stride period")
+    axes.ticklabel_format(useOffset=False)
+    axes.legend(frameon=False)
+    return figure
+
+
+def _phase_lag(run: RecordedRun) -> Any:
+    figure, axes = _axes()
+    pulses = run.analysis.pulses
+    axes.axhline(0, color=GREY, ls="--", lw=1.2, label="toe-off: end of double stance")
+    axes.plot(
+        [p.stride for p in pulses],
+        [p.phase_lag * 1e3 for p in pulses],
+        ".-",
+        color=BLUE,
+        lw=0.8,
+        label="pulse onset",
+    )
+    last = run.analysis.entrainments[-1] if run.analysis.entrainments else None
+    if last is not None and last.entrained_since_stride:
+        axes.axvline(
+            last.entrained_since_stride,
+            color=GREEN,
+            lw=1.2,
+            label=f"near its final lag since stride {last.entrained_since_stride}",
+        )
+    axes.set(xlabel="stride", ylabel="onset minus toe-off [ms]", title="Phase lag of the pulses")
+    axes.legend(frameon=False)
+    return figure
+
+
+def _ankle_torque(run: RecordedRun) -> Any:
+    """Draw one line of ankle torque per stride, from the other leg's heel strike on, as Fig. 7."""
+    strides = [s for s in run.analysis.strides if s.number <= run.protocol.strides]
+    chosen = np.unique(np.linspace(0, len(strides) - 1, STRIDES_DRAWN).round().astype(int))
+    rows = [strides[i] for i in chosen] if strides else []
+    figure, axes = _axes(height=2 + 0.28 * len(rows))
+    torques = run.torques
+    scale = 0.9 / max(run.protocol.walker.peak_torque, 1.0)
+    longest = 0.0
+    for row, stride in enumerate(rows):
+        inside = (torques.stamps >= stride.start) & (torques.stamps < stride.end)
+        time = (torques.stamps[inside] - stride.start) / NANOSECONDS_PER_SECOND
+        longest = max(longest, stride.period)
+        own = torques.intrinsic[inside] * scale
+        whole = own + torques.effective[inside] * scale
+        delivered = torques.delivered[inside] != 0
+        axes.fill_between(time, row, row + own, color=BLUE, alpha=0.35, lw=0)
+        axes.fill_between(time, row + own, row + whole, color=ORANGE, lw=0)
+        axes.plot(time, row + whole, color=BLUE, lw=0.6)
+        axes.plot(
+            time[delivered], np.full(delivered.sum(), row - 0.12), "s", ms=1.5, color=ORANGE
+        )
+        axes.text(
+            longest * 1.01 if row else stride.period * 1.01,
+            row,
+            f"{stride.period:.4f} s",
+            fontsize=7,
+            va="bottom",
+        )
+    axes.set_yticks(range(len(rows)), [str(s.number) for s in rows], fontsize=7)
+    axes.invert_yaxis()
+    axes.set_ylim(len(rows) - 0.5, -1.1)
+    axes.set(
+        xlabel="time since heel strike of the perturbed leg [s]",
+        ylabel="stride",
+        title="Ankle torque: own push-off (blue), pulse that acts (orange), "
+        "pulse delivered (orange line)",
+    )
+    axes.title.set_fontsize(9)
+    return figure

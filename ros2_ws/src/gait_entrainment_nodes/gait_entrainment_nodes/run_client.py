@@ -1,0 +1,147 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The client of a run: asks the experiment to conduct a protocol, and shows how it goes."""
+
+import time
+from typing import Any
+
+import rclpy
+from rclpy.action import ActionClient
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from tqdm import tqdm
+
+from gait_entrainment.protocol import Protocol
+from gait_entrainment_msgs.action import RunProtocol
+from gait_entrainment_msgs.msg import ExperimentState, PulsePhase, Stride
+from gait_entrainment_nodes.node_list import NODES
+from gait_entrainment_nodes.supervisor import Supervisor
+from gait_entrainment_nodes.topics import PULSE_PHASES, STRIDES
+
+# How long the experiment may take to appear, and the analyzer to lag behind it [s].
+APPEARANCE_TIMEOUT = 30.0
+ANALYZER_TIMEOUT = 5.0
+
+
+class RunClient:
+    """
+    Conducts one protocol through the experiment node.
+
+    Parameters
+    ----------
+    supervisor
+        The processes to watch meanwhile.
+    protocol
+        What is conducted, for the length of the progress bar.
+    quiet
+        Show no progress.
+
+    """
+
+    def __init__(self, supervisor: Supervisor, protocol: Protocol, quiet: bool) -> None:
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        self._supervisor = supervisor
+        self._node = Node("entrain_run")
+        self._executor = EventsExecutor()
+        self._executor.add_node(self._node)
+        self._client = ActionClient(self._node, RunProtocol, "experiment/run_protocol")
+        for topic, callback in ((STRIDES, self._on_stride), (PULSE_PHASES, self._on_pulse)):
+            self._node.create_subscription(topic.type, topic.name, callback, topic.qos)
+        self._bar = tqdm(
+            total=protocol.strides, unit="stride", disable=True if quiet else None, leave=False
+        )
+        self._stride_period = self._phase_lag = ""
+        self._strides_walked = self._strides_analyzed = 0
+        self._analyzed_at = time.monotonic()
+
+    def conduct(self, protocol_text: str) -> tuple[str, str]:
+        """
+        Conduct a protocol to its end.
+
+        Returns
+        -------
+        failure
+            Why the run failed, or an empty text.
+        blamed
+            The node whose log may tell more, or an empty text.
+
+        """
+        deadline = time.monotonic() + APPEARANCE_TIMEOUT
+        while not self._client.server_is_ready():
+            if time.monotonic() > deadline:
+                return f"experiment did not appear within {APPEARANCE_TIMEOUT:g} s", "experiment"
+            ended = self._spin()
+            if ended:
+                return ended
+        goal_future = self._client.send_goal_async(
+            RunProtocol.Goal(protocol=protocol_text), feedback_callback=self._on_feedback
+        )
+        result_future = None
+        while result_future is None or not result_future.done():
+            ended = self._spin()
+            if ended:
+                return ended
+            if result_future is None and goal_future.done():
+                goal = goal_future.result()
+                if not goal.accepted:
+                    return "experiment rejected the protocol: it conducts another", "experiment"
+                result_future = goal.get_result_async()
+                self._analyzed_at = time.monotonic()
+        self._bar.close()
+        result = result_future.result().result
+        if result.outcome == RunProtocol.Result.FINISHED:
+            return "", ""
+        blamed = [node for node in NODES if node in result.message]
+        return result.message, blamed[0] if blamed else ""
+
+    def close(self) -> None:
+        """Leave the ROS graph."""
+        self._bar.close()
+        self._executor.shutdown()
+        self._node.destroy_node()
+        rclpy.try_shutdown()
+
+    def _spin(self) -> tuple[str, str] | None:
+        """Serve ROS for a moment; return failure and node where one has ended or is stuck."""
+        self._executor.spin_once(timeout_sec=0.05)
+        for node, code in self._supervisor.ended().items():
+            # The recorder ends by itself once the record is complete.
+            if node != "bag_recorder" or code != 0:
+                return f"{node} ended unexpectedly with exit code {code}", node
+        behind = self._strides_walked - self._strides_analyzed
+        if behind <= 0:
+            self._analyzed_at = time.monotonic()
+        elif time.monotonic() - self._analyzed_at > ANALYZER_TIMEOUT:
+            return f"gait_analyzer is {behind} strides behind and silent", "gait_analyzer"
+        return None
+
+    def _on_feedback(self, message: Any) -> None:
+        state: ExperimentState = message.feedback.state
+        self._strides_walked = state.stride
+        self._bar.update(state.stride - self._bar.n)
+
+    def _on_stride(self, stride: Stride) -> None:
+        self._strides_analyzed = stride.number
+        self._analyzed_at = time.monotonic()
+        self._stride_period = f"period {stride.period:.4f} s"
+        self._show()
+
+    def _on_pulse(self, pulse: PulsePhase) -> None:
+        self._phase_lag = f"lag {pulse.phase_lag * 1e3:+.0f} ms"
+        self._show()
+
+    def _show(self) -> None:
+        self._bar.set_postfix_str(f"{self._stride_period} {self._phase_lag}", refresh=False)

@@ -1,0 +1,209 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""entrain run: the nodes as processes, one protocol conducted, the run recorded."""
+
+import argparse
+import json
+import math
+import os
+import signal
+import sys
+import tempfile
+from datetime import datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import yaml
+from ament_index_python.packages import get_package_share_directory
+
+from gait_entrainment.bags import BagError
+from gait_entrainment.commands.protocol_options import add_protocol_options, chosen_protocol
+from gait_entrainment.device import DeviceLimits, LimitError
+from gait_entrainment.protocol import Protocol, ProtocolError, write_protocol
+from gait_entrainment_nodes.domain import DomainError, claimed_domain
+from gait_entrainment_nodes.node_list import NODES, STOP_ORDER, parameters
+from gait_entrainment_nodes.supervisor import PACKAGE, Supervisor
+
+_EXAMPLES = """examples:
+  entrain run                          the paper's example, as fast as it goes
+  entrain run --real-time              the same at the pace of the wall clock
+  entrain run my_protocol.yaml --out bags/mine
+  ROS_DOMAIN_ID=42 entrain run         in a domain of your choice, to listen with other tools
+"""
+# After the experiment has ended, the recorder has this long to close the bag [s].
+CLOSING_TIMEOUT = 15.0
+
+
+class RunFailed(Exception):
+    """The run has failed; the message says why."""
+
+
+def add_command(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser = commands.add_parser(
+        "run",
+        help="the experiment over real ROS 2 nodes, recorded",
+        description="Start the nodes, conduct a protocol, record a bag, print the outcome.",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add_protocol_options(parser)
+    parser.add_argument(
+        "--real-time", action="store_true", help="at the pace of the wall clock, not in lock-step"
+    )
+    parser.add_argument("--out", type=Path, help="folder of the bag; default bags/<time>_<name>")
+    parser.add_argument(
+        "--sample-rate",
+        type=float,
+        default=200.0,
+        help="samples per second, 0 to 1000; 0 samples at gait events only (default 200)",
+    )
+    parser.add_argument(
+        "--no-ground-reaction", action="store_true", help="leave out the ground reaction forces"
+    )
+    parser.add_argument("--no-figures", action="store_true", help="draw no figures")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run one experiment; 1 where it failed, 2 for a protocol or an option that is wrong."""
+    try:
+        protocol = chosen_protocol(options)
+        DeviceLimits().check_pulse(protocol.pulse_torque, protocol.pulses.width)
+        if not 0 <= options.sample_rate <= 1000:
+            raise ProtocolError(f"--sample-rate: {options.sample_rate:g}; allowed: 0 to 1000 Hz")
+        bag = options.out or Path("bags") / f"{datetime.now():%Y%m%d-%H%M%S}_{protocol.name}"
+        if bag.exists():
+            raise ProtocolError(f"--out: {bag} is already there; a bag is never overwritten")
+    except (ProtocolError, LimitError) as error:
+        print(f"entrain run: {error}", file=sys.stderr)
+        return 2
+    # Stopping from outside takes the same path as Ctrl-C: torque first, then the rest.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        with claimed_domain() as domain:
+            conduct(protocol, bag, domain, options)
+        return report(bag, options)
+    except KeyboardInterrupt:
+        print(f"entrain run: interrupted; what was recorded is in {bag}", file=sys.stderr)
+    except (RunFailed, DomainError, BagError) as error:
+        print(f"entrain run: {error}", file=sys.stderr)
+    return 1
+
+
+def conduct(protocol: Protocol, bag: Path, domain: int, options: argparse.Namespace) -> None:
+    """Start the nodes, conduct the protocol, stop the nodes."""
+    # Imported here, so that a mistake in the protocol is answered without waiting for rclpy.
+    from gait_entrainment_nodes.run_client import RunClient
+
+    environment = {
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "FASTRTPS_DEFAULT_PROFILES_FILE": str(
+            Path(get_package_share_directory(PACKAGE)) / "config" / "fastdds.xml"
+        ),
+        **os.environ,
+        "ROS_DOMAIN_ID": str(domain),
+    }
+    os.environ.update(environment)  # for the client in this process
+    text = write_protocol(protocol)
+    sampling = {
+        "sample_rate": options.sample_rate,
+        "ground_reaction": not options.no_ground_reaction,
+    }
+    node_parameters = parameters(
+        protocol,
+        str(bag.absolute()),
+        json.dumps(provenance(protocol, text, options.real_time)),
+        real_time=options.real_time,
+        sampling=sampling,
+    )
+    with tempfile.TemporaryDirectory(prefix="entrain_") as folder:
+        parameter_file = Path(folder) / "parameters.yaml"
+        parameter_file.write_text(
+            yaml.safe_dump({f"/**/{n}": {"ros__parameters": p} for n, p in node_parameters.items()})
+        )
+        supervisor = Supervisor(Path(folder), environment)
+        try:
+            for node in NODES:
+                arguments = ["--ros-args", "--params-file", str(parameter_file)]
+                if not options.real_time:
+                    arguments += ["-p", "use_sim_time:=true"]
+                supervisor.start(node, arguments)
+            client = RunClient(supervisor, protocol, quiet=options.json)
+            try:
+                failure, blamed = client.conduct(text)
+                if not failure and supervisor.wait("bag_recorder", CLOSING_TIMEOUT) != 0:
+                    failure, blamed = "bag_recorder did not complete the record", "bag_recorder"
+            finally:
+                client.close()
+        finally:
+            supervisor.stop(STOP_ORDER)
+        if failure:
+            lines = supervisor.last_lines(blamed) if blamed else ""
+            kept = f"\nthe bag of the run so far is {bag}" if bag.exists() else ""
+            raise RunFailed(f"{failure}{kept}" + (f"\n{lines}" if lines else ""))
+    (bag / "protocol.yaml").write_text(text)
+
+
+def provenance(protocol: Protocol, text: str, real_time: bool) -> dict[str, str]:
+    """Return what the bag keeps of how it came about."""
+    packages = ("gait_entrainment", "numpy", "mcap")
+    return {
+        "protocol": text,
+        "driver": protocol.driver,
+        "seed": str(protocol.seed),
+        "mode": "real time" if real_time else "lock-step",
+        "versions": json.dumps({package: version(package) for package in packages}),
+    }
+
+
+def report(bag: Path, options: argparse.Namespace) -> int:
+    """Print the outcome from the bag and draw its figures."""
+    from gait_entrainment.report.recorded_run import read_run
+    from gait_entrainment.report.summary import outcome_of, summary
+
+    recorded = read_run(bag)
+    outcome = outcome_of(
+        recorded.protocol,
+        recorded.analysis,
+        recorded.events,
+        recorded.measured_period,
+        recorded.pulse_period,
+    )
+    factor = recorded.real_time_factor
+    outcome |= {
+        "bag": str(bag),
+        "messages": recorded.messages,
+        "lost": recorded.lost,
+        "real_time_factor": None if math.isnan(factor) else factor,
+    }
+    figures = []
+    if not options.no_figures:
+        from gait_entrainment.report.figures import draw_figures
+
+        figures = draw_figures(recorded, bag)
+    if options.json:
+        print(json.dumps(outcome))
+        return 0
+    print(summary(outcome))
+    if not math.isnan(factor):
+        print(f"speed            {factor:.0f} times real time")
+    print(f"messages         {recorded.messages} recorded, {recorded.lost} lost")
+    print(f"bag              {bag}")
+    for figure in figures:
+        print(f"figure           {figure}")
+    return 0
