@@ -40,7 +40,7 @@ from synthetic_gait import (
     white,
 )
 
-from gait_entrainment.analysis import Verdict, analyze, drift_of
+from gait_entrainment.analysis import Verdict, VerdictSettings, analyze, drift_of
 from gait_entrainment.conventions import Side
 
 
@@ -51,11 +51,12 @@ class Case:
     response: Response
     noise: Noise
     variation: float  # coefficient of variation of the stride periods
+    window: int = 20  # pulses judged at a time
 
     def __str__(self) -> str:
         walker = self.response.__name__.replace("_", " ")
         noise = self.noise.__name__.replace("_", " ")
-        return f"| {walker} | {noise} | {100 * self.variation:g} % |"
+        return f"| {walker} | {noise} | {100 * self.variation:g} % | {self.window} |"
 
 
 @dataclass(frozen=True)
@@ -91,10 +92,11 @@ def rate(successes: int, trials: int) -> str:
 
 def run(case: Case, trials: int, seed: int = 2012) -> Outcome:
     """Run independent trials of one case; the same seed gives the same trials."""
+    rule = VerdictSettings(window=case.window)
     ever, final, since = 0, Counter[Verdict](), []
     for rng in np.random.default_rng(seed).spawn(trials):
         events, onsets = noisy_walk(rng, case.response, case.noise, case.variation)
-        entrainments = analyze(events, onsets, Side.RIGHT).entrainments
+        entrainments = analyze(events, onsets, Side.RIGHT, rule).entrainments
         ever += any(e.verdict == Verdict.ENTRAINED for e in entrainments)
         last = entrainments[-1]
         final[last.verdict] += 1
@@ -126,16 +128,19 @@ def cases() -> Iterator[Case]:
         for variation in variations:
             for noise in NOISES:
                 yield Case(response, noise, variation)
+    for response in (ignores, locks):
+        for noise in NOISES:
+            yield Case(response, noise, 0.02, window=30)
 
 
 if __name__ == "__main__":
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
     print(
-        "| walker | noise | CV | ever entrained, % (95 % interval) | at the last pulse: "
+        "| walker | noise | CV | N | ever entrained, % (95 % interval) | at the last pulse: "
         "entrained, % | undecided, % | drifting, % | lost, % | untestable, % | entrained since "
         "stride, median |"
     )
-    print("| --- " * 10 + "|")
+    print("| --- " * 11 + "|")
     for each in cases():
         print(each, run(each, count), sep="", flush=True)
     for noise in NOISES:
