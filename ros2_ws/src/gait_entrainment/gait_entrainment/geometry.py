@@ -25,8 +25,8 @@ foot AD = l and the leg DC = L at the angle psi. The law of cosines for the side
 so sin(theta) and cos(psi) are linear in each other, which is the paper's function psi(theta)
 solved for the sine. While the walker moves on, theta falls and psi grows.
 
-The functions take plain numbers and import only `math`: the parameters use them as they are, the
-walker compiles the same functions. Lengths are in m, angles in rad, forces in N, torques in N m,
+The functions take plain numbers, import only `math` and call no other: the parameters use them as
+they are, the walker compiles each. Lengths are in m, angles in rad, forces in N, torques in N m,
 masses in kg, rates in rad/s. Equation numbers are those of Ahn and Hogan (2012).
 """
 
@@ -54,7 +54,7 @@ def ankle_cosine(
 def leg_per_ankle(
     sin_ankle: float, cos_leg: float, foot_length: float, separation: float
 ) -> float:
-    """Transmission -d theta / d psi of the linkage, positive: both sides of `leg_sine`, derived."""
+    """Transmission -d theta / d psi of the linkage, positive: the derivative of `leg_sine`."""
     return foot_length / separation * sin_ankle / cos_leg
 
 
@@ -73,7 +73,7 @@ def spring_torque(ankle: float, stiffness: float, max_plantarflexion: float) -> 
 
 
 def torque_work(angle: float, torque: float, stiffness: float) -> float:
-    """Work [J] over an ankle rotation by `angle` of a torque that falls off linearly from `torque`."""
+    """Work [J] over a rotation by `angle` of a torque that falls off linearly from `torque`."""
     return angle * (torque - 0.5 * stiffness * angle)
 
 
@@ -87,10 +87,9 @@ def trailing_reach(cos_ankle: float, leg_length: float, foot_length: float) -> f
 
 
 def trailing_force(
-    torque: float, sin_ankle: float, cos_ankle: float, leg_length: float, foot_length: float
+    torque: float, sin_ankle: float, reach: float, leg_length: float, foot_length: float
 ) -> float:
-    """Ground reaction F_A at the trailing toe, along AC, from the moment balance of the foot, Eq. 5."""
-    reach = trailing_reach(cos_ankle, leg_length, foot_length)
+    """Ground reaction F_A at the trailing toe, along AC = reach: moments on the foot, Eq. 5."""
     return torque * reach / (leg_length * foot_length * sin_ankle)
 
 
@@ -100,7 +99,7 @@ def unloading_arm(
     """
     Force that a newton metre of trailing ankle torque takes off the leading leg [1/m].
 
-    From the paper's F_B: F_A (cos(phi) sin(theta) - sin(phi) cos(theta)) with F_A from Eq. 5, where
+    From the paper's F_B: F_A (cos(phi) sin(theta) - sin(phi) cos(theta)), F_A from Eq. 5, where
     |AC| cos(phi) = d - L sin(theta) and |AC| sin(phi) = L cos(theta), is
     -T (L - d sin(theta)) / (L l sin(psi)).
     """
@@ -110,7 +109,7 @@ def unloading_arm(
 def pendulum_force(
     cos_leg: float, squared_rate: float, mass: float, gravity: float, leg_length: float
 ) -> float:
-    """Ground reaction along the leading leg of the bare inverted pendulum, m g cos(theta) - m L w^2."""
+    """Ground reaction [N] on an inverted pendulum, m g cos(theta) - m L theta_dot^2."""
     return mass * (gravity * cos_leg - leg_length * squared_rate)
 
 
@@ -126,3 +125,18 @@ def trailing_leg_angle(
     toe = math.atan2(leg_length * sin_leg - separation, leg_length * cos_leg)
     foot = math.atan2(foot_length * math.sin(ankle), leg_length - foot_length * math.cos(ankle))
     return toe - foot
+
+
+def trailing_leg_per_ankle(
+    ankle: float,
+    sin_leg: float,
+    transmission: float,
+    reach: float,
+    leg_length: float,
+    foot_length: float,
+    separation: float,
+) -> float:
+    """Derivative of `trailing_leg_angle` by psi; `transmission` and `reach` as at that posture."""
+    toe = transmission * leg_length * (leg_length - separation * sin_leg)
+    foot = foot_length * (leg_length * math.cos(ankle) - foot_length)
+    return -(toe + foot) / (reach * reach)

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Parameters of the ankle-actuated walker (Table 1 of Ahn and Hogan 2012), and what follows from them.
+Parameters of the ankle-actuated walker (Table 1 of Ahn and Hogan 2012) and what they imply.
 
 A walker exists only where the linkage closes and a period-one gait vaults over each step without
 flying off the ground. Its construction checks that, and an error says by how much it fails. The
@@ -100,8 +100,8 @@ class WalkerParameters:
         least, most = math.asin(min(1.0, self.foot_length / (2 * self.leg_length))), math.pi / 4
         if least >= most:
             raise ParameterError(
-                f"foot_length {self.foot_length:g} m is too long for legs of {self.leg_length:g} m:"
-                f" allowed: below {2 * self.leg_length * math.sin(most):g} m"
+                f"foot_length {self.foot_length:g} m is too long for legs of"
+                f" {self.leg_length:g} m; allowed: below {2 * self.leg_length * math.sin(most):g} m"
             )
         if not least < self.leg_angle < most:
             raise ParameterError(
@@ -159,7 +159,7 @@ class WalkerParameters:
 
     @property
     def double_stance_start(self) -> float:
-        """Angle psi [rad] of the trailing ankle at heel strike: its foot flat, its leg at -alpha."""
+        """Angle psi [rad] of the trailing ankle at heel strike: foot flat, leg at -alpha."""
         return math.pi / 2 - self.leg_angle
 
     @property

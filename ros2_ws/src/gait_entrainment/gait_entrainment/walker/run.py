@@ -21,7 +21,8 @@ import numpy as np
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side, nanoseconds
 from gait_entrainment.device import TorqueProfile
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment.walker.walker import Ending, Samples, Transition, Walker
+from gait_entrainment.walker.sampling import Samples
+from gait_entrainment.walker.walker import Ending, Transition, Walker
 
 
 @dataclass(frozen=True)

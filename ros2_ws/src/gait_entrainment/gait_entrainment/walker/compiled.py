@@ -1,0 +1,58 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+How the walker's functions are compiled: numba, kept on disk, to the bit the same every time.
+
+No fastmath: it would let the compiler reorder sums, differently in every place a function is
+inlined, and the walker's results are promised to the bit. Division follows IEEE (a panel that runs
+into a stall yields infinity or NaN and is refused there) instead of raising, which is also what
+lets loops run in vector registers.
+"""
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+
+from gait_entrainment import geometry
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def _sources() -> tuple[str, int]:
+    """Stamp of every source file that the compiled functions are made of."""
+    here = Path(__file__).parent
+    files = [Path(geometry.__file__), *sorted(here.glob("*.py"))]
+    digest = hashlib.sha256()
+    for file in files:
+        digest.update(file.read_bytes())
+    return digest.hexdigest(), len(files)
+
+
+_STAMP = _sources()
+
+
+def compiled(function: Function) -> Function:
+    """
+    Compile at the first call, and keep the machine code on disk for the next process.
+
+    Numba drops a kept function when that function's own file changes. Ours are inlined into one
+    another across files, so each is kept under the stamp of all of them.
+    """
+    dispatcher: Any = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    dispatcher._cache._cache_file._source_stamp = _STAMP
+    return cast(Function, dispatcher)

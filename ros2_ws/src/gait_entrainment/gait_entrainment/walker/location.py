@@ -1,0 +1,106 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Where in a segment the walker is at a given time: the quadrature, inverted.
+
+A quintic through position, velocity and acceleration at both ends is a first guess. One quadrature
+tells the time at the guess, and the rest of the way is a second-order Taylor step in time, whose
+error is the cube of the time left.
+"""
+
+from typing import Final
+
+from gait_entrainment.walker.compiled import compiled
+from gait_entrainment.walker.model import Floats, Model
+from gait_entrainment.walker.segment import (
+    SINGLE_STANCE,
+    Segment,
+    double_stance_time,
+    motion,
+)
+from gait_entrainment.walker.single_stance import pendulum_time
+
+# A Taylor step this short [s] misses by less than 1e-17: the cube, times a jerk of up to 10 / s^3.
+LAST_STEP: Final = 1e-6
+
+# Bisection alone would need 60 halvings; Newton steps between them can only be quicker.
+MOST_STEPS: Final = 100
+
+
+@compiled
+def travel_time(model: Model, work: Floats, segment: Segment, start: float, end: float) -> float:
+    """Time [s] from position `start` to `end` of the segment, negative if `end` is before it."""
+    if end < start:
+        return -travel_time_onward(model, work, segment, end, start)
+    return travel_time_onward(model, work, segment, start, end)
+
+
+@compiled
+def travel_time_onward(
+    model: Model, work: Floats, segment: Segment, start: float, end: float
+) -> float:
+    """Time [s] from one position of the segment to a later one."""
+    if segment.phase == SINGLE_STANCE:
+        return pendulum_time(model.per_drop, segment.apex, start, end)
+    return double_stance_time(model, work, segment, start, end)
+
+
+@compiled
+def quintic(model: Model, segment: Segment, elapsed: float) -> float:
+    """Position at a time of the segment by Hermite interpolation between its ends."""
+    span = segment.duration
+    velocity_0, acceleration_0 = motion(model, segment, segment.position)
+    velocity_1, acceleration_1 = motion(model, segment, segment.end)
+    s = elapsed / span
+    v0, v1 = velocity_0 * span, velocity_1 * span
+    a0, a1 = acceleration_0 * span * span, acceleration_1 * span * span
+    gap = segment.end - segment.position - v0 - 0.5 * a0
+    speed, bend = v1 - v0 - a0, a1 - a0
+    c3 = 10.0 * gap - 4.0 * speed + 0.5 * bend
+    c4 = -15.0 * gap + 7.0 * speed - bend
+    c5 = 6.0 * gap - 3.0 * speed + 0.5 * bend
+    return segment.position + s * (v0 + s * (0.5 * a0 + s * (c3 + s * (c4 + s * c5))))
+
+
+@compiled
+def position_at(model: Model, work: Floats, segment: Segment, elapsed: float) -> float:
+    """Position after `elapsed` seconds of the segment, held within its ends."""
+    low, high = segment.position, segment.end
+    if elapsed <= 0.0:
+        return low
+    if elapsed >= segment.duration:
+        return high
+    position = quintic(model, segment, elapsed)
+    if not low < position < high:
+        position = 0.5 * (low + high)
+    left = elapsed - travel_time(model, work, segment, low, position)
+    for _ in range(MOST_STEPS):
+        if left >= 0.0:
+            low = position
+        else:
+            high = position
+        velocity, acceleration = motion(model, segment, position)
+        step = left * (velocity + 0.5 * acceleration * left)
+        target = position + step
+        inside = low <= target <= high
+        if abs(left) < LAST_STEP and inside:
+            return target
+        if not inside or velocity * left * step <= 0.0:
+            target = 0.5 * (low + high)
+            if target in (low, high):
+                return target
+        left -= travel_time(model, work, segment, position, target)
+        position = target
+    return position

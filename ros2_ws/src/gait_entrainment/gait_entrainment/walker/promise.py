@@ -1,0 +1,118 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a walker knows of one ankle's perturbation: torque changes, promised so far."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from gait_entrainment.walker.model import Floats
+from gait_entrainment.walker.trajectory import Stamps
+
+# Before all time: the first entry, torque zero, so that every instant has an entry before it.
+_EVER = -(2**62)
+
+
+class PromisedTorque:
+    """
+    Torque changes of one side [ns, N m], neighbours always different.
+
+    Past the promise the torque counts as zero, until a further promise says otherwise.
+    """
+
+    def __init__(self) -> None:
+        """Begin with nothing promised."""
+        self.valid_until = 0
+        self._changes = [_EVER]
+        self._torques = [0.0]
+        self._arrays: tuple[Stamps, Floats] | None = None
+
+    def extend(
+        self,
+        times: Sequence[int] | Stamps,
+        torques: Sequence[float] | Floats,
+        valid_until: int,
+        reached: int,
+    ) -> int:
+        """
+        Append pieces, torques[i] from times[i] on, the last until `valid_until`.
+
+        What lies before `reached`, where the walker already is, comes too late and is left out;
+        returns how many nanoseconds of the promise that is. Raises ValueError where the pieces are
+        out of order, not finite, or contradict what was promised.
+        """
+        borders = [int(t) for t in times]
+        if len(borders) != len(torques):
+            raise ValueError(
+                f"{len(borders)} times for {len(torques)} torques; one each is needed"
+            )
+        ends = [*borders[1:], valid_until][: len(borders)]
+        if any(start >= end for start, end in zip(borders, ends, strict=True)):
+            raise ValueError(f"times {borders} up to {valid_until} ns are not increasing")
+        if borders and borders[0] < self.valid_until:
+            raise ValueError(
+                f"torque from {borders[0]} ns contradicts the promise up to {self.valid_until} ns"
+            )
+        if not all(math.isfinite(torque) for torque in torques):
+            raise ValueError(f"torques {list(torques)} are not all finite")
+        if valid_until < self.valid_until:
+            raise ValueError(
+                f"valid_until {valid_until} ns is before the promise up to {self.valid_until} ns"
+            )
+        late = max(0, min(reached, valid_until) - self.valid_until)
+        if self._changes[-1] == self.valid_until and self.valid_until >= reached:
+            # The zero past the old promise has not been walked through: it was provisional.
+            self._pop()
+        if not borders or borders[0] > self.valid_until:
+            self._change(max(self.valid_until, reached), 0.0)
+        for start, end, torque in zip(borders, ends, torques, strict=True):
+            if end > reached:
+                self._change(max(start, reached), float(torque))
+        self._change(max(valid_until, reached), 0.0)
+        self.valid_until = valid_until
+        return late
+
+    def cut(self, at: int, reached: int) -> None:
+        """Void the promise from `at` on, or from `reached` if that is later: torque zero."""
+        at = max(at, reached)
+        while self._changes[-1] >= at:
+            self._pop()
+        self._change(at, 0.0)
+        self.valid_until = min(self.valid_until, at)
+
+    def forget(self, before: int) -> None:
+        """Drop what only instants earlier than `before` need."""
+        while len(self._changes) > 1 and self._changes[1] < before:
+            del self._changes[0], self._torques[0]
+            self._arrays = None
+
+    def arrays(self) -> tuple[Stamps, Floats]:
+        """Stamps [ns] of the changes and the torques [N m] from them on, for the walker."""
+        if self._arrays is None:
+            self._arrays = np.array(self._changes, np.int64), np.array(self._torques)
+        return self._arrays
+
+    def _change(self, stamp: int, torque: float) -> None:
+        if self._changes[-1] == stamp:
+            self._pop()
+        if self._torques[-1] != torque:
+            self._changes.append(stamp)
+            self._torques.append(torque)
+            self._arrays = None
+
+    def _pop(self) -> None:
+        del self._changes[-1], self._torques[-1]
+        self._arrays = None

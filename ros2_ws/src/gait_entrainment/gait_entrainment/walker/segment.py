@@ -1,0 +1,292 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A segment: the stretch of motion between two switching instants, and how it is travelled.
+
+Gait events, changes of the perturbation and the unloading of the trailing foot switch; between
+them the ankle torque falls off linearly in the ankle angle, so energy gives the speed at every
+position in closed form and time is a quadrature over position. A segment is kept as the state at
+its start, with what would end it if the perturbation stayed as it is.
+
+Position is what grows while the walker moves on: the trailing ankle's angle psi in double stance,
+-theta in single stance.
+"""
+
+import math
+from enum import IntEnum
+from typing import Any, Final, Protocol
+
+import numpy as np
+
+from gait_entrainment.walker.compiled import compiled
+from gait_entrainment.walker.linkage import (
+    drop,
+    leg_per_ankle,
+    leg_sine,
+    pendulum_force,
+    torque_work,
+    unloading_arm,
+)
+from gait_entrainment.walker.model import TAIL_TOLERANCE, Floats, Model
+
+# The compiled functions read plain integers; the enumerations name them for everyone else.
+DOUBLE_STANCE: Final = 0
+SINGLE_STANCE: Final = 1
+
+
+class Phase(IntEnum):
+    """What the walker stands on."""
+
+    DOUBLE_STANCE = DOUBLE_STANCE
+    SINGLE_STANCE = SINGLE_STANCE
+
+
+HEEL_STRIKE: Final = 0
+TOE_OFF: Final = 1
+TORQUE_CHANGE: Final = 2
+UNLOADING: Final = 3
+FALL: Final = 4
+FLY_OFF: Final = 5
+
+
+class Segment(Protocol):
+    """A record of SEGMENT, which the compiled functions change in place."""
+
+    stamp: int
+    """Start: whole nanoseconds since the start of the run,"""
+    rest: float
+    """and what is left of it [s], at most half a nanosecond."""
+    after: int
+    """Torque changes later than this stamp are still to come."""
+    began: int
+    """The switch that began it."""
+    ends: int
+    """The switch that ends it if the perturbation stays as it is."""
+    phase: int
+    leading: int
+    """Side of the leading leg, in single stance the stance leg."""
+    step: int
+    """Number of the step in progress."""
+    position: float
+    apex: float
+    """Squared rate at the apex without further torque [1/s^2] (see `model`)."""
+    perturbation: float
+    """Torque of the ankle robot on the trailing ankle [N m]."""
+    torque: float
+    """Effective ankle torque at the start [N m],"""
+    stiffness: float
+    """and by how much it falls off [N m/rad]."""
+    end: float
+    """Position of the end."""
+    duration: float
+    """Time to the end [s]."""
+    shortfall: float
+    """What lacks at a fall [J] or fly-off [N]."""
+
+
+SEGMENT = np.dtype([(name, kind) for name, kind in Segment.__annotations__.items()])
+
+Log = Any
+"""An array of SEGMENT, the segments of a stretch in order."""
+
+# Widest panel [rad]: keeps the Taylor series of `panel` to rounding.
+PANEL_WIDTH: Final = 1.6
+
+# A panel this narrow [rad, or sqrt(rad) up to a stall] is taken as it is.
+NARROWEST_PANEL: Final = 1e-12
+
+# Rows of the work space that the quadrature fills, one column for each node.
+OFFSET: Final = 0
+STRETCH: Final = 1
+TIME: Final = 2
+WORK_ROWS: Final = 3
+
+
+@compiled
+def effective_torque(segment: Segment, position: float) -> float:
+    """Ankle torque [N m] at a position of the segment; zero in single stance."""
+    return segment.torque - segment.stiffness * (position - segment.position)
+
+
+@compiled
+def gained_apex(model: Model, segment: Segment, position: float) -> float:
+    """`apex` at a position of the segment: the start's, and the torque's work."""
+    rotation = position - segment.position
+    work = torque_work(rotation, segment.torque, segment.stiffness)
+    return segment.apex + model.per_energy * work
+
+
+@compiled
+def leg_sine_at(model: Model, phase: int, position: float) -> float:
+    """sin(theta) of the leading leg."""
+    if phase == SINGLE_STANCE:
+        return -math.sin(position)
+    return leg_sine(math.cos(position), model.leg_length, model.foot_length, model.separation)
+
+
+@compiled
+def squared_rate(model: Model, segment: Segment, position: float) -> float:
+    """theta_dot^2 at a position of the segment, from energy; negative beyond a stall."""
+    sine = leg_sine_at(model, segment.phase, position)
+    fall = drop(sine, math.sqrt(1.0 - sine * sine))
+    return gained_apex(model, segment, position) + model.per_drop * fall
+
+
+@compiled
+def leading_force(model: Model, segment: Segment, position: float) -> float:
+    """Ground reaction F_B [N] of the leading leg, along the leg; negative where it would pull."""
+    sine = leg_sine_at(model, segment.phase, position)
+    force = pendulum_force(
+        math.sqrt(1.0 - sine * sine),
+        squared_rate(model, segment, position),
+        model.mass,
+        model.gravity,
+        model.leg_length,
+    )
+    if segment.phase == DOUBLE_STANCE:
+        arm = unloading_arm(
+            math.sin(position), sine, model.leg_length, model.foot_length, model.separation
+        )
+        force -= arm * effective_torque(segment, position)
+    return force
+
+
+@compiled
+def motion(model: Model, segment: Segment, position: float) -> tuple[float, float]:
+    """
+    Velocity and acceleration of the position.
+
+    In double stance psi_dot = u theta_dot with u = d cos(theta) / (l sin(psi)), and the
+    acceleration is half the derivative of psi_dot^2 by psi.
+    """
+    square = max(0.0, squared_rate(model, segment, position))
+    if segment.phase == SINGLE_STANCE:
+        return math.sqrt(square), 0.5 * model.per_drop * math.sin(position)
+    sin_ankle, cos_ankle = math.sin(position), math.cos(position)
+    sine = leg_sine_at(model, DOUBLE_STANCE, position)
+    slope = leg_per_ankle(
+        sin_ankle, math.sqrt(1.0 - sine * sine), model.foot_length, model.separation
+    )
+    u = 1.0 / slope
+    u_slope = model.separation / model.foot_length * sine * slope / sin_ankle
+    u_slope -= u * cos_ankle / sin_ankle
+    square_slope = model.per_energy * effective_torque(segment, position)
+    square_slope -= model.per_drop * sine * slope
+    return u * math.sqrt(square), u * (0.5 * u * square_slope + u_slope * square)
+
+
+@compiled
+def panel(
+    model: Model, work: Floats, segment: Segment, start: float, end: float, up_to_stall: bool
+) -> tuple[float, bool]:
+    """
+    Time over one panel of double stance by Gauss-Legendre, and whether that has converged.
+
+    The integrand is (d theta / d psi) / theta_dot. Its sines and cosines come from those of the
+    middle and a short Taylor series, in loops that run in vector registers. Up to a stall, where
+    it has an inverse square root, the variable is sqrt(stall - psi) and the integrand smooth.
+    """
+    offset, stretch, time = work[OFFSET], work[STRETCH], work[TIME]
+    middle, half = 0.5 * (start + end), 0.5 * (end - start)
+    if up_to_stall:
+        centre = segment.end - 0.5 * (start * start + end * end)
+        for i in range(model.nodes.size):
+            root = middle + half * model.nodes[i]
+            offset[i] = segment.end - root * root - centre
+            stretch[i] = -2.0 * root
+    else:
+        centre = middle
+        for i in range(model.nodes.size):
+            offset[i] = half * model.nodes[i]
+            stretch[i] = 1.0
+    sin_centre, cos_centre = math.sin(centre), math.cos(centre)
+    rotation = centre - segment.position
+    for i in range(model.nodes.size):
+        x = offset[i]
+        s, c = short_sine(x), short_cosine(x)
+        sin_ankle = sin_centre * c + cos_centre * s
+        cos_ankle = cos_centre * c - sin_centre * s
+        sine = leg_sine(cos_ankle, model.leg_length, model.foot_length, model.separation)
+        cosine = math.sqrt(1.0 - sine * sine)
+        gain = torque_work(rotation + x, segment.torque, segment.stiffness)
+        square = segment.apex + model.per_energy * gain + model.per_drop * drop(sine, cosine)
+        slope = leg_per_ankle(sin_ankle, cosine, model.foot_length, model.separation)
+        time[i] = stretch[i] * slope / math.sqrt(square)
+    total, tail_1, tail_2 = 0.0, 0.0, 0.0
+    for i in range(model.nodes.size):
+        total += model.weights[i] * time[i]
+        tail_1 += model.tails[0, i] * time[i]
+        tail_2 += model.tails[1, i] * time[i]
+    converged = abs(tail_1) + abs(tail_2) <= 0.5 * TAIL_TOLERANCE * abs(total)
+    return half * total, converged
+
+
+@compiled
+def short_sine(x: float) -> float:
+    """sin(x) for |x| <= 0.8 to rounding: Taylor to x^17."""
+    y = x * x
+    p = 1.0 / 355687428096000.0
+    p = p * y - 1.0 / 1307674368000.0
+    p = p * y + 1.0 / 6227020800.0
+    p = p * y - 1.0 / 39916800.0
+    p = p * y + 1.0 / 362880.0
+    p = p * y - 1.0 / 5040.0
+    p = p * y + 1.0 / 120.0
+    p = p * y - 1.0 / 6.0
+    return x + x * y * p
+
+
+@compiled
+def short_cosine(x: float) -> float:
+    """cos(x) for |x| <= 0.8 to rounding: Taylor to x^18."""
+    y = x * x
+    p = -1.0 / 6402373705728000.0
+    p = p * y + 1.0 / 20922789888000.0
+    p = p * y - 1.0 / 87178291200.0
+    p = p * y + 1.0 / 479001600.0
+    p = p * y - 1.0 / 3628800.0
+    p = p * y + 1.0 / 40320.0
+    p = p * y - 1.0 / 720.0
+    p = p * y + 1.0 / 24.0
+    p = p * y - 0.5
+    return 1.0 + y * p
+
+
+@compiled
+def double_stance_time(
+    model: Model, work: Floats, segment: Segment, start: float, end: float
+) -> float:
+    """Time [s] from one position of double stance to a later one, in panels that converge."""
+    up_to_stall = segment.ends == FALL
+    if up_to_stall:
+        # The variable sqrt(stall - psi) falls: from the end backwards it grows.
+        start, end = (
+            math.sqrt(max(0.0, segment.end - start)),
+            math.sqrt(max(0.0, segment.end - end)),
+        )
+    total, here, width = 0.0, start, end - start
+    # psi changes by at most 2 sqrt(stall - start) times the change of its root.
+    limit = 0.5 * PANEL_WIDTH / start if up_to_stall else PANEL_WIDTH
+    while here != end:
+        width = max(-limit, min(limit, width))
+        there = end if abs(end - here) <= abs(width) else here + width
+        part, converged = panel(model, work, segment, here, there, up_to_stall)
+        if converged or abs(width) < NARROWEST_PANEL:
+            total += part
+            here = there
+            width = 2.0 * width
+        else:
+            width = 0.5 * width
+    return total

@@ -1,0 +1,160 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+From switch to switch: the loop that every use of the walker runs.
+
+The perturbation is a list of changes for each side: from the stamp `changes[i]` on the torque is
+`torques[i]`; the first entry lies before all time with torque zero, and neighbours differ. A gait
+event comes before a torque change of the same stamp, and a change acts only on what comes after
+its stamp. So all that happens up to a stamp depends on the torque before it alone, and an event can be
+told as soon as that is promised.
+"""
+
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait_entrainment.walker.compiled import compiled
+from gait_entrainment.walker.location import position_at
+from gait_entrainment.walker.model import Floats, Model
+from gait_entrainment.walker.segment import (
+    DOUBLE_STANCE,
+    FALL,
+    FLY_OFF,
+    HEEL_STRIKE,
+    TOE_OFF,
+    WORK_ROWS,
+    Log,
+    Segment,
+)
+from gait_entrainment.walker.transitions import (
+    NANO,
+    change_torque,
+    clock,
+    collide,
+    enter_double_stance,
+    leave_double_stance,
+    rounded_stamp,
+    seconds,
+    unload,
+)
+
+Stamps = NDArray[np.int64]
+
+# What `proceed` did.
+SWITCHED: Final = 0
+HELD: Final = 1
+ENDED: Final = 2
+
+
+class Perturbation(NamedTuple):
+    """Torque changes of both sides: stamps [ns] and the torques [N m] that hold from them on."""
+
+    left_changes: Stamps
+    left_torques: Floats
+    right_changes: Stamps
+    right_torques: Floats
+
+
+@compiled
+def skip_changes(changes: Stamps, index: int, after: int) -> int:
+    """Index of the first change later than the stamp `after`, searched from `index` on."""
+    while index < changes.size and changes[index] <= after:
+        index += 1
+    return index
+
+
+@compiled
+def proceed(
+    model: Model,
+    work: Floats,
+    segment: Segment,
+    changes: tuple[Stamps, Stamps],
+    torques: tuple[Floats, Floats],
+    cursors: Stamps,
+    until: int,
+) -> int:
+    """
+    Go on to the next switch, writing the segment it begins over `segment`.
+
+    HELD if it comes after `until`, ENDED if the walker falls or flies off by then.
+    """
+    end, rest = clock(segment.stamp, segment.rest, segment.duration)
+    end_stamp = rounded_stamp(seconds(end, rest))
+    trailing = 1 - segment.leading
+    if segment.phase == DOUBLE_STANCE:
+        cursors[trailing] = skip_changes(changes[trailing], cursors[trailing], segment.after)
+        index = cursors[trailing]
+        if index < changes[trailing].size and changes[trailing][index] < end_stamp:
+            stamp = changes[trailing][index]
+            if stamp >= until:
+                return HELD
+            elapsed = (stamp - segment.stamp) / NANO - segment.rest
+            position = position_at(model, work, segment, elapsed)
+            segment.stamp, segment.rest, segment.after = stamp, 0.0, stamp
+            change_torque(model, segment, position, torques[trailing][index], work)
+            return SWITCHED
+    if end_stamp > until:
+        return HELD
+    if segment.ends == FALL or segment.ends == FLY_OFF:
+        return ENDED
+    segment.stamp, segment.rest = end, rest
+    segment.after = max(segment.after, end_stamp - 1)
+    if segment.ends == HEEL_STRIKE:
+        # The stance leg now trails: its torque is what held before this stamp.
+        side = segment.leading
+        cursors[side] = skip_changes(changes[side], cursors[side], segment.after)
+        collide(model, segment, torques[side][cursors[side] - 1], work)
+    elif segment.ends == TOE_OFF:
+        leave_double_stance(model, segment)
+    else:
+        unload(model, segment, work)
+    return SWITCHED
+
+
+@compiled
+def advance(
+    model: Model,
+    log: Log,
+    count: int,
+    changes: tuple[Stamps, Stamps],
+    torques: tuple[Floats, Floats],
+    until: int,
+) -> tuple[int, int]:
+    """
+    Append to the `count` segments of `log` all that begin by `until`.
+
+    Returns the new count and HELD, ENDED, or SWITCHED where the log is full.
+    """
+    work = np.empty((WORK_ROWS, model.nodes.size))
+    cursors = np.zeros(2, np.int64)
+    while count < log.size:
+        log[count] = log[count - 1]
+        outcome = proceed(model, work, log[count], changes, torques, cursors, until)
+        if outcome != SWITCHED:
+            return count, outcome
+        count += 1
+    return count, SWITCHED
+
+
+@compiled
+def start_walking(model: Model, segment: Segment, leading: int, rate: float) -> None:
+    """Write the first segment: right after heel strike 0 of `leading`, theta_dot = -rate."""
+    work = np.empty((WORK_ROWS, model.nodes.size))
+    segment.stamp, segment.rest, segment.after = 0, 0.0, -1
+    segment.began, segment.leading, segment.step = HEEL_STRIKE, leading, 1
+    segment.apex = rate * rate - model.per_drop * model.strike_drop
+    enter_double_stance(model, segment, 0.0, work)

@@ -1,0 +1,329 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Guards and resets: what ends a segment, and how the next one begins.
+
+    switch           guard                                   reset
+    toe-off          psi = mu in double stance               leave_double_stance
+    heel strike      theta = -alpha in single stance         collide
+    torque change    the stamp of the change                 change_torque
+    unloading        k (mu - psi) + T_p = 0 while T_p < 0    unload
+    fall             theta_dot = 0                           none: the end
+    fly-off          F_B < 0                                 none: the end
+
+Each reset writes the next segment over the last and then looks ahead (`look_ahead_*`): which of
+these switches comes first if the perturbation stays as it is, where, and when.
+"""
+
+import math
+from typing import Final
+
+from gait_entrainment.walker.compiled import compiled
+from gait_entrainment.walker.linkage import torque_work
+from gait_entrainment.walker.model import Floats, Model
+from gait_entrainment.walker.segment import (
+    DOUBLE_STANCE,
+    FALL,
+    FLY_OFF,
+    HEEL_STRIKE,
+    SINGLE_STANCE,
+    TOE_OFF,
+    TORQUE_CHANGE,
+    UNLOADING,
+    Segment,
+    double_stance_time,
+    gained_apex,
+    leading_force,
+    squared_rate,
+)
+from gait_entrainment.walker.single_stance import (
+    lift_off_position,
+    pendulum_time,
+    turning_position,
+    whole_single_stance_time,
+)
+
+NANO: Final = 1e9
+
+# Points of the search for a stall or lift-off. It is made only where the bounds do not rule both
+# out; rate and force bend a few times at most over a double stance, and minima are refined.
+SEARCH_POINTS: Final = 128
+
+
+# Resets
+
+
+@compiled
+def collide(model: Model, segment: Segment, perturbation: float, work: Floats) -> None:
+    """Heel strike: the speed falls by cos(2 alpha), the legs change roles, the push-off begins."""
+    square = segment.apex + model.per_drop * model.strike_drop
+    segment.apex = model.restitution * square - model.per_drop * model.strike_drop
+    segment.leading = 1 - segment.leading
+    segment.step += 1
+    segment.began = HEEL_STRIKE
+    enter_double_stance(model, segment, perturbation, work)
+
+
+@compiled
+def enter_double_stance(model: Model, segment: Segment, perturbation: float, work: Floats) -> None:
+    """Begin double stance right after the collision, with `apex` as it is."""
+    segment.phase = DOUBLE_STANCE
+    segment.position = model.double_stance_start
+    segment.perturbation = perturbation
+    load(model, segment)
+    look_ahead_double_stance(model, segment, work)
+
+
+@compiled
+def leave_double_stance(model: Model, segment: Segment) -> None:
+    """Toe-off: the ankle torque ends, also where a pulse is still on."""
+    segment.apex = gained_apex(model, segment, segment.end)
+    segment.phase = SINGLE_STANCE
+    segment.position = model.toe_off_position
+    segment.perturbation = 0.0
+    segment.torque = 0.0
+    segment.stiffness = 0.0
+    segment.began = TOE_OFF
+    look_ahead_single_stance(model, segment)
+
+
+@compiled
+def change_torque(
+    model: Model, segment: Segment, position: float, perturbation: float, work: Floats
+) -> None:
+    """Begin a segment with another torque of the ankle robot."""
+    segment.apex = gained_apex(model, segment, position)
+    segment.position = position
+    segment.perturbation = perturbation
+    segment.began = TORQUE_CHANGE
+    load(model, segment)
+    look_ahead_double_stance(model, segment, work)
+
+
+@compiled
+def unload(model: Model, segment: Segment, work: Floats) -> None:
+    """The pulse has eaten up the spring: the trailing foot is unloaded, double stance goes on."""
+    segment.apex = gained_apex(model, segment, segment.end)
+    segment.position = segment.end
+    segment.torque = 0.0
+    segment.stiffness = 0.0
+    segment.began = UNLOADING
+    look_ahead_double_stance(model, segment, work)
+
+
+@compiled
+def load(model: Model, segment: Segment) -> None:
+    """Effective torque max(0, k (mu - psi) + T_p) at the start, and how it falls off."""
+    spring = model.stiffness * (model.max_plantarflexion - segment.position)
+    segment.torque = max(0.0, spring + segment.perturbation)
+    segment.stiffness = model.stiffness if segment.torque > 0.0 else 0.0
+
+
+# Guards
+
+
+@compiled
+def look_ahead_single_stance(model: Model, segment: Segment) -> None:
+    """Heel strike, unless the walker turns back before the apex or flies off after it."""
+    segment.ends = HEEL_STRIKE
+    segment.end = model.strike_position
+    segment.shortfall = 0.0
+    if segment.apex <= 0.0 and model.toe_off_position < 0.0:
+        segment.ends = FALL
+        segment.end = turning_position(model.per_drop, segment.apex)
+        segment.shortfall = -segment.apex / model.per_energy
+    else:
+        # The mass is lowest and fastest at heel strike, so the force is least there.
+        force = leading_force(model, segment, segment.end)
+        if force < 0.0:
+            segment.ends = FLY_OFF
+            segment.end = max(segment.position, lift_off_position(model, segment.apex))
+            segment.shortfall = -force
+    if segment.ends == HEEL_STRIKE and segment.apex > 0.0 and model.toe_off_position < 0.0:
+        segment.duration = whole_single_stance_time(model, segment.apex)
+    else:
+        segment.duration = pendulum_time(
+            model.per_drop, segment.apex, segment.position, segment.end
+        )
+
+
+@compiled
+def look_ahead_double_stance(model: Model, segment: Segment, work: Floats) -> None:
+    """Toe-off or unloading, unless the walker stalls or flies off before."""
+    segment.ends = TOE_OFF
+    segment.end = model.max_plantarflexion
+    segment.shortfall = 0.0
+    if segment.stiffness > 0.0 and segment.perturbation < 0.0:
+        segment.ends = UNLOADING
+        segment.end = segment.position + segment.torque / segment.stiffness
+        segment.end = min(segment.end, model.max_plantarflexion)
+    if not cleared(model, segment):
+        search_stall_and_lift_off(model, segment)
+    whole = (
+        segment.position == model.double_stance_start
+        and segment.ends == TOE_OFF
+        and segment.perturbation == 0.0
+        and segment.apex >= model.whole_least_apex
+    )
+    if whole:
+        segment.duration = whole_double_stance_time(model, work, segment.apex)
+    else:
+        segment.duration = double_stance_time(model, work, segment, segment.position, segment.end)
+
+
+@compiled
+def whole_double_stance_time(model: Model, work: Floats, apex: float) -> float:
+    """Duration [s] of an unperturbed double stance: one panel whose geometry was made once."""
+    time = work[0]
+    for i in range(model.nodes.size):
+        time[i] = model.whole_weights[i] / math.sqrt(apex + model.whole_gain[i])
+    total = 0.0
+    for i in range(model.nodes.size):
+        total += time[i]
+    return total
+
+
+@compiled
+def cleared(model: Model, segment: Segment) -> bool:
+    """
+    Whether bounds alone rule out a stall and a fly-off in the rest of double stance.
+
+    Compared with the spring alone, a positive pulse only adds speed and lifts in proportion to its
+    torque (the bound between two known pulses is their chord: a minimum of functions linear in the
+    torque is concave); a negative one only takes speed, at most its own work.
+    """
+    pulse = segment.perturbation
+    turned = segment.position - model.double_stance_start
+    peak = model.stiffness * (model.max_plantarflexion - model.double_stance_start)
+    apex = segment.apex - model.per_energy * torque_work(turned, peak, model.stiffness)
+    slowest = apex + model.least_gain
+    hold = model.least_hold
+    if pulse < 0.0:
+        slowest += model.per_energy * pulse * (model.max_plantarflexion - segment.position)
+    elif pulse <= model.bounded_pulse:
+        hold += (model.bounded_hold - model.least_hold) * (pulse / model.bounded_pulse)
+    else:
+        return False
+    lift = model.mass * model.leg_length * apex
+    return slowest > 0.0 and hold > lift
+
+
+@compiled
+def margin(model: Model, segment: Segment, position: float, switch: int) -> float:
+    """What must stay positive: the squared rate (fall) or the leading leg's force (fly-off)."""
+    if switch == FALL:
+        return squared_rate(model, segment, position)
+    return leading_force(model, segment, position)
+
+
+@compiled
+def search_stall_and_lift_off(model: Model, segment: Segment) -> None:
+    """End the segment where first its speed or the leading leg's force would go through zero."""
+    end = segment.end
+    for switch in (FALL, FLY_OFF):
+        position, least = first_crossing(model, segment, end, switch)
+        if least < 0.0 and position <= segment.end:
+            segment.ends = switch
+            segment.end = position
+            segment.shortfall = -least
+            if switch == FALL:
+                segment.shortfall = -least / model.per_energy
+
+
+@compiled
+def first_crossing(model: Model, segment: Segment, end: float, switch: int) -> tuple[float, float]:
+    """Where a margin first goes negative up to `end`, and the least value it takes there."""
+    start = segment.position
+    step = (end - start) / SEARCH_POINTS
+    least = margin(model, segment, start, switch)
+    before, here = start, start
+    value_before, value_here = least, least
+    first = start if least < 0.0 else math.inf
+    for i in range(1, SEARCH_POINTS + 1):
+        there = start + i * step if i < SEARCH_POINTS else end
+        value_there = margin(model, segment, there, switch)
+        low, low_value = there, value_there
+        dip = value_here < value_before and value_here <= value_there
+        if dip or i == 1 or i == SEARCH_POINTS:
+            low, low_value = minimum(model, segment, before, there, switch)
+        if low_value < 0.0 and first == math.inf:
+            first = root(
+                model, segment, here if value_here >= 0.0 and here < low else before, low, switch
+            )
+        least = min(least, low_value, value_there)
+        before, value_before = here, value_here
+        here, value_here = there, value_there
+    return first, least
+
+
+@compiled
+def minimum(
+    model: Model, segment: Segment, low: float, high: float, switch: int
+) -> tuple[float, float]:
+    """Place and value of a margin's minimum between two positions: golden section."""
+    ratio = 0.5 * (math.sqrt(5.0) - 1.0)
+    # At a smooth minimum the value no longer depends on the place below sqrt(epsilon).
+    while high - low > 1e-9:
+        inner, outer = high - ratio * (high - low), low + ratio * (high - low)
+        if margin(model, segment, inner, switch) < margin(model, segment, outer, switch):
+            high = outer
+        else:
+            low = inner
+    place = 0.5 * (low + high)
+    return place, margin(model, segment, place, switch)
+
+
+@compiled
+def root(model: Model, segment: Segment, positive: float, negative: float, switch: int) -> float:
+    """Where a margin goes through zero, to the last bit, from a place above it to one below."""
+    while True:
+        middle = 0.5 * (positive + negative)
+        if middle <= positive or middle >= negative:
+            return positive
+        if margin(model, segment, middle, switch) < 0.0:
+            negative = middle
+        else:
+            positive = middle
+
+
+# Time
+
+
+@compiled
+def clock(stamp: int, rest: float, elapsed: float) -> tuple[int, float]:
+    """
+    Instant after `elapsed` seconds, as whole nanoseconds and what is left of it [s].
+
+    A double that counts seconds would lose 3e-14 s at each addition after 150 s; this loses none.
+    """
+    time = rest + elapsed
+    whole = math.floor(time * NANO + 0.5)
+    return stamp + whole, time - whole / NANO
+
+
+@compiled
+def seconds(stamp: int, rest: float) -> float:
+    """Instant as seconds since the start of the run."""
+    return stamp / NANO + rest
+
+
+@compiled
+def rounded_stamp(time: float) -> int:
+    """Nanoseconds of an instant [s], to the nearest, ties to even: `conventions.nanoseconds`."""
+    scaled = time * NANO
+    whole = math.floor(scaled)
+    over = scaled - whole
+    odd = math.floor(0.5 * whole) * 2.0 != whole
+    return int(whole) + (1 if over > 0.5 or (over == 0.5 and odd) else 0)

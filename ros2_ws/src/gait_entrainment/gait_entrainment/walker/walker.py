@@ -1,0 +1,260 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The walker in time: torque promises in, gait events and samples out.
+
+The state is kept at the last true switch, never at the instant that was asked for. So neither how
+a run is cut into `advance` calls, nor how a torque profile is cut into promises, nor which
+instants are sampled changes a bit of the result.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+import numpy as np
+
+from gait_entrainment.conventions import EventKind, Side, nanoseconds
+from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment.walker.model import Floats, make_model
+from gait_entrainment.walker.promise import PromisedTorque
+from gait_entrainment.walker.sampling import ROWS, Samples, fill_samples, samples_from_table
+from gait_entrainment.walker.segment import (
+    FALL,
+    HEEL_STRIKE,
+    SEGMENT,
+    TOE_OFF,
+    Log,
+    Phase,
+    leg_sine_at,
+)
+from gait_entrainment.walker.trajectory import ENDED, SWITCHED, Stamps, advance, start_walking
+from gait_entrainment.walker.transitions import clock, seconds
+
+
+@dataclass(frozen=True)
+class Transition:
+    """A gait event of the model: its instant [s] and stamp [ns] since the start of the run."""
+
+    time: float
+    stamp: int
+    kind: EventKind
+    side: Side
+    step: int
+
+
+class EndingKind(str, Enum):
+    """How a walk ended by itself."""
+
+    FALL = "fall"
+    FLY_OFF = "fly_off"
+
+
+@dataclass(frozen=True)
+class Ending:
+    """
+    Where and why the walk ended: the model's reported limit, not an error.
+
+    `side` is the leading leg, `angle` its lean theta [rad] (positive: mass behind the foot).
+    `missing` is, for a fall, the energy [J] that lacks to get over the rest of the phase; for a
+    fly-off, the force [N] with which the leg would have to pull at most in the rest of the phase.
+    Both take the perturbation as staying what it was.
+    """
+
+    kind: EndingKind
+    phase: Phase
+    side: Side
+    step: int
+    time: float
+    stamp: int
+    angle: float
+    missing: float
+
+    @property
+    def message(self) -> str:
+        """One sentence for people."""
+        where = f"in {self.phase.name.lower().replace('_', ' ')} of step {self.step}"
+        when = f"at {self.time:.6f} s, leg angle {self.angle:.4f} rad"
+        if self.kind == EndingKind.FALL:
+            return f"The walker fell {where} {when}: {self.missing:.3g} J were missing."
+        return (
+            f"The walker flew off {where} {when}: the {self.side.name.lower()} leg would have"
+            f" had to pull with {self.missing:.3g} N."
+        )
+
+
+class Walker:
+    """
+    The ankle-actuated walker, driven by torque promises for both ankles.
+
+    It starts at stamp 0, right after heel strike number 0 of `first_heel_strike`, in the
+    period-one gait or with the mass at `initial_speed` [m/s].
+
+    An event comes before a torque change of the same stamp, and a change acts only after its
+    stamp: a sample shows the events of its own stamp, but the torque up to it. So everything up to
+    a stamp follows from what was promised up to that stamp.
+    """
+
+    def __init__(
+        self,
+        parameters: WalkerParameters,
+        first_heel_strike: Side = Side.RIGHT,
+        initial_speed: float | None = None,
+    ) -> None:
+        """Raise ValueError if `initial_speed` is not a positive, finite number."""
+        self.parameters = parameters
+        self._model = make_model(parameters)
+        rate = parameters.speed_after_collision / parameters.leg_length
+        if initial_speed is not None:
+            if not 0.0 < initial_speed < float("inf"):
+                raise ValueError(
+                    f"initial_speed {initial_speed} m/s is not a positive, finite number"
+                )
+            rate = initial_speed / parameters.leg_length
+        self._promises = (PromisedTorque(), PromisedTorque())
+        self._log: Log = np.zeros(16, SEGMENT)
+        self._count = 1
+        self._announced = 0
+        self._sampled_from = 0
+        self.time_reached = 0
+        self.ending: Ending | None = None
+        start_walking(self._model, self._log[0], int(first_heel_strike), rate)
+
+    @property
+    def valid_until(self) -> int:
+        """Stamp [ns] up to which the torque of both ankles is promised."""
+        return min(promise.valid_until for promise in self._promises)
+
+    def extend_torque(
+        self,
+        side: Side,
+        times_ns: Sequence[int] | Stamps,
+        torques: Sequence[float] | Floats,
+        valid_until_ns: int,
+    ) -> int:
+        """
+        Promise the torque of one ankle up to `valid_until_ns`.
+
+        torques[i] [N m] holds from times_ns[i] to the next, the last to `valid_until_ns`; before
+        the first, and without any, the torque is zero. Returns how many nanoseconds of the promise
+        came too late, for a stretch that the walker has gone through with zero torque.
+
+        Raises ValueError where the pieces are out of order, not finite, or contradict an earlier
+        promise.
+        """
+        return self._promises[side].extend(
+            times_ns, torques, int(valid_until_ns), self.time_reached
+        )
+
+    def cut_torque(self, at_ns: int) -> None:
+        """Stop: void both ankles' promises from `at_ns` on, but not before `time_reached`."""
+        for promise in self._promises:
+            promise.cut(int(at_ns), self.time_reached)
+
+    def advance(self, until_ns: int) -> list[Transition]:
+        """
+        Walk up to `until_ns` and return the new events with stamps up to it, in order.
+
+        Torque past `valid_until` counts as zero, for good. If the walk ends before, `ending` is
+        set and `time_reached` stays at its stamp.
+        """
+        if self.ending is not None:
+            return []
+        if until_ns < self.time_reached:
+            raise ValueError(f"the walker is at {self.time_reached} ns, past {until_ns} ns")
+        self._forget()
+        self._sampled_from = self.time_reached
+        changes, torques = self._arrays()
+        outcome = SWITCHED
+        while outcome == SWITCHED:
+            if self._count == self._log.size:
+                self._log = np.concatenate([self._log, np.zeros_like(self._log)])
+            self._count, outcome = advance(
+                self._model, self._log, self._count, changes, torques, int(until_ns)
+            )
+        self.time_reached = int(until_ns)
+        if outcome == ENDED:
+            self.ending = self._describe_ending(self._log[self._count - 1])
+            self.time_reached = self.ending.stamp
+        fresh = self._log[self._announced : self._count]
+        self._announced = self._count
+        return [_transition(row) for row in fresh if row["began"] in (HEEL_STRIKE, TOE_OFF)]
+
+    def sample(self, times_ns: Stamps) -> Samples:
+        """
+        Sample the stretch that the last `advance` went through, both its ends included.
+
+        `times_ns` (n,) are stamps [ns] in any order. Raises ValueError for one outside.
+        """
+        times = np.ascontiguousarray(times_ns, np.int64)
+        if (
+            times.size
+            and not self._sampled_from <= times.min() <= times.max() <= self.time_reached
+        ):
+            raise ValueError(
+                f"samples from {times.min()} to {times.max()} ns are not all within the last"
+                f" stretch, {self._sampled_from} to {self.time_reached} ns"
+            )
+        table = np.zeros((ROWS, times.size))
+        changes, torques = self._arrays()
+        fill_samples(self._model, self._log[: self._count], times, changes, torques, table)
+        return samples_from_table(table)
+
+    def _arrays(self) -> tuple[tuple[Stamps, Stamps], tuple[Floats, Floats]]:
+        (left_changes, left_torques), (right_changes, right_torques) = (
+            promise.arrays() for promise in self._promises
+        )
+        return (left_changes, right_changes), (left_torques, right_torques)
+
+    def _forget(self) -> None:
+        """Keep of the log and the torque only what the coming stretch and its samples need."""
+        log = self._log[: self._count]
+        first = max(0, int(np.searchsorted(log["after"], self.time_reached)) - 1)
+        kept = log[first:].copy()
+        self._log[: kept.size] = kept
+        self._count -= first
+        self._announced -= first
+        for promise in self._promises:
+            promise.forget(min(self.time_reached, int(kept["after"][0]) + 1))
+
+    def _describe_ending(self, last: Any) -> Ending:
+        stamp, rest = clock(last["stamp"], last["rest"], last["duration"])
+        time = seconds(stamp, rest)
+        sine = leg_sine_at(self._model, last["phase"], last["end"])
+        return Ending(
+            kind=EndingKind.FALL if last["ends"] == FALL else EndingKind.FLY_OFF,
+            phase=Phase(last["phase"]),
+            side=Side(last["leading"]),
+            step=int(last["step"]),
+            time=time,
+            stamp=nanoseconds(time),
+            angle=float(np.arcsin(sine)),
+            missing=float(last["shortfall"]),
+        )
+
+
+def _transition(segment: Any) -> Transition:
+    """Event that began a segment. A heel strike closes the step before the one in progress."""
+    time = float(seconds(segment["stamp"], segment["rest"]))
+    struck = segment["began"] == HEEL_STRIKE
+    leading, step = Side(segment["leading"]), int(segment["step"])
+    return Transition(
+        time=time,
+        stamp=nanoseconds(time),
+        kind=EventKind.HEEL_STRIKE if struck else EventKind.TOE_OFF,
+        side=leading if struck else leading.other,
+        step=step - 1 if struck else step,
+    )
