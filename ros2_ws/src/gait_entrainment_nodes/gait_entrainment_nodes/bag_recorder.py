@@ -104,7 +104,7 @@ class BagRecorder(Participant, Node):
             RECORDER_PROGRESS.type, RECORDER_PROGRESS.name, RECORDER_PROGRESS.qos
         )
         self.resolved = {
-            topic: self.resolve_topic_name(topic.name)
+            topic.name: self.resolve_topic_name(topic.name)
             for topic in (
                 GAIT_EVENTS, JOINT_STATES, ANKLE_TORQUE, *GROUND_REACTION,
                 WALKER_PROGRESS, PUBLISHED_COUNTS, RECORDER_PROGRESS,
@@ -121,7 +121,7 @@ class BagRecorder(Participant, Node):
     def subscribe_to_new_topics(self) -> None:
         """Subscribe to every topic that has a publisher and is not recorded yet."""
         for name, types in self.get_topic_names_and_types():
-            hidden = "/_" in name or name == self.resolved[RECORDER_PROGRESS]
+            hidden = "/_" in name or name == self.resolved[RECORDER_PROGRESS.name]
             chosen = not self.chosen or name in self.chosen
             if name in self.seen or hidden or not chosen or not self.count_publishers(name):
                 continue
@@ -169,8 +169,8 @@ class BagRecorder(Participant, Node):
         stamped = _first_field(definition.schema_text).startswith(_STAMPED)
         write, wall_clock, unpack = self.bag.write, time.time_ns, _STAMP.unpack_from
         then = {
-            self.resolved[WALKER_PROGRESS]: self.on_progress,
-            self.resolved[PUBLISHED_COUNTS]: self.on_counts,
+            self.resolved[WALKER_PROGRESS.name]: self.on_progress,
+            self.resolved[PUBLISHED_COUNTS.name]: self.on_counts,
         }.get(name)
 
         def record(data: bytes) -> None:
@@ -205,10 +205,10 @@ class BagRecorder(Participant, Node):
         """Send the progress back once everything that it covers is written."""
         progress, counts = self.progress, self.bag.counts
         assert progress is not None
-        if counts.get(self.resolved[GAIT_EVENTS], progress.events) < progress.events:
+        if counts.get(self.resolved[GAIT_EVENTS.name], progress.events) < progress.events:
             return
         for topic in (JOINT_STATES, ANKLE_TORQUE, *GROUND_REACTION):
-            if counts.get(self.resolved[topic], progress.samples) < progress.samples:
+            if counts.get(self.resolved[topic.name], progress.samples) < progress.samples:
                 return
         self.progress = None
         self.acknowledge.publish(progress)

@@ -20,8 +20,7 @@ service: what a run depends on or is judged by is reliable and keeps all, on bot
 nothing is lost without an error; what tells a late-comer how things stand is transient local.
 """
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
@@ -35,10 +34,11 @@ from gait_entrainment_msgs import msg
 EVERY_MESSAGE = QoSProfile(
     history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE, depth=0
 )
-# The latest state matters, also to who joins late.
+# The latest state matters, also to who joins late. The writer keeps more than that, so that a
+# recorder which is briefly behind misses nothing.
 LATEST_STATE = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,
-    depth=1,
+    depth=1000,
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
@@ -48,8 +48,7 @@ DIAGNOSTICS_QOS = QoSProfile(
 )
 
 
-@dataclass(frozen=True)
-class Topic:
+class Topic(NamedTuple):
     """One topic: relative name, message type, quality of service of both ends."""
 
     name: str
