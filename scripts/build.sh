@@ -33,7 +33,7 @@ if [ "$(cat ros2_ws/install/complete 2> /dev/null)" != "$fingerprint" ]; then
         cd ros2_ws
         colcon --log-level error --log-base log build --symlink-install --event-handlers console_direct- \
             --cmake-args -DPython3_EXECUTABLE="$(command -v python)" \
-            -DPython3_FIND_VIRTUALENV=ONLY -DBUILD_TESTING=OFF --no-warn-unused-cli
+            -DPython3_FIND_VIRTUALENV=ONLY -DCMAKE_BUILD_TYPE=Release -DBUILD_TESTING=OFF --no-warn-unused-cli
     )
     cp .venv/complete ros2_ws/build/environment
     echo "$fingerprint" > ros2_ws/install/complete
@@ -41,12 +41,19 @@ if [ "$(cat ros2_ws/install/complete 2> /dev/null)" != "$fingerprint" ]; then
 fi
 
 # The walker is compiled at its first use and then kept: let that be now.
-walker=$(cat .venv/complete ros2_ws/src/gait_entrainment/gait_entrainment/{geometry.py,walker/*.py} | sha256sum)
+walker=$({
+    cat .venv/complete
+    cd ros2_ws/src/gait_entrainment/gait_entrainment
+    find geometry.py walker -name '*.py' -print0 | sort -z | xargs -0 cat
+} | sha256sum)
 if [ "$(cat ros2_ws/install/compiled 2> /dev/null)" != "$walker" ]; then
     echo "build: compiling the walker ..."
     start=$SECONDS
     source ./env.bash
-    entrain simulate --json > /dev/null
-    echo "$walker" > ros2_ws/install/compiled
-    echo "build: done in $((SECONDS - start)) s"
+    if entrain simulate --json > /dev/null; then
+        echo "$walker" > ros2_ws/install/compiled
+        echo "build: done in $((SECONDS - start)) s"
+    else
+        echo "build: the walker will be compiled at its first use instead" >&2
+    fi
 fi
