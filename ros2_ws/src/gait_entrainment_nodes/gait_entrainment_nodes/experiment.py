@@ -179,6 +179,7 @@ class Experiment(Participant, Node):
         self.grant = self.recorded_grant = -1
         self.recorder_heard = False
         self.horizons_sent = self.profiles_received = 0
+        self.promised_until = 0  # by the latest horizon [ns since 1970]
         self.planning = False  # a train has been requested and not been accepted yet
         self.shown: tuple[Phase, int] | None = None
 
@@ -290,6 +291,9 @@ class Experiment(Participant, Node):
         assert self.conductor is not None
         self.known_until = known_until
         horizon = self.conductor.horizon(known_until)
+        if horizon.until == self.promised_until:
+            return  # in real time progress goes on while the last stretch is walked
+        self.promised_until = horizon.until
         self.horizons.publish(
             msg.Horizon(
                 header=header(known_until),

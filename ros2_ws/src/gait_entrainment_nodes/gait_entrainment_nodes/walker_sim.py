@@ -62,6 +62,8 @@ LOCK_STEP_START = 946_684_800
 UNACKNOWLEDGED_GRANTS = 2
 # Real time: how often progress is reported and promises are asked for [ns].
 PROGRESS_PERIOD = 20_000_000
+# Real time: from the start request to heel strike 0 [ns], so that the first promise is there.
+START_DELAY = 200_000_000
 
 
 class WalkerSim(Participant, Node):
@@ -110,10 +112,14 @@ class WalkerSim(Participant, Node):
         self.progress = self.publisher(WALKER_PROGRESS)
         self.clock_publisher = None if self.real_time else self.publisher(CLOCK)
         self._make_templates()
+        # A step ahead of time loads the compiled kernels, which the first stretch must not wait
+        # for.
+        WalkerRun(self.parameters, self.first_heel_strike, 100.0).advance(NANOSECONDS_PER_SECOND)
 
         self.run: WalkerRun | None = None
         self.run_number = 0
         self.start = 0  # instant of heel strike 0 [ns since 1970]
+        self.steady_offset = 0  # steady time at which instant 0 is due [ns]
         self.grant = 0
         self.acknowledged_grants = 0
         self.granted: deque[tuple[int, bool]] = deque()  # lock-step: (until, last), not yet walked
@@ -141,13 +147,13 @@ class WalkerSim(Participant, Node):
             return response
         self.run = WalkerRun(self.parameters, self.first_heel_strike, self.sample_rate)
         self.run_number = request.run
-        self.start = (
-            time.time_ns() if self.real_time else LOCK_STEP_START * NANOSECONDS_PER_SECOND
-        )
-        # Deadlines are met on steady time; its offset to the stamps is fixed here, once.
-        self.steady_offset = (
-            time.monotonic_ns() + round(self.presentation_delay * NANOSECONDS_PER_SECOND)
-        )
+        if self.real_time:
+            self.start = time.time_ns() + START_DELAY
+            # Deadlines are met on steady time; its offset to the stamps is fixed here, once.
+            delay = START_DELAY + round(self.presentation_delay * NANOSECONDS_PER_SECOND)
+            self.steady_offset = time.monotonic_ns() + delay
+        else:
+            self.start = LOCK_STEP_START * NANOSECONDS_PER_SECOND
         self.grant = self.acknowledged_grants = 0
         self.end, self.reproducible, self.late, self.next_progress = None, True, 0, 0
         response.success, response.start = True, to_time(self.start)
