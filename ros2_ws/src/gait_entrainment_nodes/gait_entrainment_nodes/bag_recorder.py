@@ -106,8 +106,13 @@ class BagRecorder(Participant, Node):
         self.resolved = {
             topic.name: self.resolve_topic_name(topic.name)
             for topic in (
-                GAIT_EVENTS, JOINT_STATES, ANKLE_TORQUE, *GROUND_REACTION,
-                WALKER_PROGRESS, PUBLISHED_COUNTS, RECORDER_PROGRESS,
+                GAIT_EVENTS,
+                JOINT_STATES,
+                ANKLE_TORQUE,
+                *GROUND_REACTION,
+                WALKER_PROGRESS,
+                PUBLISHED_COUNTS,
+                RECORDER_PROGRESS,
             )
         }
         self.seen: set[str] = set()  # topics that are recorded, or cannot be

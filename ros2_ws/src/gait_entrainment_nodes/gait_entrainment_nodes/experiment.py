@@ -55,7 +55,7 @@ from gait_entrainment_nodes.topics import (
 TICK = 0.02
 
 
-class ExperimentFailed(Exception):
+class ExperimentError(Exception):
     """The experiment cannot go on; the message says why and names who."""
 
 
@@ -151,11 +151,11 @@ class Experiment(Participant, Node):
             result.reproducible = final.reproducible
             result.message = final.message or "every stride of the protocol was walked"
             if final.state != msg.Progress.FINISHED:
-                raise ExperimentFailed(final.message or "the walker ended the run")
+                raise ExperimentError(final.message or "the walker ended the run")
             self.publish_state(Phase.FINISHED, result.message)
             await self.transition(Transition.TRANSITION_DEACTIVATE)
             goal.succeed()
-        except (ExperimentFailed, ProtocolError) as failure:
+        except (ExperimentError, ProtocolError) as failure:
             result.message = str(failure)
             cancelled = goal.is_cancel_requested
             result.outcome = (
@@ -191,7 +191,7 @@ class Experiment(Participant, Node):
         waiting = "participants"
         while waiting:
             if time.monotonic() > deadline:
-                raise ExperimentFailed(f"not ready within {self.ready_timeout:g} s: {waiting}")
+                raise ExperimentError(f"not ready within {self.ready_timeout:g} s: {waiting}")
             self.fail_if_cancelled()
             waiting = await self.not_ready_yet()
             if waiting:
@@ -224,7 +224,7 @@ class Experiment(Participant, Node):
             self._change_state.call_async(_transition(number)), "perturbator does not answer"
         )
         if not response.success:
-            raise ExperimentFailed(
+            raise ExperimentError(
                 "perturbator refused to be configured, activated or deactivated; see its log"
             )
 
@@ -235,7 +235,7 @@ class Experiment(Participant, Node):
             "walker_sim does not answer",
         )
         if not response.success:
-            raise ExperimentFailed(f"walker_sim did not start: {response.message}")
+            raise ExperimentError(f"walker_sim did not start: {response.message}")
         return to_nanoseconds(response.start)
 
     # The chain of promises
@@ -334,7 +334,10 @@ class Experiment(Participant, Node):
     def on_pulses_ended(self, future: Future) -> None:
         """End the run where the pulses were ended before their time."""
         result = future.result().result
-        if result.outcome in (DeliverPulseTrain.Result.STOPPED, DeliverPulseTrain.Result.CANCELLED):
+        if result.outcome in (
+            DeliverPulseTrain.Result.STOPPED,
+            DeliverPulseTrain.Result.CANCELLED,
+        ):
             self.fail(f"the pulses were ended: {result.message}")
 
     def on_profile(self, profile: msg.TorqueProfile) -> None:
@@ -363,7 +366,7 @@ class Experiment(Participant, Node):
             if future.done():
                 continue
             if now > deadline:
-                future.set_exception(ExperimentFailed(reason))
+                future.set_exception(ExperimentError(reason))
             else:
                 self._waits.append((future, deadline, reason))
         ticks, self._ticks = self._ticks, []
@@ -393,12 +396,12 @@ class Experiment(Participant, Node):
     def fail_if_cancelled(self) -> None:
         """Raise where the client has cancelled the run."""
         if self._goal.is_cancel_requested:
-            raise ExperimentFailed("cancelled by the client")
+            raise ExperimentError("cancelled by the client")
 
     def fail(self, reason: str) -> None:
         """End the run that goes on."""
         if not self.ended.done():
-            self.ended.set_exception(ExperimentFailed(reason))
+            self.ended.set_exception(ExperimentError(reason))
 
     async def within(self, future: Future, reason: str) -> Any:
         """Wait for an answer, at most for the silence timeout."""

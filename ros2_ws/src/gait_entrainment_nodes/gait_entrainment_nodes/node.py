@@ -111,9 +111,7 @@ class Participant:
 
     def subscription(self, topic: Topic, callback: Callable[[Any], None], **options: Any) -> Any:
         """Create a subscription with the quality of service of its topic."""
-        return self.create_subscription(
-            topic.type, topic.name, callback, topic.qos, **options
-        )
+        return self.create_subscription(topic.type, topic.name, callback, topic.qos, **options)
 
     def not_ready(self) -> str:
         """Return what this node still waits for before a run, or an empty text."""

@@ -50,9 +50,7 @@ def parameters(
     """
     side = protocol.side.name.lower()
     walker = {name: getattr(protocol.walker, name) for name in protocol.walker.__match_args__}
-    experiment: dict[str, Any] = {
-        "participants": [node for node in NODES if node != "experiment"]
-    }
+    experiment: dict[str, Any] = {"participants": [node for node in NODES if node != "experiment"]}
     if real_time:
         experiment["longest_lookahead"] = REAL_TIME_LOOKAHEAD
     return {

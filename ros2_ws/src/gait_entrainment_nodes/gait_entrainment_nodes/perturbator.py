@@ -128,8 +128,12 @@ class Perturbator(Participant, LifecycleNode):
             self.robot.cancel()
             self.profiles.publish(
                 TorqueProfile(
-                    header=header(self.now), run=self.run_number, side=self.side, stop=True,
-                    revision=self.revision, valid_until=to_time(self.robot.promised_until),
+                    header=header(self.now),
+                    run=self.run_number,
+                    side=self.side,
+                    stop=True,
+                    revision=self.revision,
+                    valid_until=to_time(self.robot.promised_until),
                 )
             )
             self.revision += 1

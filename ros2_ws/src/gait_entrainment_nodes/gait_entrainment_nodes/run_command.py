@@ -47,7 +47,7 @@ _EXAMPLES = """examples:
 CLOSING_TIMEOUT = 15.0
 
 
-class RunFailed(Exception):
+class RunError(Exception):
     """The run has failed; the message says why."""
 
 
@@ -100,7 +100,7 @@ def run(options: argparse.Namespace) -> int:
         return report(bag, options)
     except KeyboardInterrupt:
         print(f"entrain run: interrupted; what was recorded is in {bag}", file=sys.stderr)
-    except (RunFailed, DomainError, BagError) as error:
+    except (RunError, DomainError, BagError) as error:
         print(f"entrain run: {error}", file=sys.stderr)
     return 1
 
@@ -134,7 +134,9 @@ def conduct(protocol: Protocol, bag: Path, domain: int, options: argparse.Namesp
     with tempfile.TemporaryDirectory(prefix="entrain_") as folder:
         parameter_file = Path(folder) / "parameters.yaml"
         parameter_file.write_text(
-            yaml.safe_dump({f"/**/{n}": {"ros__parameters": p} for n, p in node_parameters.items()})
+            yaml.safe_dump(
+                {f"/**/{n}": {"ros__parameters": p} for n, p in node_parameters.items()}
+            )
         )
         supervisor = Supervisor(Path(folder), environment)
         try:
@@ -155,7 +157,7 @@ def conduct(protocol: Protocol, bag: Path, domain: int, options: argparse.Namesp
         if failure:
             lines = supervisor.last_lines(blamed) if blamed else ""
             kept = f"\nthe bag of the run so far is {bag}" if bag.exists() else ""
-            raise RunFailed(f"{failure}{kept}" + (f"\n{lines}" if lines else ""))
+            raise RunError(f"{failure}{kept}" + (f"\n{lines}" if lines else ""))
     (bag / "protocol.yaml").write_text(text)
 
 

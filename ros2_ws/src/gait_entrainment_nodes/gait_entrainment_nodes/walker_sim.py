@@ -72,9 +72,7 @@ class WalkerSim(Participant, Node):
     def __init__(self) -> None:
         super().__init__("walker_sim")
         self.parameters = declare_fields(self, WalkerParameters)
-        side = declare(
-            self, "first_heel_strike", "right", "leg of heel strike 0: left or right"
-        )
+        side = declare(self, "first_heel_strike", "right", "leg of heel strike 0: left or right")
         if side not in ("left", "right"):
             raise ValueError(f"first_heel_strike: {side!r}; allowed: left, right")
         self.first_heel_strike = Side[side.upper()]
@@ -100,9 +98,7 @@ class WalkerSim(Participant, Node):
         self.acknowledged = declare(
             self, "acknowledged", False, "lock-step: keep to what a recorder has acknowledged"
         )
-        with_forces = declare(
-            self, "ground_reaction", True, "publish the ground reaction forces"
-        )
+        with_forces = declare(self, "ground_reaction", True, "publish the ground reaction forces")
         self.begin_participation()
 
         self.events = self.publisher(GAIT_EVENTS)
@@ -218,7 +214,10 @@ class WalkerSim(Participant, Node):
         """Walk every promised stretch, as far as the recorder keeps up."""
         run = self.run
         while run is not None and self.granted and not run.ended:
-            if self.acknowledged and self.grant - self.acknowledged_grants >= UNACKNOWLEDGED_GRANTS:
+            if (
+                self.acknowledged
+                and self.grant - self.acknowledged_grants >= UNACKNOWLEDGED_GRANTS
+            ):
                 return
             until, last = self.granted.popleft()
             self.send(run.advance(until, last=last))
@@ -300,7 +299,9 @@ class WalkerSim(Participant, Node):
             *(
                 (publisher, self._force_template.fill(stamps, force=force))
                 for publisher, force in zip(
-                    self.forces, np.moveaxis(_in_space(samples.ground_reaction), 1, 0), strict=False
+                    self.forces,
+                    np.moveaxis(_in_space(samples.ground_reaction), 1, 0),
+                    strict=False,
                 )
             ),
         ):
@@ -319,9 +320,7 @@ class WalkerSim(Participant, Node):
             reproducible=self.reproducible,
         )
         if run.ending is not None:
-            message.state = (
-                Progress.FELL if run.ending.kind == "fall" else Progress.FLEW_OFF
-            )
+            message.state = Progress.FELL if run.ending.kind == "fall" else Progress.FLEW_OFF
             message.message = run.ending.message
         elif run.ended:
             message.state = Progress.FINISHED

@@ -47,7 +47,7 @@ def add_command(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Simulate and print; 1 where the walker falls or flies off, 2 for a protocol that is wrong."""
+    """Simulate and print; 1 where the walker falls or flies off, 2 for a wrong protocol."""
     # Imported here: the compiled walker takes a while, and other commands do without it.
     from gait_entrainment.simulation import simulate
 

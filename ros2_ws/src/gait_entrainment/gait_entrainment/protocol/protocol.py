@@ -27,7 +27,7 @@ from gait_entrainment.parameters import WalkerParameters
 
 
 class ProtocolError(ValueError):
-    """A protocol that cannot be conducted; the message names the place, the field and what is allowed."""
+    """A protocol that cannot be conducted; the message says place, field and what is allowed."""
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ Protocol files: YAML in, a validated Protocol out, with the line of whatever is 
 PyYAML's node graph keeps the line of every key, which its loaded dictionaries do not.
 """
 
+import contextlib
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, fields
@@ -119,7 +120,9 @@ def read_protocol(
     for pair in _ALTERNATIVES:
         if all(key in entries for key in pair):
             where = entries[pair[1]].where
-            raise ProtocolError(f"{where}: {pair[1]}: give either {pair[0]} or {pair[1]}, not both")
+            raise ProtocolError(
+                f"{where}: {pair[1]}: give either {pair[0]} or {pair[1]}, not both"
+            )
     return _build(entries)
 
 
@@ -222,10 +225,8 @@ def _checked(key: str, entry: _Entry) -> object:
         return value
     allowed = _RANGES.get(key, _Range())
     if isinstance(value, str):  # YAML 1.1 reads 1e-3, which has no dot, as text
-        try:
+        with contextlib.suppress(ValueError):
             value = float(value)
-        except ValueError:
-            pass
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ProtocolError(f"{entry.where}: {key}: {value!r} is not a number; allowed: {allowed}")
     if key in _INTEGERS and not isinstance(value, int):

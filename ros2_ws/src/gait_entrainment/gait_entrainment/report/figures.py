@@ -123,12 +123,10 @@ def _ankle_torque(run: RecordedRun) -> Any:
         own = torques.intrinsic[inside] * scale
         whole = own + torques.effective[inside] * scale
         delivered = torques.delivered[inside] != 0
-        axes.fill_between(time, row, row + own, color=BLUE, alpha=0.35, lw=0)
-        axes.fill_between(time, row + own, row + whole, color=ORANGE, lw=0)
-        axes.plot(time, row + whole, color=BLUE, lw=0.6)
-        axes.plot(
-            time[delivered], np.full(delivered.sum(), row - 0.12), "s", ms=1.5, color=ORANGE
-        )
+        axes.fill_between(time, row, row - own, color=BLUE, alpha=0.35, lw=0)
+        axes.fill_between(time, row - own, row - whole, color=ORANGE, lw=0)
+        axes.plot(time, row - whole, color=BLUE, lw=0.6)
+        axes.plot(time[delivered], np.full(delivered.sum(), row + 0.12), "s", ms=1.5, color=ORANGE)
         axes.text(
             longest * 1.01 if row else stride.period * 1.01,
             row,
