@@ -24,6 +24,7 @@ from gait_entrainment.bags.errors import (
     DiskFullError,
     UnreadableBagError,
 )
+from gait_entrainment.bags.export import export
 from gait_entrainment.bags.mcap_file import BagMessage
 from gait_entrainment.bags.metadata import INFINITE, QosProfile, TopicInfo
 from gait_entrainment.bags.reader import BagInfo, BagReader, info
@@ -41,6 +42,7 @@ __all__ = [
     "Severity",
     "recover",
     "Recovery",
+    "export",
     "TopicInfo",
     "QosProfile",
     "INFINITE",

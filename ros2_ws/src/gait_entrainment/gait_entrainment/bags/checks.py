@@ -267,6 +267,8 @@ def _check_data_checksum(file: McapFile, report: _Report) -> None:
     try:
         for opcode, start, length in file.records():
             if opcode == Opcode.DATA_END:
+                if length != 4:
+                    raise file.damage(start, "broken end of the data section")
                 expected = file.parse(DataEnd.read, start, length).data_section_crc
                 while offset < start:
                     piece = file.read(offset, min(2**20, start - offset))

@@ -182,21 +182,27 @@ def _dependencies(type_name: str, text: str) -> Iterator[str]:
         yield f"{owner or package}/{nested}/{name}"
 
 
-def missing_definitions(type_name: str, schema_text: str) -> list[str]:
-    """List the types (``package/Type``) that the text of a schema names but does not define."""
+def schema_parts(type_name: str, schema_text: str) -> dict[str, str]:
+    """Take the text of a schema apart: definitions by ``package/Type``, the root one first."""
     root, *others = schema_text.split(f"{SEPARATOR}\nMSG: ")
-    defined = {}
+    parts = {_short(type_name): root}
     for other in others:
         name, _, text = other.partition("\n")
-        defined[name.strip()] = text
+        parts[name.strip()] = text
+    return parts
+
+
+def missing_definitions(type_name: str, schema_text: str) -> list[str]:
+    """List the types (``package/Type``) that the text of a schema names but does not define."""
     needed = set()
     try:
-        for name, text in ((type_name, root), *defined.items()):
-            full = name if name.count("/") == 2 else name.replace("/", "/msg/", 1)
+        parts = schema_parts(type_name, schema_text)
+        for name, text in parts.items():
+            full = name.replace("/", "/msg/", 1)
             needed |= {_short(dependency) for dependency in _dependencies(full, text)}
     except DefinitionMissingError as error:
         return [str(error)]
-    return sorted(needed - defined.keys())
+    return sorted(needed - parts.keys())
 
 
 def _short(type_name: str) -> str:

@@ -396,7 +396,7 @@ class McapFile:
                     raise _BrokenRecordsError(_WRONG_INDEX)
                 messages.append(found)
             return messages
-        except struct.error:
+        except (struct.error, OverflowError):  # an offset beyond the chunk
             raise self.damage(chunk.offset, _WRONG_INDEX) from None
         except _BrokenRecordsError as error:
             raise self.damage(chunk.offset, str(error)) from None

@@ -26,6 +26,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterable, Mapping
+from io import FileIO
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -381,6 +382,10 @@ def _write_error(error: OSError, what: str) -> BagWriteError:
     return BagWriteError(f"{what}: {first_line(error)}")
 
 
+def _open_new(path: Path) -> FileIO:
+    return path.open("xb", buffering=0)
+
+
 class _ReservingFile:
     """
     The file that a recording goes to, with space put aside for its end.
@@ -396,7 +401,7 @@ class _ReservingFile:
         self._size = 0
         self._sync_thread: threading.Thread | None = None
         self._sync_error: OSError | None = None
-        self._raw = path.open("xb", buffering=0)
+        self._raw = _open_new(path)
         self._reserve = tempfile.TemporaryFile(dir=path.parent, buffering=0)  # noqa: SIM115
         try:
             os.posix_fallocate(self._reserve.fileno(), 0, reserve)

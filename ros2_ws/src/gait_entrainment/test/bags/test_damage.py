@@ -1,0 +1,100 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Whatever happens to the bytes of a bag: a verdict or data, never a traceback or a hang."""
+
+import contextlib
+from pathlib import Path
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gait_entrainment.bags import BagReader, UnreadableBagError, check, info, recover
+
+ALL = [1, 2, 3, 4]
+
+
+def read(path: Path) -> list[int] | None:
+    """Read a bag as far as it goes; None after a verdict."""
+    try:
+        with BagReader(path) as reader:
+            found = [message.log_time for message in reader.messages()]
+            some = [message.log_time for message in reader.messages(reader.topics.keys() & {"/b"})]
+            assert some == [2] or "/b" not in reader.topics
+            return found
+    except UnreadableBagError as error:
+        said = str(error)
+    assert str(path) in said
+    assert "\n" not in said
+    return None
+
+
+def test_file_cut_at_every_length(small_bag: Path, tmp_path: Path) -> None:
+    data = (small_bag / "small_0.mcap").read_bytes()
+    path = tmp_path / "cut.mcap"
+    for length in range(len(data)):
+        path.write_bytes(data[:length])
+        assert read(path) is None
+        assert any(finding.rule in ("closed", "mcap") for finding in check(path))
+
+
+def test_every_byte_flipped(small_bag: Path, tmp_path: Path) -> None:
+    data = bytearray((small_bag / "small_0.mcap").read_bytes())
+    path = tmp_path / "flipped.mcap"
+    for offset in range(len(data)):
+        data[offset] ^= 0xFF
+        path.write_bytes(data)
+        data[offset] ^= 0xFF
+        # Either a verdict or all of the messages: never fewer in silence.
+        assert read(path) in (None, ALL)
+        assert check(path) != [], f"byte {offset}"
+
+
+def test_every_byte_of_the_metadata_file_flipped(small_bag: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "small"
+    folder.mkdir()
+    (folder / "small_0.mcap").write_bytes((small_bag / "small_0.mcap").read_bytes())
+    data = bytearray((small_bag / "metadata.yaml").read_bytes())
+    for offset in range(len(data)):
+        data[offset] ^= 0x15
+        (folder / "metadata.yaml").write_bytes(data)
+        data[offset] ^= 0x15
+        with contextlib.suppress(UnreadableBagError):
+            info(folder)
+        check(folder)
+
+
+@settings(derandomize=True, deadline=None, max_examples=150)
+@given(data=st.data())
+def test_bytes_replaced_at_random(
+    small_bag: Path, tmp_path_factory: object, data: st.DataObject
+) -> None:
+    folder = tmp_path_factory.mktemp("damaged")  # type: ignore[attr-defined]
+    content = bytearray((small_bag / "small_0.mcap").read_bytes())
+    for _ in range(data.draw(st.integers(1, 3))):
+        offset = data.draw(st.integers(0, len(content)))
+        cut = data.draw(st.integers(0, 8))
+        content[offset : offset + cut] = data.draw(
+            st.binary(max_size=8) | st.just(b"\xff" * 8) | st.just(bytes(8))
+        )
+    path = folder / "damaged.mcap"
+    path.write_bytes(content)
+    read(path)
+    check(path)
+    try:
+        rescued = recover(path, folder / "rescued")
+    except UnreadableBagError:
+        return
+    assert sum(rescued.counts.values()) <= len(ALL)
+    assert check(folder / "rescued") == []
