@@ -50,7 +50,7 @@ if [ "$(cat ros2_ws/install/compiled 2> /dev/null)" != "$walker" ]; then
     echo "build: compiling the walker ..."
     start=$SECONDS
     source ./env.bash
-    if entrain simulate --json > /dev/null; then
+    if python scripts/compile_walker.py > /dev/null; then
         echo "$walker" > ros2_ws/install/compiled
         echo "build: done in $((SECONDS - start)) s"
     else

@@ -10,7 +10,7 @@ check() {
 }
 
 check ruff check --quiet --output-format concise .
-check ruff format --check --quiet .
+check ruff format --check --output-format concise .
 check mypy
 check lint-imports --no-logo --no-cache
 check python scripts/check_licence_headers.py
