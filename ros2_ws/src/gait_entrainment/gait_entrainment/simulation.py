@@ -22,7 +22,7 @@ which a lock-step run drives them. So both give the same events to the nanosecon
 from dataclasses import dataclass
 
 from gait_entrainment.analysis import Analysis, VerdictSettings, analyze
-from gait_entrainment.device import DeviceLimits, IdealAnkleRobot, PulseTrain
+from gait_entrainment.device import DeviceLimits, PulseTrain, find_driver
 from gait_entrainment.events import GaitEvent
 from gait_entrainment.experiment import Conductor
 from gait_entrainment.protocol import Protocol
@@ -48,17 +48,17 @@ def simulate(
     settings: VerdictSettings | None = None,
 ) -> Simulation:
     """
-    Conduct a protocol on the simulated walker with the ideal ankle robot.
+    Conduct a protocol on the simulated walker.
 
     Raises
     ------
     LimitError
-        where the pulses are outside the limits of the device.
+        where the driver is unknown, or the pulses are outside the limits of the device.
     ProtocolError
         where the pulses would overlap at the measured period.
 
     """
-    robot = IdealAnkleRobot(protocol.side, 0, limits)
+    robot = find_driver(protocol.driver)(protocol.side, 0, limits)
     robot.limits.check_pulse(protocol.pulse_torque, protocol.pulses.width)
     conductor = Conductor(protocol)
     run = WalkerRun(protocol.walker, first_heel_strike=protocol.side, sample_rate=None)

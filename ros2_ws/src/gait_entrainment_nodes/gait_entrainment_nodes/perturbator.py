@@ -30,14 +30,18 @@ from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.device import DeviceLimits, IdealAnkleRobot, LimitError, PulseTrain
+from gait_entrainment.device import (
+    DeviceLimits,
+    IdealAnkleRobot,
+    LimitError,
+    PulseTrain,
+    find_driver,
+)
 from gait_entrainment_msgs.action import DeliverPulseTrain
 from gait_entrainment_msgs.msg import AnkleRobotState, Horizon, TorqueProfile, TorquePulse
 from gait_entrainment_nodes.node import Participant, declare, declare_fields, run_node
 from gait_entrainment_nodes.stamps import header, to_nanoseconds, to_time
 from gait_entrainment_nodes.topics import HORIZON, PULSES, ROBOT_STATE, TORQUE_PROFILE
-
-DRIVERS = {"ideal": IdealAnkleRobot}
 
 
 class Perturbator(Participant, LifecycleNode):
@@ -81,9 +85,10 @@ class Perturbator(Participant, LifecycleNode):
 
     def on_configure(self, _: LifecycleState) -> TransitionCallbackReturn:
         """Load the driver; releases a latched stop."""
-        if self.driver not in DRIVERS:
-            known = ", ".join(sorted(DRIVERS))
-            self.get_logger().error(f"driver: {self.driver!r} is unknown; allowed: {known}")
+        try:
+            self.make_robot = find_driver(self.driver)
+        except LimitError as error:
+            self.get_logger().error(str(error))
             return TransitionCallbackReturn.FAILURE
         self.stopped = False
         return TransitionCallbackReturn.SUCCESS
@@ -205,7 +210,7 @@ class Perturbator(Participant, LifecycleNode):
             return
         self.now = to_nanoseconds(message.header.stamp)
         if self.robot is None or message.run != self.run_number:
-            self.robot = DRIVERS[self.driver](self.side, self.now, self.limits)
+            self.robot = self.make_robot(self.side, self.now, self.limits)
             self.run_number, self.revision = message.run, 0
         until = to_nanoseconds(message.until)
         if self._goal is not None and self._goal.is_cancel_requested:

@@ -31,7 +31,7 @@ from ament_index_python.packages import get_package_share_directory
 
 from gait_entrainment.bags import BagError
 from gait_entrainment.commands.protocol_options import add_protocol_options, chosen_protocol
-from gait_entrainment.device import DeviceLimits, LimitError
+from gait_entrainment.device import DeviceLimits, LimitError, find_driver
 from gait_entrainment.protocol import Protocol, ProtocolError, write_protocol
 from gait_entrainment_nodes.domain import DomainError, claimed_domain
 from gait_entrainment_nodes.node_list import NODES, STOP_ORDER, parameters
@@ -83,6 +83,7 @@ def run(options: argparse.Namespace) -> int:
     """Run one experiment; 1 where it failed, 2 for a protocol or an option that is wrong."""
     try:
         protocol = chosen_protocol(options)
+        find_driver(protocol.driver)
         DeviceLimits().check_pulse(protocol.pulse_torque, protocol.pulses.width)
         if not 0 <= options.sample_rate <= 1000:
             raise ProtocolError(f"--sample-rate: {options.sample_rate:g}; allowed: 0 to 1000 Hz")

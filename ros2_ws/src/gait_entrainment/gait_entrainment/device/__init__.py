@@ -14,9 +14,17 @@
 
 """The ankle robot: pulse trains in, promised torque profiles out."""
 
+from gait_entrainment.device.drivers import find_driver
 from gait_entrainment.device.ideal import IdealAnkleRobot
 from gait_entrainment.device.limits import DeviceLimits, LimitError
 from gait_entrainment.device.profile import TorqueProfile
 from gait_entrainment.device.pulse_train import PulseTrain
 
-__all__ = ["DeviceLimits", "IdealAnkleRobot", "LimitError", "PulseTrain", "TorqueProfile"]
+__all__ = [
+    "DeviceLimits",
+    "IdealAnkleRobot",
+    "LimitError",
+    "PulseTrain",
+    "TorqueProfile",
+    "find_driver",
+]

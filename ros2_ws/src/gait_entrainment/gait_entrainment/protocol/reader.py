@@ -204,11 +204,15 @@ def _build(entries: Mapping[str, _Entry]) -> Protocol:
             **sections[""],
         )
     except ParameterError as error:
-        places = [entries[key].where for key in _WALKER_FIELDS if key in entries]
-        raise ProtocolError(f"{', '.join(places) or 'walker'}: walker: {error}") from None
+        # The message begins with the field; where that is a default, the others are at fault.
+        named = f"walker.{str(error).split()[0]}"
+        given = [key for key in _WALKER_FIELDS if key in entries]
+        places = [entries[key].where for key in ([named] if named in given else given)]
+        raise ProtocolError(f"{', '.join(places)}: walker: {error}") from None
     except ProtocolError as error:
-        named = str(error).partition(":")[0]
-        place = entries[named].where + ": " if named in entries else ""
+        # What is wrong may lie in a default; then the field that does not go with it is at fault.
+        suspects = (str(error).partition(":")[0], "pulses.period")
+        place = next((entries[key].where + ": " for key in suspects if key in entries), "")
         raise ProtocolError(f"{place}{error}") from None
 
 

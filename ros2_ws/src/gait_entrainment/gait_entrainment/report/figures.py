@@ -134,14 +134,15 @@ def _ankle_torque(run: RecordedRun) -> Any:
             fontsize=7,
             va="bottom",
         )
+    axes.text(longest * 1.01, -0.85, "stride period", fontsize=7)
     axes.set_yticks(range(len(rows)), [str(s.number) for s in rows], fontsize=7)
     axes.invert_yaxis()
     axes.set_ylim(len(rows) - 0.5, -1.1)
     axes.set(
         xlabel="time since heel strike of the perturbed leg [s]",
         ylabel="stride",
-        title="Ankle torque: own push-off (blue), pulse that acts (orange), "
-        "pulse delivered (orange line)",
+        title=f"Ankle torque: own push-off (blue, peak {run.protocol.walker.peak_torque:.0f} N m), "
+        "pulse that acts (orange), pulse delivered (bar)",
     )
     axes.title.set_fontsize(9)
     return figure

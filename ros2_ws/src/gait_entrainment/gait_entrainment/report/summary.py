@@ -59,7 +59,7 @@ def outcome_of(
     parameters = asdict(protocol)
     parameters["side"] = protocol.side.name.lower()
     parameters["pulses"]["torque"] = protocol.pulse_torque
-    return _without_nan(
+    outcome: dict[str, Any] = _without_nan(
         {
             "unperturbed_stride_period": measured_period,
             "perturbation_period": pulse_period,
@@ -80,6 +80,7 @@ def outcome_of(
             "parameters": parameters,
         }
     )
+    return outcome
 
 
 def summary(outcome: dict[str, Any]) -> str:

@@ -1,0 +1,139 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The conductor: its plan, and the promises that must never cover an unplanned onset."""
+
+import math
+import statistics
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gait_entrainment.conventions import EventKind, Side
+from gait_entrainment.events import GaitEvent
+from gait_entrainment.experiment import Conductor, Phase
+from gait_entrainment.protocol import Protocol, ProtocolError, PulsePlan
+
+
+def walk(strides, toe_off=0.36):
+    """Gait events of strides of the given periods [s]; the right leg strikes first, at 0."""
+    events, strike = [GaitEvent(0, EventKind.HEEL_STRIKE, Side.RIGHT, 0)], 0
+    for number, period in enumerate(strides):
+        middle, end = strike + round(period * 5e8), strike + round(period * 1e9)
+        for step, begin, side, close in (
+            (2 * number + 1, strike, Side.LEFT, middle),
+            (2 * number + 2, middle, Side.RIGHT, end),
+        ):
+            off = begin + round(toe_off * (close - begin))
+            events.append(GaitEvent(off, EventKind.TOE_OFF, side, step))
+            events.append(GaitEvent(close, EventKind.HEEL_STRIKE, side, step))
+        strike = end
+    return events
+
+
+def conduct(conductor, events):
+    """Drive a conductor as a walker would, never past a promise; return horizons and the plan."""
+    reached, rest, horizons, planned_at = 0, list(events), [], None
+    while True:
+        horizon = conductor.horizon(reached)
+        assert horizon.until > reached, "lock-step would stand still"
+        horizons.append(horizon)
+        if horizon.last or not rest:
+            return horizons, planned_at
+        reached = horizon.until
+        while rest and rest[0].stamp <= reached:
+            train = conductor.add_event(rest.pop(0))
+            if train is not None:
+                planned_at = reached
+                assert train.first_onset >= reached, "an onset inside what was promised"
+
+
+@settings(derandomize=True, deadline=None, max_examples=150)
+@given(
+    baseline=st.integers(2, 6),
+    periods=st.lists(st.floats(0.9, 1.6), min_size=14, max_size=14),
+    phase=st.floats(0, 1, exclude_max=True),
+    longest=st.sampled_from([0.1, 0.3, math.inf]),
+)
+def test_no_promise_covers_an_onset_that_is_not_planned(baseline, periods, phase, longest):
+    protocol = Protocol(
+        baseline=baseline, washout=2, pulses=PulsePlan(count=3, initial_phase=phase)
+    )
+    conductor = Conductor(protocol, longest)
+    events = walk(periods)
+    conduct(conductor, events)
+    measured = statistics.fmean(round(p * 1e9) / 1e9 for p in periods[: baseline - 1])
+    strikes = [e.stamp for e in events if e.kind is EventKind.HEEL_STRIKE and e.side is Side.RIGHT]
+    train = conductor.train
+    assert conductor.measured_period == pytest.approx(measured, abs=2e-9)
+    # The definition, from the strike that starts the last baseline stride.
+    onset = strikes[baseline - 1] + round((1 + phase) * conductor.measured_period * 1e9)
+    assert train.first_onset == onset
+    assert train.period == conductor.measured_period - 0.05
+
+
+@settings(derandomize=True, deadline=None, max_examples=50)
+@given(
+    periods=st.lists(st.floats(1.0, 1.4), min_size=9, max_size=9),
+    longest=st.sampled_from([0.05, 0.21, 0.7]),
+)
+def test_the_end_lies_behind_everything_promised_and_behind_the_last_stride(periods, longest):
+    protocol = Protocol(baseline=2, washout=2, pulses=PulsePlan(count=3))
+    conductor = Conductor(protocol, longest)
+    events = walk(periods)
+    horizons, _ = conduct(conductor, events)
+    strikes = [e.stamp for e in events if e.kind is EventKind.HEEL_STRIKE and e.side is Side.RIGHT]
+    assert horizons[-1].last
+    assert horizons[-1].until > strikes[protocol.strides]
+    assert [h.until for h in horizons] == sorted(h.until for h in horizons)
+    assert conductor.strides >= protocol.strides
+
+
+def test_an_absolute_period_needs_no_measurement():
+    protocol = Protocol(
+        baseline=1,
+        washout=0,
+        pulses=PulsePlan(count=2, period=1.5, period_offset=None, initial_phase=0.25),
+    )
+    conductor = Conductor(protocol)
+    conduct(conductor, walk([1.4] * 4))
+    assert conductor.train.first_onset == round(1.25 * 1.5e9)
+    assert conductor.train.period == 1.5
+
+
+def test_phases_follow_the_plan():
+    protocol = Protocol(baseline=2, washout=1, pulses=PulsePlan(count=2))
+    conductor = Conductor(protocol)
+    events = walk([1.2] * 6)
+    assert conductor.phase(0) is Phase.BASELINE
+    for event in events[:9]:
+        conductor.add_event(event)
+    train = conductor.train
+    assert conductor.phase(train.first_onset - 1) is Phase.BASELINE
+    assert conductor.phase(train.first_onset) is Phase.PULSES
+    assert conductor.phase(train.end(1)) is Phase.WASHOUT
+    for event in events[9:]:
+        conductor.add_event(event)
+    assert conductor.phase(train.end(1)) is Phase.FINISHED
+
+
+def test_a_baseline_without_a_complete_stride_says_so():
+    conductor = Conductor(Protocol(baseline=2, pulses=PulsePlan(count=2)))
+    events = walk([1.2] * 4)
+    # The strikes of stride 2 and 3 are missing: the baseline is over before a stride was closed.
+    assert conductor.add_event(events[0]) is None
+    third = [e for e in events if e.kind is EventKind.HEEL_STRIKE and e.step == 6]
+    with pytest.raises(ProtocolError, match="no complete stride"):
+        conductor.add_event(*third)

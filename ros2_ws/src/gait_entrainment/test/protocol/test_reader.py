@@ -1,0 +1,157 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Protocol files: what reads back, and what is refused with which words."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gait_entrainment.conventions import Side
+from gait_entrainment.protocol import (
+    DEFAULT_PROTOCOL,
+    Protocol,
+    ProtocolError,
+    PulsePlan,
+    read_protocol,
+    write_protocol,
+)
+
+
+def test_the_default_is_the_papers_example():
+    plan = read_protocol().pulses
+    assert (plan.count, plan.width, plan.torque_fraction) == (50, 0.1, 0.1)
+    assert plan.period_offset == -0.05
+    assert (DEFAULT_PROTOCOL.baseline, DEFAULT_PROTOCOL.washout) == (15, 15)
+    assert DEFAULT_PROTOCOL.strides == 80
+    # 17 % of body weight times leg length, a tenth of it, within the rounding of Table 1.
+    assert DEFAULT_PROTOCOL.pulse_torque == pytest.approx(0.1 * 0.17 * 80 * 9.81, rel=1e-3)
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(
+    side=st.sampled_from(Side),
+    baseline=st.integers(2, 1000),
+    count=st.integers(1, 1000),
+    width=st.floats(1e-3, 0.5),
+    torque=st.one_of(st.none(), st.floats(-200, 200)),
+    period=st.one_of(st.none(), st.floats(0.6, 10)),
+    offset=st.floats(-0.3, 0.3),
+    phase=st.floats(0, 1, exclude_max=True),
+    mass=st.floats(30, 150),
+    seed=st.integers(0, 2**63 - 1),
+)
+def test_what_is_written_reads_back_the_same(
+    side, baseline, count, width, torque, period, offset, phase, mass, seed
+):
+    stiffness = 87.3 * mass / 80  # the same gait, whatever the mass
+    protocol = Protocol(
+        side=side,
+        baseline=baseline,
+        seed=seed,
+        pulses=PulsePlan(
+            count=count,
+            width=width,
+            torque=torque,
+            torque_fraction=0.2 if torque is None else None,
+            period=period,
+            period_offset=offset if period is None else None,
+            initial_phase=phase,
+        ),
+        walker=type(DEFAULT_PROTOCOL.walker)(mass=mass, ankle_stiffness=stiffness),
+    )
+    assert read_protocol(write_protocol(protocol)) == protocol
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("baselin: 3", ("baselin", "unknown field", "baseline")),
+        ("baseline: 1", ("baseline", "at least 2")),
+        ("baseline: 0", ("baseline", "at least 1")),
+        ("baseline: 2.5", ("baseline", "whole number")),
+        ("baseline: true", ("baseline", "not a number")),
+        ("washout: -1", ("washout", "at least 0")),
+        ("side: middle", ("side", "left, right")),
+        ("name: ../x", ("name", "plain name")),
+        ("pulses: 3", ("pulses", "mapping")),
+        ("pulses: {width: -0.1}", ("pulses.width", "-0.1", "above 0", "s")),
+        ("pulses: {width: .nan}", ("pulses.width", "nan")),
+        ("pulses: {width: abc}", ("pulses.width", "not a number")),
+        ("pulses: {width: [1]}", ("pulses.width", "single value")),
+        ("pulses: {wdth: 1}", ("pulses.wdth", "unknown field", "width")),
+        ("pulses: {period: 0.05}", ("pulses.width", "overlap")),
+        ("pulses: {period: .inf}", ("pulses.period", "inf")),
+        ("pulses: {initial_phase: 1}", ("pulses.initial_phase", "below 1")),
+        ("pulses: {torque: 5, torque_fraction: 0.1}", ("torque_fraction", "not both")),
+        ("pulses: {period: 2, period_offset: 0.1}", ("period_offset", "not both")),
+        ("walker: {ankle_stiffness: 60}", ("ankle_stiffness", "67.48 to 111.9")),
+        ("walker: {mass: .nan}", ("mass",)),
+        ("walker: {weight: 3}", ("walker.weight", "unknown field", "mass")),
+        ("seed: 1\nseed: 2", ("seed", "twice")),
+    ],
+)
+def test_a_mistake_is_named_with_its_line(line, words):
+    text = "# a protocol\nname: mine\n" if not line.startswith("name") else "# a protocol\n\n"
+    with pytest.raises(ProtocolError) as refused:
+        read_protocol(text + line + "\n")
+    message = str(refused.value)
+    place = 4 if line.startswith("seed") else 3
+    assert message.startswith(f"protocol:{place}: "), message
+    assert "\n" not in message
+    for word in words:
+        assert word in message
+
+
+def test_a_file_that_cannot_be_read_is_named(tmp_path):
+    with pytest.raises(ProtocolError, match=r"nowhere\.yaml: cannot be read: No such file"):
+        read_protocol(tmp_path / "nowhere.yaml")
+    binary = tmp_path / "binary.yaml"
+    binary.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ProtocolError, match="not UTF-8"):
+        read_protocol(binary)
+    broken = tmp_path / "broken.yaml"
+    broken.write_text("name: x\npulses: {width: 1\n")
+    with pytest.raises(ProtocolError, match=r"broken\.yaml:3: not valid YAML"):
+        read_protocol(broken)
+
+
+def test_an_empty_file_is_the_default(tmp_path):
+    (tmp_path / "empty.yaml").write_text("# nothing\n")
+    assert read_protocol(tmp_path / "empty.yaml") == DEFAULT_PROTOCOL
+
+
+def test_an_option_replaces_the_file_and_its_alternative():
+    protocol = read_protocol(
+        "pulses: {torque: 5, period: 2.0}\n\n",
+        {"pulses.torque_fraction": (0.2, "--torque-fraction")},
+    )
+    assert protocol.pulses.torque is None
+    assert protocol.pulses.torque_fraction == 0.2
+    assert protocol.pulses.period == 2.0
+    with pytest.raises(ProtocolError, match=r"^--width: pulses.width: -1"):
+        read_protocol(None, {"pulses.width": (-1.0, "--width")})
+
+
+def test_a_number_without_a_dot_in_scientific_notation_is_a_number():
+    assert read_protocol("pulses: {width: 1e-1}\n\n").pulses.width == 0.1
+
+
+def test_pulses_that_would_overlap_at_the_measured_period_are_refused():
+    with pytest.raises(ProtocolError, match="overlap"):
+        PulsePlan(width=0.1, period_offset=-1.9).period_for(1.93)
+    assert PulsePlan(period_offset=-0.05).period_for(2.0) == 1.95
+    assert math.isnan(PulsePlan(period_offset=0.0).period_for(1.0)) is False

@@ -1,0 +1,121 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The experiment in one process: the paper's example entrains, and its mirror image likewise."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gait_entrainment.analysis import Verdict
+from gait_entrainment.conventions import EventKind, Side
+from gait_entrainment.device import LimitError
+from gait_entrainment.protocol import Protocol, PulsePlan
+from gait_entrainment.simulation import simulate
+from gait_entrainment.walker import Walker
+
+
+@pytest.fixture(scope="module")
+def default():
+    return simulate(Protocol())
+
+
+def test_the_papers_example_entrains_at_the_end_of_double_stance(default):
+    last = default.analysis.entrainments[-1]
+    assert last.verdict is Verdict.ENTRAINED
+    assert default.ending is None
+    strides = [s for s in default.analysis.strides if s.number <= 80]
+    assert len(strides) == 80
+    assert default.train.period == default.measured_period - 0.05
+    # Locked: the stride takes as long as the pulses' period, to the nanosecond's rounding.
+    locked = [s.period for s in strides if 55 <= s.number <= 64]
+    assert locked == pytest.approx([default.train.period] * len(locked), abs=2e-9)
+    # The pulse meets toe-off: it begins before, and would end after it.
+    for pulse in default.analysis.pulses[-10:]:
+        assert -0.1 < pulse.phase_lag < 0
+    # Washout: back to the unperturbed period, and the verdict stands.
+    assert strides[-1].period == pytest.approx(default.measured_period, abs=1e-6)
+
+
+def test_the_stride_count_does_not_depend_on_the_pulse_period():
+    for offset in (-0.2, 0.1):
+        protocol = Protocol(
+            baseline=3, washout=4, pulses=PulsePlan(count=20, period_offset=offset)
+        )
+        strides = simulate(protocol).analysis.strides
+        assert max(s.number for s in strides) >= 27
+        closing = [s.end for s in strides if s.number == 27]
+        assert len(closing) == 1
+
+
+def test_the_other_leg_gives_the_mirror_image(default):
+    mirrored = simulate(Protocol(side=Side.LEFT))
+    assert [(e.stamp, e.kind, e.side.other, e.step) for e in mirrored.events] == [
+        (e.stamp, e.kind, e.side, e.step) for e in default.events
+    ]
+
+
+def test_events_alternate_and_are_numbered(default):
+    places = [e.place for e in default.events]
+    assert places == list(range(len(places)))
+    assert default.events[0].stamp == 0
+    assert default.events[0].kind is EventKind.HEEL_STRIKE
+
+
+@settings(derandomize=True, deadline=None, max_examples=8)
+@given(phase=st.floats(0, 1, exclude_max=True), offset=st.floats(-0.07, -0.02))
+def test_the_same_as_one_walk_over_the_whole_torque(phase, offset):
+    """Cutting into grants changes nothing: one uncut walk gives the same stamps."""
+    import numpy as np
+
+    protocol = Protocol(
+        baseline=3,
+        washout=2,
+        pulses=PulsePlan(count=10, period_offset=offset, initial_phase=phase),
+    )
+    cut = simulate(protocol)
+    end = cut.events[-1].stamp
+    train = cut.train
+    times, torques = [0], [0.0]
+    for n in range(train.count):
+        times += [train.onset(n), train.end(n)]
+        torques += [train.torque, 0.0]
+    walker = Walker(protocol.walker, protocol.side)
+    walker.extend_torque(
+        protocol.side, np.array(times), np.array(torques), max(end, times[-1]) + 1
+    )
+    whole = walker.advance(end)
+    assert [(t.stamp, t.kind, t.side, t.step) for t in whole] == [
+        (e.stamp, e.kind, e.side, e.step) for e in cut.events
+    ]
+
+
+def test_a_torque_beyond_the_device_is_refused_before_anything_moves():
+    with pytest.raises(LimitError, match=r"torque: 45 N m.*-30 to 30"):
+        simulate(Protocol(pulses=PulsePlan(torque=45.0, torque_fraction=None)))
+
+
+def test_a_walk_that_ends_by_itself_is_reported():
+    """A strong dorsiflexion pulse in early double stance takes the energy to vault over."""
+    protocol = Protocol(
+        baseline=2,
+        washout=2,
+        pulses=PulsePlan(
+            count=20, width=0.4, torque=-29.0, torque_fraction=None, initial_phase=0.5
+        ),
+    )
+    simulation = simulate(protocol)
+    assert simulation.ending is not None
+    assert simulation.ending.missing > 0
+    assert len(simulation.analysis.strides) < protocol.strides
