@@ -24,11 +24,11 @@ from gait_entrainment.bags.errors import (
     DiskFullError,
     UnreadableBagError,
 )
-from gait_entrainment.bags.export import export
 from gait_entrainment.bags.mcap_file import BagMessage
 from gait_entrainment.bags.metadata import INFINITE, QosProfile, TopicInfo
 from gait_entrainment.bags.reader import BagInfo, BagReader, info
 from gait_entrainment.bags.recovery import Recovery, recover
+from gait_entrainment.bags.tables import export
 from gait_entrainment.bags.writer import BagWriter
 
 __all__ = [

@@ -30,7 +30,7 @@ from mcap.opcode import Opcode
 from mcap.records import DataEnd
 
 from gait_entrainment.bags.decoding import CDR_HEADER_SIZE, decoder_for
-from gait_entrainment.bags.definitions import missing_definitions
+from gait_entrainment.bags.definitions import is_type_name, missing_definitions
 from gait_entrainment.bags.errors import BagError, UnreadableBagError
 from gait_entrainment.bags.mcap_file import BagMessage, Chunk, Contents, McapFile
 from gait_entrainment.bags.metadata import (
@@ -79,7 +79,11 @@ RULES: dict[str, tuple[Severity, str]] = {
         _ERROR,
         "readers stop there or give wrong data; `entrain bag recover` saves the rest",
     ),
-    "summary": (_WARNING, "a reader has to go through the whole file to know what is in it"),
+    "summary": (
+        _WARNING,
+        "a reader has to go through the whole file to know what is in it, or falls back to the "
+        "order of the file",
+    ),
     "profile": (_ERROR, "rosbags rejects the file"),
     "schema": (_ERROR, "rosbag2 throws when it opens the file"),
     "schema-name": (_ERROR, "rosbag2 finds no message package for it and skips the topic"),
@@ -177,7 +181,7 @@ def _check_file(path: Path, report: _Report) -> Contents | None:
             try:
                 summary = file.read_summary()
                 if summary is None:
-                    report.add("summary", f"{path}: no summary with channels and statistics")
+                    report.add("summary", f"{path}: no summary of channels, statistics and chunks")
             except UnreadableBagError as error:
                 report.add("intact", str(error))
         messages = _MessageCheck(file, summary, report)
@@ -226,8 +230,12 @@ class _MessageCheck:
         """Decode the first message of a topic, as a viewer would."""
         for channel in contents.channels.values():
             topic = topic_of(channel, contents.schemas)
-            if topic.name != message.topic or not topic.schema_text:
+            if topic.name != message.topic or not is_type_name(topic.type):
                 continue
+            # A type without fields is serialized as one byte, which is padded to four.
+            if not topic.schema_text.strip() and len(message.data) > CDR_HEADER_SIZE + 4:
+                self._report.add("schema-text", f"{self._file.path}: {topic.type}: is empty")
+                return
             try:
                 decoder_for(topic)(message.data)
             except UnreadableBagError as error:
@@ -301,12 +309,10 @@ def _check_channels(path: Path, stock: Contents, report: _Report) -> None:
     types: dict[str, str] = {}
     for schema in stock.schemas.values():
         where = f"{path}: {schema.name}"
-        if schema.name.count("/") != 2:
+        if not is_type_name(schema.name):
             report.add("schema-name", f"{where}: a type reads package/msg/Type")
-        if schema.encoding != "ros2msg":
+        elif schema.encoding != "ros2msg":
             report.add("schema-encoding", f"{where}: {schema.encoding!r} instead of 'ros2msg'")
-        elif not schema.data.strip() and schema.name not in EMPTY_TYPES:
-            report.add("schema-text", f"{where}: is empty")
         elif missing := missing_definitions(schema.name, schema.data.decode(errors="replace")):
             report.add("schema-text", f"{where}: lacks the definition of {', '.join(missing)}")
     for channel in stock.channels.values():
@@ -328,10 +334,6 @@ def _check_channels(path: Path, stock: Contents, report: _Report) -> None:
             report.add("offered-qos", f"{path}: {error}")
         if not _is_type_hash(channel.metadata.get("topic_type_hash")):
             report.add("type-hash", f"{where}: no topic_type_hash RIHS01_ and 64 hex digits")
-
-
-EMPTY_TYPES = frozenset({"std_msgs/msg/Empty"})
-"""Types whose definition is rightly without a line."""
 
 
 def _is_type_hash(value: Any) -> bool:

@@ -205,6 +205,11 @@ def missing_definitions(type_name: str, schema_text: str) -> list[str]:
     return sorted(needed - parts.keys())
 
 
+def is_type_name(name: str) -> bool:
+    """Tell whether a name reads ``package/msg/Type``, or the same of a service or an action."""
+    return _TYPE_NAME.fullmatch(name) is not None
+
+
 def _short(type_name: str) -> str:
     package, _, name = _split(type_name)
     return f"{package}/{name}"

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gait_entrainment.bags.definitions import is_type_name
 from gait_entrainment.bags.errors import UnreadableBagError
 from gait_entrainment.bags.mcap_file import BagMessage, Chunk, Contents, McapFile
 from gait_entrainment.bags.metadata import TopicInfo
@@ -148,7 +149,7 @@ class _Rescue:
                 )
             if topic.name in self.writer.counts or topic.name in self.refused:
                 continue
-            if topic.schema_text:
+            if is_type_name(topic.type):
                 self.writer.add_topic(topic)
             else:
-                self.refused[topic.name] = f"{topic.name}: lost, no definition of its type"
+                self.refused[topic.name] = f"{topic.name}: lost, its type {topic.type!r} is none"

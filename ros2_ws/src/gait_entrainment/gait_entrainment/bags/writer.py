@@ -33,6 +33,7 @@ from typing import Any
 
 from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
 
+from gait_entrainment.bags.definitions import is_type_name
 from gait_entrainment.bags.errors import BagError, BagExistsError, BagWriteError, DiskFullError
 from gait_entrainment.bags.metadata import (
     RECORD_NAME,
@@ -158,16 +159,15 @@ class BagWriter:
         Raises
         ------
         BagError
-            The topic was announced before, or has no definition, without which the bag's
-            messages could not be read on another machine.
+            The topic was announced before, or its type is none.
         BagWriteError
             As for `write`.
 
         """
         if topic.name in self._topics:
             raise BagError(f"{topic.name}: already in the bag")
-        if not topic.schema_text:
-            raise BagError(f"{topic.name}: no definition of {topic.type} given")
+        if not is_type_name(topic.type):
+            raise BagError(f"{topic.name}: type {topic.type!r} does not read package/msg/Type")
         self._require_open()
         self._topics[topic.name] = topic
         self.counts[topic.name] = 0

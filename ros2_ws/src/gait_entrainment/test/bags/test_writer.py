@@ -157,8 +157,8 @@ def test_what_the_caller_did_wrong_is_named_and_costs_nothing(tmp_path: Path) ->
         writer.add_topic(NOISE)
         with pytest.raises(BagError, match="already in the bag"):
             writer.add_topic(NOISE)
-        with pytest.raises(BagError, match="no definition"):
-            writer.add_topic(TopicInfo("/x", "p/msg/X", ""))
+        with pytest.raises(BagError, match="type 'p/X' does not read package/msg/Type"):
+            writer.add_topic(TopicInfo("/x", "p/X", "uint8 x\n"))
         with pytest.raises(BagError, match="/y: not announced"):
             writer.write("/y", b"", 1, 1)
         writer.write("/noise", b"\0\1\0\0", 1, 1)
