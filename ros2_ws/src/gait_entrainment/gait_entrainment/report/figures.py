@@ -78,7 +78,8 @@ def _stride_period(run: RecordedRun) -> Any:
     axes.plot([s.number for s in strides], [s.period for s in strides], ".-", color=BLUE, lw=0.8)
     axes.set(xlabel="stride", ylabel="stride period [s]", title="Stride period")
     axes.ticklabel_format(useOffset=False)
-    axes.legend(frameon=False)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(frameon=False)
     return figure
 
 
