@@ -115,7 +115,8 @@ def _ankle_torque(run: RecordedRun) -> Any:
     rows = [strides[i] for i in chosen] if strides else []
     figure, axes = _axes(height=2 + 0.28 * len(rows))
     torques = run.torques
-    scale = 0.9 / max(run.protocol.walker.peak_torque, 1.0)
+    peak = run.protocol.walker.peak_torque
+    scale = 0.9 / peak
     longest = 0.0
     for row, stride in enumerate(rows):
         inside = (torques.stamps >= stride.start) & (torques.stamps < stride.end)
@@ -142,7 +143,7 @@ def _ankle_torque(run: RecordedRun) -> Any:
     axes.set(
         xlabel="time since heel strike of the perturbed leg [s]",
         ylabel="stride",
-        title=f"Ankle torque: own push-off (blue, peak {run.protocol.walker.peak_torque:.0f} N m), "
+        title=f"Ankle torque: own push-off (blue, peak {peak:.0f} N m), "
         "pulse that acts (orange), pulse delivered (bar)",
     )
     axes.title.set_fontsize(9)
