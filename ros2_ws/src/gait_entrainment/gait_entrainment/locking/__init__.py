@@ -1,0 +1,45 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Phase-locked gaits, solved.
+
+    pulsed_gait    gaits with one pulse a stride, and the exact derivative of their Poincare map
+    branches       smooth branches of them, corners and folds, the locked gaits at a pulse period
+"""
+
+from gait_entrainment.locking.branches import (
+    Border,
+    End,
+    LockedGait,
+    Piece,
+    Place,
+    locked_gaits,
+    pieces_of,
+    stable_intervals,
+)
+from gait_entrainment.locking.pulsed_gait import Gaits, PulsedGait
+
+__all__ = [
+    "Border",
+    "End",
+    "Gaits",
+    "LockedGait",
+    "Piece",
+    "Place",
+    "PulsedGait",
+    "locked_gaits",
+    "pieces_of",
+    "stable_intervals",
+]

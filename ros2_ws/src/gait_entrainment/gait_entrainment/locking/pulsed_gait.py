@@ -1,0 +1,446 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Gaits with one pulse a stride, exactly, in terms of where in double stance the pulse acts.
+
+A pulse of width w on the leg that trails acts from the ankle angle psi_s to psi_e. Energy then
+gives the speed of the gait that repeats itself in closed form, for the stride is linear in `apex`
+(see walker.model), and times are quadratures between known angles: nothing is integrated step by
+step and no time is inverted. So a whole branch of gaits is a few array operations.
+
+The Poincare section is the heel strike of the *other* leg, where the perturbed leg's push-off
+begins. The state there is (apex right after the collision, onset of the pulse after the heel
+strike [s], negative before), and a pulse period tau_p gives the map
+
+    apex' = A(apex, onset),    onset' = onset + tau_p - R(apex, onset),
+
+R the time to the next such heel strike. Its fixed points are the 1:1 phase-locked gaits: the gaits
+below whose period R is tau_p. The Jacobian does not depend on tau_p and is exact.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import elliprd, elliprf
+
+from gait_entrainment import geometry
+from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment.walker.model import TAIL_TOLERANCE, Floats, make_model
+
+# These closed forms are arithmetic only: they take arrays as they take numbers.
+_leg_sine: Callable[..., Any] = geometry.leg_sine
+_leg_per_ankle: Callable[..., Any] = geometry.leg_per_ankle
+_drop: Callable[..., Any] = geometry.drop
+_torque_work: Callable[..., Any] = geometry.torque_work
+_pendulum_force: Callable[..., Any] = geometry.pendulum_force
+_unloading_arm: Callable[..., Any] = geometry.unloading_arm
+
+# Newton steps on an ankle angle end here [rad]; convergence is quadratic, so the next is rounding.
+_ANGLE_STEP = 1e-12
+_MOST_STEPS = 50
+
+# Points of the scan for a corner. The function searched grows; the scan only steps around places
+# without a gait.
+_SCAN_POINTS = 33
+
+
+@dataclass(frozen=True)
+class Gaits:
+    """Gaits that repeat themselves, one element each; times in s. NaN where there is none."""
+
+    start: Floats
+    """Ankle angle where the pulse begins to act [rad]."""
+    end: Floats
+    """Ankle angle where it ceases to act."""
+    onset: Floats
+    """Pulse onset after the other leg's heel strike."""
+    period: Floats
+    """Time from one pulse to the next."""
+    apex: Floats
+    """State of the speed at the section (see walker.model)."""
+    double_stance: Floats
+    """Duration of the perturbed leg's push-off."""
+    step: Floats
+    """Duration of the step that begins at the section."""
+    jacobian: Floats
+    """Derivative of the map (..., 2, 2)."""
+    feasible: Any
+    """Whether the mass goes on, the leading leg presses on the ground at both ends and at all
+    nodes of the quadratures, and these have converged."""
+
+    @property
+    def lag(self) -> Floats:
+        """Pulse onset after the perturbed leg's toe-off."""
+        return self.onset - self.double_stance
+
+    @property
+    def phase(self) -> Floats:
+        """Pulse onset in the perturbed leg's gait cycle, in [0, 1)."""
+        phase: Floats = np.mod(1 + (self.onset - self.step) / self.period, 1.0)
+        return phase
+
+    @property
+    def slope(self) -> Floats:
+        """
+        Derivative of the period by the onset, along the branch.
+
+        det(I - J) = (1 - dA/dapex) slope: a multiplier is 1 exactly where the branch folds.
+        """
+        j = self.jacobian
+        determinant = (1 - j[..., 0, 0]) * (1 - j[..., 1, 1]) - j[..., 0, 1] * j[..., 1, 0]
+        slope: Floats = determinant / (1 - j[..., 0, 0])
+        return slope
+
+    @property
+    def multipliers(self) -> Any:
+        """Both Floquet multipliers (..., 2), complex, the larger in magnitude first."""
+        j = np.where(np.isfinite(self.jacobian), self.jacobian, 0.0)
+        values = np.linalg.eigvals(j).astype(complex)
+        order = np.argsort(-np.abs(values), axis=-1, kind="stable")
+        return np.take_along_axis(values, order, axis=-1)
+
+    @property
+    def stable(self) -> Any:
+        """
+        Whether both multipliers lie inside the unit circle.
+
+        For a real 2x2 matrix that is |trace| < 1 + determinant and determinant < 1 (Jury).
+        """
+        j = self.jacobian
+        trace = j[..., 0, 0] + j[..., 1, 1]
+        determinant = j[..., 0, 0] * j[..., 1, 1] - j[..., 0, 1] * j[..., 1, 0]
+        return self.feasible & (np.abs(trace) < 1 + determinant) & (determinant < 1)
+
+    def at(self, index: int) -> "Gaits":
+        """Return one of the gaits."""
+        return Gaits(**{field.name: getattr(self, field.name)[index] for field in fields(self)})
+
+
+class _Stretch(NamedTuple):
+    """Times of stretches of double stance and what they tell about them."""
+
+    time: Floats
+    by_apex: Floats
+    """Derivative of the time by `apex`."""
+    sound: Any
+    """Whether the quadrature has converged, with the walker moving and on the ground."""
+
+
+class PulsedGait:
+    """
+    Gaits of one walker under one kind of pulse.
+
+    Parameters
+    ----------
+    parameters
+        The walker.
+    torque, width
+        Height [N m] and duration [s] of the pulse; a negative torque (dorsiflexion) is this
+        project's extension of the paper.
+    steps_per_pulse
+        2: one leg, once per stride, as in the experiments. 1: every step, each leg at its own.
+        Many: a single pulse, whose effect has died out by the time that the gait repeats itself.
+
+    Raises
+    ------
+    ValueError
+        where a pulse could reach from one push-off of its leg into the next.
+
+    """
+
+    def __init__(
+        self, parameters: WalkerParameters, torque: float, width: float, steps_per_pulse: int = 2
+    ) -> None:
+        self.parameters, self.torque, self.width = parameters, torque, width
+        self.steps_per_pulse = steps_per_pulse
+        self._model = model = make_model(parameters)
+        self.heel_strike, self.toe_off = model.double_stance_start, model.max_plantarflexion
+        peak = parameters.peak_torque
+        self._step_gain = model.per_energy * parameters.push_off_work
+        # Beyond it a negative pulse leaves nothing of the spring: the trailing foot is unloaded.
+        self._unloaded = min(
+            max(self.toe_off + torque / model.stiffness, self.heel_strike), self.toe_off
+        )
+        self._peak = peak
+        here = np.array([self.heel_strike])
+        plain = self._gaits(here, here, "none")
+        self.unperturbed_period = float(plain.period[0])
+        """Period of the same number of steps without a pulse [s]."""
+        step = self.unperturbed_period / steps_per_pulse
+        if not 0 < width < step:
+            raise ValueError(
+                f"width {width:g} s is out of range; allowed: above 0 and below a step,"
+                f" {step:.4g} s"
+            )
+
+    def speed(self, apex: float) -> float:
+        """Speed of the mass [m/s] at the section, right after the collision."""
+        model = self._model
+        return float(model.leg_length * np.sqrt(apex + model.per_drop * model.strike_drop))
+
+    # Branches: where the pulse begins and ends
+
+    def early(self, end: Floats) -> Gaits:
+        """Pulses that begin before double stance and end in it, at these ankle angles."""
+        return self._gaits(np.full_like(end, self.heel_strike), end, "early")
+
+    def inside(self, start: Floats) -> Gaits:
+        """Pulses that begin in double stance, at these ankle angles, and end in it."""
+        return self._gaits(start, self._end_of_pulse(start), "inside")
+
+    def late(self, start: Floats) -> Gaits:
+        """Pulses that begin in double stance, at these ankle angles, and outlast it."""
+        return self._gaits(start, np.full_like(start, self.toe_off), "late")
+
+    @cached_property
+    def first_end(self) -> float:
+        """Ankle angle where a pulse that begins at heel strike ends; toe-off if it outlasts it."""
+
+        def excess(end: Floats) -> Floats:
+            return self._pulse_time(np.full_like(end, self.heel_strike), end).time - self.width
+
+        return _first_root(excess, self.heel_strike, self.toe_off)
+
+    @cached_property
+    def last_start(self) -> float:
+        """Ankle angle where a pulse that ends at toe-off begins; heel strike if before it."""
+
+        def excess(start: Floats) -> Floats:
+            return self._pulse_time(start, np.full_like(start, self.toe_off)).time - self.width
+
+        return _first_root(excess, self.toe_off, self.heel_strike)
+
+    def _end_of_pulse(self, start: Floats) -> Floats:
+        """Ankle angle where a pulse that begins at `start` ends, in the gait that it sustains."""
+
+        def excess(end: Floats) -> tuple[Floats, Floats]:
+            stretch = self._pulse_time(start, end)
+            gain = self._apex_per_gain * self._model.per_energy * self._pulse_torque(end)
+            slope = 1 / self._velocity(end, self._apex(start, end), start)
+            return stretch.time - self.width, slope + stretch.by_apex * gain
+
+        return _newton(excess, start, start, self.toe_off)
+
+    # Energy
+
+    @property
+    def _apex_per_gain(self) -> float:
+        """How much a repeated gain of squared rate raises `apex` at the section."""
+        kept = self._model.restitution**self.steps_per_pulse
+        return float(kept / (1 - kept))
+
+    def _apex(self, start: Floats, end: Floats) -> Floats:
+        """Return `apex` of the gait that repeats itself (Eq. 8 with the pulse's work)."""
+        return self._model.start_apex + self._apex_per_gain * self._pulse_gain(start, end)
+
+    def _pulse_torque(self, angle: Floats) -> Floats:
+        """Torque that the pulse adds at an ankle angle: all of it, or what the spring leaves."""
+        torque: Floats = np.maximum(self.torque, -self._model.stiffness * (self.toe_off - angle))
+        return torque
+
+    def _pulse_gain(self, start: Floats, angle: Floats) -> Floats:
+        """Gain in squared rate by the pulse from `start` to `angle`."""
+        loaded = np.minimum(np.maximum(start, self._unloaded), angle)
+        left, last = self.toe_off - loaded, self.toe_off - angle
+        spring = 0.5 * self._model.stiffness * (left**2 - last**2)
+        gain: Floats = self._model.per_energy * (self.torque * (loaded - start) - spring)
+        return gain
+
+    def _gain(self, angle: Floats, sine: Floats, cosine: Floats) -> Floats:
+        """Gain in squared rate from heel strike on, unperturbed: the spring's work and height."""
+        work = _torque_work(angle - self.heel_strike, self._peak, self._model.stiffness)
+        gain: Floats = self._model.per_energy * work + self._model.per_drop * _drop(sine, cosine)
+        return gain
+
+    def _leg_sine(self, angle: Floats) -> Any:
+        model = self._model
+        return _leg_sine(np.cos(angle), model.leg_length, model.foot_length, model.separation)
+
+    def _velocity(self, angle: Floats, apex: Floats, start: Floats) -> Floats:
+        """Rate of the ankle angle [rad/s] with the pulse on since `start`."""
+        model, sine = self._model, self._leg_sine(angle)
+        cosine = np.sqrt(1 - sine**2)
+        slope = _leg_per_ankle(np.sin(angle), cosine, model.foot_length, model.separation)
+        square = apex + self._gain(angle, sine, cosine) + self._pulse_gain(start, angle)
+        velocity: Floats = np.sqrt(square) / slope
+        return velocity
+
+    # Times
+
+    def _stretch(
+        self, low: Floats, high: Floats, apex: Floats, start: Floats | None = None
+    ) -> _Stretch:
+        """Time from `low` to `high` in double stance, with the pulse on since `start`."""
+        model = self._model
+        half = 0.5 * (high - low)
+        # The nodes for the time, and both ends beside them, where the force is least.
+        places = np.concatenate([[-1.0], model.nodes, [1.0]])
+        angle = (low + half)[..., None] + half[..., None] * places
+        sine = self._leg_sine(angle)
+        cosine = np.sqrt(1 - sine**2)
+        lengths = (model.leg_length, model.foot_length, model.separation)
+        slope = _leg_per_ankle(np.sin(angle), cosine, model.foot_length, model.separation)
+        square = apex[..., None] + self._gain(angle, sine, cosine)
+        torque = model.stiffness * (self.toe_off - angle)
+        if start is not None:
+            square = square + self._pulse_gain(start[..., None], angle)
+            torque = torque + self._pulse_torque(angle)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            integrand = (slope / np.sqrt(square))[..., 1:-1]
+            total = integrand @ model.weights
+            tail = np.abs(integrand @ model.tails.T).sum(axis=-1)
+            by_apex = -0.5 * half * ((integrand / square[..., 1:-1]) @ model.weights)
+        force = _pendulum_force(cosine, square, model.mass, model.gravity, model.leg_length)
+        force = force - _unloading_arm(np.sin(angle), sine, *lengths) * torque
+        sound = (tail <= 0.5 * TAIL_TOLERANCE * total) & (force >= 0).all(axis=-1)
+        return _Stretch(half * total, by_apex, sound | (half <= 0))
+
+    def _pulse_time(self, start: Floats, end: Floats, apex: Floats | None = None) -> _Stretch:
+        """Time under the pulse, in two stretches where it unloads the trailing foot."""
+        if apex is None:
+            apex = self._apex(start, end)
+        if self._unloaded == self.toe_off:
+            return self._stretch(start, end, apex, start)
+        loaded = np.minimum(np.maximum(start, self._unloaded), end)
+        first = self._stretch(start, loaded, apex, start)
+        last = self._stretch(loaded, end, apex, start)
+        return _Stretch(
+            first.time + last.time, first.by_apex + last.by_apex, first.sound & last.sound
+        )
+
+    def _single_stance(self, apex: Floats) -> _Stretch:
+        """Time of single stance: R_F, and R_D for its derivative (DLMF 19.18.1)."""
+        model = self._model
+        time, by_apex = np.zeros_like(apex), np.zeros_like(apex)
+        with np.errstate(invalid="ignore"):
+            moving = apex > 0
+        apex = np.where(moving, apex, np.nan)
+        # An apex after toe-off is passed on both sides; before it only the far side counts.
+        sides = (
+            ((1.0 if model.toe_off_position < 0 else -1.0), model.toe_off_half_sine),
+            (
+                1.0,
+                model.strike_half_sine,
+            ),
+        )
+        for sign, z in sides:
+            x, y, w = apex * (1 - z), apex + 2 * model.per_drop * z, apex
+            time += sign * 2 * np.sqrt(z) * elliprf(x, y, w)
+            derivative = (1 - z) * elliprd(y, w, x) + elliprd(x, w, y) + elliprd(x, y, w)
+            by_apex -= sign * np.sqrt(z) / 3 * derivative
+        struck = _pendulum_force(
+            np.cos(self.parameters.leg_angle),
+            apex + model.per_drop * model.strike_drop,
+            model.mass,
+            model.gravity,
+            model.leg_length,
+        )
+        return _Stretch(time, by_apex, moving & (struck >= 0))
+
+    def _collide(self, apex: Floats) -> Floats:
+        model = self._model
+        lost = (1 - model.restitution) * model.per_drop * model.strike_drop
+        return model.restitution * apex - lost
+
+    # The whole gait and the derivative of the map
+
+    def _gaits(self, start: Floats, end: Floats, kind: str) -> Gaits:
+        model = self._model
+        apex = self._apex(start, end)
+        pulse_gain = self._pulse_gain(start, end)
+        here, there = np.full_like(apex, self.heel_strike), np.full_like(apex, self.toe_off)
+        before = self._stretch(here, start, apex)
+        pulse = self._pulse_time(start, end, apex)
+        after = self._stretch(end, there, apex + pulse_gain)
+        leaving = apex + self._step_gain + pulse_gain
+        swing = self._single_stance(leaving)
+        double_stance = before.time + pulse.time + after.time
+        step = double_stance + swing.time
+        onset = pulse.time - self.width if kind == "early" else before.time
+
+        # Forward differentiation by (apex, onset), in the order of the motion.
+        one, none = np.ones_like(apex), np.zeros_like(apex)
+        d_apex = np.stack([one, none], axis=-1)
+        d_onset = np.stack([none, one], axis=-1)
+        column = np.newaxis
+        begins, ends = kind in ("inside", "late"), kind in ("inside", "early")
+        d_start = d_end = np.zeros_like(d_apex)
+        with np.errstate(invalid="ignore"):
+            at_start = self._velocity(start, apex, start)[..., column]
+            at_end = self._velocity(end, apex, start)[..., column]
+        if begins:
+            d_start = at_start * (d_onset - before.by_apex[..., column] * d_apex)
+        torque_gain = model.per_energy * self._pulse_torque(start)[..., column]
+        d_pulse = pulse.by_apex[..., column] * (d_apex - torque_gain * d_start)
+        if ends:
+            d_acting = 0.0 if begins else d_onset
+            d_end = at_end * (d_acting + d_start / at_start - d_pulse)
+        d_gain = model.per_energy * self._pulse_torque(end)[..., column] * d_end
+        d_leaving = d_apex + d_gain - torque_gain * d_start
+        d_period = (
+            before.by_apex[..., column] * d_apex
+            + d_pulse
+            + (after.by_apex + swing.by_apex)[..., column] * d_leaving
+        )
+        d_next = model.restitution * d_leaving
+
+        period, sound = step, before.sound & pulse.sound & after.sound & swing.sound
+        arriving = self._collide(leaving)
+        for _ in range(self.steps_per_pulse - 1):
+            whole = self._stretch(here, there, arriving)
+            swing = self._single_stance(arriving + self._step_gain)
+            period = period + whole.time + swing.time
+            d_period = d_period + (whole.by_apex + swing.by_apex)[..., column] * d_next
+            d_next = model.restitution * d_next
+            sound = sound & whole.sound & swing.sound
+            arriving = self._collide(arriving + self._step_gain)
+        jacobian = np.stack([d_next, d_onset - d_period], axis=-2)
+        return Gaits(start, end, onset, period, apex, double_stance, step, jacobian, sound)
+
+
+def _newton(
+    function: Callable[[Floats], tuple[Floats, Floats]],
+    guess: Floats,
+    least: Floats,
+    most: float,
+) -> Floats:
+    """Roots of a growing function, element by element, held within bounds; NaN for none."""
+    angle = guess
+    for _ in range(_MOST_STEPS):
+        with np.errstate(invalid="ignore", divide="ignore"):
+            value, slope = function(angle)
+            following = np.clip(angle - value / slope, least, most)
+        step = np.abs(following - angle)
+        angle = following
+        if not (step > _ANGLE_STEP).any():
+            break
+    return angle
+
+
+def _first_root(function: Callable[[Floats], Floats], start: float, end: float) -> float:
+    """Return the root of a function, negative at `start`, nearest to it; `end` for none."""
+    angles = np.linspace(start, end, _SCAN_POINTS)
+    with np.errstate(invalid="ignore"):
+        beyond = np.flatnonzero(function(angles) >= 0)
+    if beyond.size == 0:
+        return end
+    bracket = angles[beyond[0] - 1], angles[beyond[0]]
+    return float(
+        brentq(lambda angle: float(function(np.array([angle]))[0]), *bracket, xtol=_ANGLE_STEP)
+    )

@@ -1,0 +1,104 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+import numpy as np
+import pytest
+
+from gait_entrainment.locking import (
+    Border,
+    Place,
+    PulsedGait,
+    locked_gaits,
+    pieces_of,
+    stable_intervals,
+)
+from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment.protocol import Protocol, PulsePlan
+from gait_entrainment.simulation import simulate
+
+TABLE_1 = WalkerParameters()
+GAIT = PulsedGait(TABLE_1, 0.1 * TABLE_1.peak_torque, 0.1)
+
+
+def offset(end):
+    return end.period - GAIT.unperturbed_period
+
+
+def test_borders_of_the_papers_basin_are_the_corners_at_toe_off():
+    basin = stable_intervals(pieces_of(GAIT))[-1]
+    assert basin.place is Place.LATE
+    assert basin.least_period.border is Border.END_AT_TOE_OFF
+    assert basin.least_period.lag == pytest.approx(-0.1, abs=1e-12)
+    assert basin.greatest_period.border is Border.START_AT_TOE_OFF
+    assert offset(basin.greatest_period) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_early_double_stance_locks_between_a_corner_and_a_fold():
+    early = stable_intervals(pieces_of(GAIT))[0]
+    assert early.place is Place.INSIDE
+    assert early.least_period.border is Border.START_AT_HEEL_STRIKE
+    assert early.least_period.onset == pytest.approx(0.0, abs=1e-12)
+    assert early.greatest_period.border is Border.FOLD
+    # At a fold the period is greatest: beside it, by a plain scan, it is nowhere longer.
+    scan = GAIT.inside(np.linspace(early.first.angle, early.last.angle + 0.1, 1001))
+    assert scan.period.max() == pytest.approx(early.greatest_period.period, abs=1e-9)
+    assert scan.period.max() <= early.greatest_period.period + 1e-14
+
+
+def test_a_multiplier_is_one_at_a_fold_and_minus_one_at_a_flip():
+    gait = PulsedGait(TABLE_1, 0.3 * TABLE_1.peak_torque, 0.1)
+    found = {}
+    for piece in pieces_of(gait):
+        along = {Place.INSIDE: gait.inside, Place.LATE: gait.late}.get(piece.place)
+        for end in (piece.first, piece.last):
+            if end.border in (Border.FOLD, Border.FLIP):
+                found[end.border] = along(np.array([end.angle])).multipliers[0]
+    assert found[Border.FOLD][0] == pytest.approx(1, abs=1e-9)
+    assert found[Border.FLIP][0] == pytest.approx(-1, abs=1e-9)
+
+
+def run(period_offset, initial_phase, pulses):
+    plan = PulsePlan(count=pulses, period_offset=period_offset, initial_phase=initial_phase)
+    return simulate(Protocol(pulses=plan, washout=1)).analysis.pulses
+
+
+@pytest.mark.parametrize("initial_phase", [0.1, 0.5, 0.9])
+def test_the_simulated_experiment_ends_in_the_solved_lock(initial_phase):
+    last = run(-0.05, initial_phase, 80)[-1]
+    stable = [g for g in locked_gaits(GAIT, GAIT.unperturbed_period - 0.05) if g.stable]
+    assert len(stable) == 1
+    # Pulse instants are whole nanoseconds.
+    assert last.phase_lag == pytest.approx(stable[0].lag, abs=5e-9)
+    assert last.phase == pytest.approx(stable[0].phase, abs=5e-9)
+
+
+def test_two_attractors_each_draw_some_initial_phases():
+    period = -0.067
+    stable = [g for g in locked_gaits(GAIT, GAIT.unperturbed_period + period) if g.stable]
+    assert [g.place for g in stable] == [Place.INSIDE, Place.LATE]
+    ends = [run(period, phase, 450)[-1].phase_lag for phase in (0.51, 0.62)]
+    assert ends == pytest.approx([g.lag for g in stable], abs=1e-6)
+
+
+@pytest.mark.parametrize(("beyond", "locks"), [(-2e-4, False), (2e-4, True)])
+def test_simulation_confirms_the_border(beyond, locks):
+    border = offset(stable_intervals(pieces_of(GAIT))[-1].least_period)
+    lags = [pulse.unwrapped_lag for pulse in run(border + beyond, 0.65, 60)]
+    # Just beyond the corner the pulse slips by a fraction of a millisecond a stride at first.
+    assert (abs(lags[-1] - lags[-2]) < 1e-6) is locks
+
+
+def test_a_pulse_longer_than_double_stance_has_no_branch_inside_it():
+    places = {piece.place for piece in pieces_of(PulsedGait(TABLE_1, 13.3, 0.5))}
+    assert places == {Place.EARLY, Place.LATE}
