@@ -268,7 +268,7 @@ class BagWriter:
         Bring all that was written to the file, so that a crash of this process loses none of it.
 
         A thread of its own then brings it to the disk, so that a loss of power loses only what
-        came after; the caller does not wait for that.
+        came after; the caller does not wait for that. Without new messages it costs nothing.
 
         Raises
         ------
@@ -277,6 +277,8 @@ class BagWriter:
 
         """
         self._require_open()
+        if self._flush_at is None:
+            return
         self._flush_at = None
         try:
             self._writer.flush()  # type: ignore[no-untyped-call]

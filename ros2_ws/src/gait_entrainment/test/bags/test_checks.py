@@ -24,7 +24,15 @@ import pytest
 import yaml
 from mcap.writer import CompressionType, IndexType, Writer
 
-from gait_entrainment.bags import BagWriter, QosProfile, Severity, TopicInfo, check
+from gait_entrainment.bags import (
+    BagReader,
+    BagWriter,
+    QosProfile,
+    Severity,
+    TopicInfo,
+    UnreadableBagError,
+    check,
+)
 from gait_entrainment.bags.checks import RULES
 from gait_entrainment.bags.metadata import offered_qos_text
 
@@ -129,6 +137,11 @@ def test_statistics_that_do_not_add_up(tmp_path: Path) -> None:
     write_checksum(data, summary_start)
     path.write_bytes(data)
     assert [finding.rule for finding in check(path)] == ["statistics"]
+    with (
+        BagReader(path) as reader,
+        pytest.raises(UnreadableBagError, match=r"3 .* but 4 expected"),
+    ):
+        list(reader.messages())
 
 
 def test_chunk_index_with_wrong_times(tmp_path: Path) -> None:

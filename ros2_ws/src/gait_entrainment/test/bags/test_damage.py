@@ -19,8 +19,10 @@ import os
 import shutil
 from pathlib import Path
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mcap.writer import CompressionType, Writer
 
 from gait_entrainment.bags import BagReader, UnreadableBagError, check, info, recover
 
@@ -75,6 +77,24 @@ def test_every_byte_of_the_metadata_file_flipped(small_bag: Path, tmp_path: Path
         with contextlib.suppress(UnreadableBagError):
             info(folder)
         check(folder)
+
+
+def test_message_that_reaches_beyond_its_chunk(tmp_path: Path) -> None:
+    path = tmp_path / "bag.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream, compression=CompressionType.NONE, enable_crcs=False)
+        writer.start("ros2")
+        schema = writer.register_schema("p/msg/Noise", "ros2msg", b"uint8[] bytes\n")
+        channels = [writer.register_channel(name, "cdr", schema) for name in ("/a", "/b")]
+        for number, channel in enumerate(channels):
+            writer.add_message(channel, number, b"marked%d" % number, number)
+        writer.finish()
+    data = bytearray(path.read_bytes())
+    data[data.index(b"marked1") - 22 - 8] += 1  # the length of its record
+    path.write_bytes(data)
+    for topics in (None, ["/b"]):
+        with BagReader(path) as reader, pytest.raises(UnreadableBagError, match="chunk"):
+            list(reader.messages(topics))
 
 
 @settings(derandomize=True, deadline=None, max_examples=150)

@@ -361,6 +361,26 @@ def test_other_errors_of_the_disk_are_told_from_a_full_one(
     assert recover(tmp_path / "walk", tmp_path / "rescued").counts == {"/noise": 1}
 
 
+def test_disk_that_fails_in_the_background_is_reported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(_: int) -> None:
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr(writer_module.os, "fdatasync", broken)
+    writer = BagWriter(tmp_path / "walk", ros_distro="jazzy")
+    writer.add_topic(NOISE)
+    writer.write("/noise", b"\0\1\0\0", 1, 1)
+    writer.flush()
+    assert writer._file._sync_thread is not None
+    writer._file._sync_thread.join()
+    writer.write("/noise", b"\0\1\0\0", 2, 2)
+    with pytest.raises(BagWriteError, match="Input/output error"):
+        writer.flush()
+    monkeypatch.undo()
+    assert recover(tmp_path / "walk", tmp_path / "rescued").counts == {"/noise": 2}
+
+
 @pytest.fixture
 def small_disk(tmp_path: Path) -> Iterator[Path]:
     """Mount a real file system of 4 MB; where that is not allowed, give one that is simulated."""
