@@ -24,7 +24,7 @@ if [ "$(cat ros2_ws/install/complete 2> /dev/null)" != "$fingerprint" ]; then
     (
         # A shell that has sourced env.bash already stands on the last build: build without it.
         for variable in AMENT_PREFIX_PATH CMAKE_PREFIX_PATH PYTHONPATH LD_LIBRARY_PATH; do
-            value=$(tr : '\n' <<< "${!variable:-}" | grep -v "^$PWD/" | paste -sd :)
+            value=$(tr : '\n' <<< "${!variable:-}" | sed "\|^$PWD/|d" | paste -sd :)
             if [ -n "$value" ]; then export "$variable=$value"; else unset "$variable"; fi
         done
         unset COLCON_PREFIX_PATH
