@@ -206,8 +206,8 @@ def _build(entries: Mapping[str, _Entry]) -> Protocol:
     except ParameterError as error:
         # The message begins with the field; where that is a default, the others are at fault.
         named = f"walker.{str(error).split()[0]}"
-        given = [key for key in _WALKER_FIELDS if key in entries]
-        places = [entries[key].where for key in ([named] if named in given else given)]
+        present = [key for key in _WALKER_FIELDS if key in entries]
+        places = [entries[key].where for key in ([named] if named in present else present)]
         raise ProtocolError(f"{', '.join(places)}: walker: {error}") from None
     except ProtocolError as error:
         # What is wrong may lie in a default; then the field that does not go with it is at fault.
