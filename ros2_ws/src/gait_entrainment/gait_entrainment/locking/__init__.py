@@ -17,6 +17,7 @@ Phase-locked gaits, solved.
 
     pulsed_gait    gaits with one pulse a stride, and the exact derivative of their Poincare map
     branches       smooth branches of them, corners and folds, the locked gaits at a pulse period
+    walked         walks under pulses by the walker in time, to confirm them
 """
 
 from gait_entrainment.locking.branches import (
@@ -30,16 +31,20 @@ from gait_entrainment.locking.branches import (
     stable_intervals,
 )
 from gait_entrainment.locking.pulsed_gait import Gaits, PulsedGait
+from gait_entrainment.locking.walked import Outcome, PulsedWalk, walk_under_pulses
 
 __all__ = [
     "Border",
     "End",
     "Gaits",
     "LockedGait",
+    "Outcome",
     "Piece",
     "Place",
     "PulsedGait",
+    "PulsedWalk",
     "locked_gaits",
     "pieces_of",
     "stable_intervals",
+    "walk_under_pulses",
 ]

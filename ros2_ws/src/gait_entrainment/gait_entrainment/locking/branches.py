@@ -28,8 +28,7 @@ from enum import Enum
 import numpy as np
 from scipy.optimize import brentq
 
-from gait_entrainment.locking.pulsed_gait import Gaits, PulsedGait
-from gait_entrainment.walker.model import Floats
+from gait_entrainment.locking.pulsed_gait import Floats, Gaits, PulsedGait
 
 # Points of the scan along a branch. Periods bend once or twice per branch; what the scan brackets
 # is then solved for, so its step decides only what could be overlooked.

@@ -17,8 +17,13 @@ Gaits with one pulse a stride, exactly, in terms of where in double stance the p
 
 A pulse of width w on the leg that trails acts from the ankle angle psi_s to psi_e. Energy then
 gives the speed of the gait that repeats itself in closed form, for the stride is linear in `apex`
-(see walker.model), and times are quadratures between known angles: nothing is integrated step by
-step and no time is inverted. So a whole branch of gaits is a few array operations.
+below), and times are quadratures between known angles: nothing is integrated step by step and no
+time is inverted. So a whole branch of gaits is a few array operations, and the walker in time,
+which shares no code with it but the closed forms of the linkage, can be held against it.
+
+`apex` is the squared angular velocity that the mass would have at the apex if no torque acted any
+more [1/s^2]: theta_dot^2 = apex + (2 g / L)(1 - cos(theta)). Torque changes it by
+2 T d psi / (m L^2); a collision keeps cos(2 alpha)^2 of theta_dot^2.
 
 The Poincare section is the heel strike of the *other* leg, where the perturbed leg's push-off
 begins. The state there is (apex right after the collision, onset of the pulse after the heel
@@ -30,18 +35,21 @@ R the time to the next such heel strike. Its fixed points are the 1:1 phase-lock
 below whose period R is tau_p. The Jacobian does not depend on tau_p and is exact.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import elliprd, elliprf
 
 from gait_entrainment import geometry
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment.walker.model import TAIL_TOLERANCE, Floats, make_model
+
+Floats = NDArray[np.float64]
 
 # These closed forms are arithmetic only: they take arrays as they take numbers.
 _leg_sine: Callable[..., Any] = geometry.leg_sine
@@ -50,6 +58,19 @@ _drop: Callable[..., Any] = geometry.drop
 _torque_work: Callable[..., Any] = geometry.torque_work
 _pendulum_force: Callable[..., Any] = geometry.pendulum_force
 _unloading_arm: Callable[..., Any] = geometry.unloading_arm
+
+# Gauss-Legendre rule of one stretch of double stance, and the weights that give the last two
+# Legendre coefficients. At Table 1 these fall by 3 each over a whole double stance, so 24 nodes
+# leave 3^-48 of the time. A stretch whose last two are not this small beside its mean has not
+# converged: the error is then about their square.
+_COUNT = 24
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(_COUNT)
+_LAST = np.arange(_COUNT - 2, _COUNT)
+_TAILS = np.polynomial.legendre.legvander(_NODES, _COUNT - 1)[:, _LAST].T
+_TAILS = (_LAST[:, None] + 0.5) * _TAILS * _WEIGHTS
+_TAIL_TOLERANCE = 1e-8
+# Both ends beside the nodes, for the force, which is least there.
+_PLACES = np.concatenate([[-1.0], _NODES, [1.0]])
 
 # Newton steps on an ankle angle end here [rad]; convergence is quadratic, so the next is rounding.
 _ANGLE_STEP = 1e-12
@@ -73,7 +94,7 @@ class Gaits:
     period: Floats
     """Time from one pulse to the next."""
     apex: Floats
-    """State of the speed at the section (see walker.model)."""
+    """State of the speed at the section."""
     double_stance: Floats
     """Duration of the perturbed leg's push-off."""
     step: Floats
@@ -169,15 +190,20 @@ class PulsedGait:
     ) -> None:
         self.parameters, self.torque, self.width = parameters, torque, width
         self.steps_per_pulse = steps_per_pulse
-        self._model = model = make_model(parameters)
-        self.heel_strike, self.toe_off = model.double_stance_start, model.max_plantarflexion
-        peak = parameters.peak_torque
-        self._step_gain = model.per_energy * parameters.push_off_work
-        # Beyond it a negative pulse leaves nothing of the spring: the trailing foot is unloaded.
-        self._unloaded = min(
-            max(self.toe_off + torque / model.stiffness, self.heel_strike), self.toe_off
+        p = parameters
+        self.heel_strike, self.toe_off = p.double_stance_start, p.max_plantarflexion
+        self._lengths = p.leg_length, p.foot_length, p.toe_separation
+        self._per_energy = 2 / (p.mass * p.leg_length**2)
+        self._per_drop = 2 * p.gravity / p.leg_length
+        self._kept = p.floquet_multiplier
+        self._strike_gain = self._per_drop * geometry.drop(
+            math.sin(p.leg_angle), math.cos(p.leg_angle)
         )
-        self._peak = peak
+        self._start_apex = (p.speed_after_collision / p.leg_length) ** 2 - self._strike_gain
+        self._step_gain = self._per_energy * p.push_off_work
+        # Beyond it a negative pulse leaves nothing of the spring: the trailing foot is unloaded.
+        unloaded = self.toe_off + min(torque, 0.0) / p.ankle_stiffness
+        self._unloaded = max(unloaded, self.heel_strike)
         here = np.array([self.heel_strike])
         plain = self._gaits(here, here, "none")
         self.unperturbed_period = float(plain.period[0])
@@ -191,8 +217,7 @@ class PulsedGait:
 
     def speed(self, apex: float) -> float:
         """Speed of the mass [m/s] at the section, right after the collision."""
-        model = self._model
-        return float(model.leg_length * np.sqrt(apex + model.per_drop * model.strike_drop))
+        return float(self.parameters.leg_length * np.sqrt(apex + self._strike_gain))
 
     # Branches: where the pulse begins and ends
 
@@ -231,7 +256,7 @@ class PulsedGait:
 
         def excess(end: Floats) -> tuple[Floats, Floats]:
             stretch = self._pulse_time(start, end)
-            gain = self._apex_per_gain * self._model.per_energy * self._pulse_torque(end)
+            gain = self._apex_per_gain * self._per_energy * self._pulse_torque(end)
             slope = 1 / self._velocity(end, self._apex(start, end), start)
             return stretch.time - self.width, slope + stretch.by_apex * gain
 
@@ -242,41 +267,44 @@ class PulsedGait:
     @property
     def _apex_per_gain(self) -> float:
         """How much a repeated gain of squared rate raises `apex` at the section."""
-        kept = self._model.restitution**self.steps_per_pulse
+        kept = self._kept**self.steps_per_pulse
         return float(kept / (1 - kept))
 
     def _apex(self, start: Floats, end: Floats) -> Floats:
         """Return `apex` of the gait that repeats itself (Eq. 8 with the pulse's work)."""
-        return self._model.start_apex + self._apex_per_gain * self._pulse_gain(start, end)
+        return self._start_apex + self._apex_per_gain * self._pulse_gain(start, end)
 
     def _pulse_torque(self, angle: Floats) -> Floats:
         """Torque that the pulse adds at an ankle angle: all of it, or what the spring leaves."""
-        torque: Floats = np.maximum(self.torque, -self._model.stiffness * (self.toe_off - angle))
+        torque: Floats = np.maximum(
+            self.torque, -self.parameters.ankle_stiffness * (self.toe_off - angle)
+        )
         return torque
 
     def _pulse_gain(self, start: Floats, angle: Floats) -> Floats:
         """Gain in squared rate by the pulse from `start` to `angle`."""
         loaded = np.minimum(np.maximum(start, self._unloaded), angle)
         left, last = self.toe_off - loaded, self.toe_off - angle
-        spring = 0.5 * self._model.stiffness * (left**2 - last**2)
-        gain: Floats = self._model.per_energy * (self.torque * (loaded - start) - spring)
+        spring = 0.5 * self.parameters.ankle_stiffness * (left**2 - last**2)
+        gain: Floats = self._per_energy * (self.torque * (loaded - start) - spring)
         return gain
 
     def _gain(self, angle: Floats, sine: Floats, cosine: Floats) -> Floats:
         """Gain in squared rate from heel strike on, unperturbed: the spring's work and height."""
-        work = _torque_work(angle - self.heel_strike, self._peak, self._model.stiffness)
-        gain: Floats = self._model.per_energy * work + self._model.per_drop * _drop(sine, cosine)
+        p = self.parameters
+        work = _torque_work(angle - self.heel_strike, p.peak_torque, p.ankle_stiffness)
+        gain: Floats = self._per_energy * work + self._per_drop * _drop(sine, cosine)
         return gain
 
-    def _leg_sine(self, angle: Floats) -> Any:
-        model = self._model
-        return _leg_sine(np.cos(angle), model.leg_length, model.foot_length, model.separation)
+    def _posture(self, angle: Floats) -> tuple[Floats, Floats, Floats]:
+        """Sine and cosine of the leading leg's angle, and its change per ankle angle."""
+        sine = _leg_sine(np.cos(angle), *self._lengths)
+        cosine = np.sqrt(1 - sine**2)
+        return sine, cosine, _leg_per_ankle(np.sin(angle), cosine, *self._lengths[1:])
 
     def _velocity(self, angle: Floats, apex: Floats, start: Floats) -> Floats:
         """Rate of the ankle angle [rad/s] with the pulse on since `start`."""
-        model, sine = self._model, self._leg_sine(angle)
-        cosine = np.sqrt(1 - sine**2)
-        slope = _leg_per_ankle(np.sin(angle), cosine, model.foot_length, model.separation)
+        sine, cosine, slope = self._posture(angle)
         square = apex + self._gain(angle, sine, cosine) + self._pulse_gain(start, angle)
         velocity: Floats = np.sqrt(square) / slope
         return velocity
@@ -287,28 +315,22 @@ class PulsedGait:
         self, low: Floats, high: Floats, apex: Floats, start: Floats | None = None
     ) -> _Stretch:
         """Time from `low` to `high` in double stance, with the pulse on since `start`."""
-        model = self._model
         half = 0.5 * (high - low)
-        # The nodes for the time, and both ends beside them, where the force is least.
-        places = np.concatenate([[-1.0], model.nodes, [1.0]])
-        angle = (low + half)[..., None] + half[..., None] * places
-        sine = self._leg_sine(angle)
-        cosine = np.sqrt(1 - sine**2)
-        lengths = (model.leg_length, model.foot_length, model.separation)
-        slope = _leg_per_ankle(np.sin(angle), cosine, model.foot_length, model.separation)
+        angle = (low + half)[..., None] + half[..., None] * _PLACES
+        sine, cosine, slope = self._posture(angle)
         square = apex[..., None] + self._gain(angle, sine, cosine)
-        torque = model.stiffness * (self.toe_off - angle)
+        torque = self.parameters.ankle_stiffness * (self.toe_off - angle)
         if start is not None:
             square = square + self._pulse_gain(start[..., None], angle)
             torque = torque + self._pulse_torque(angle)
         with np.errstate(invalid="ignore", divide="ignore"):
             integrand = (slope / np.sqrt(square))[..., 1:-1]
-            total = integrand @ model.weights
-            tail = np.abs(integrand @ model.tails.T).sum(axis=-1)
-            by_apex = -0.5 * half * ((integrand / square[..., 1:-1]) @ model.weights)
-        force = _pendulum_force(cosine, square, model.mass, model.gravity, model.leg_length)
-        force = force - _unloading_arm(np.sin(angle), sine, *lengths) * torque
-        sound = (tail <= 0.5 * TAIL_TOLERANCE * total) & (force >= 0).all(axis=-1)
+            total = integrand @ _WEIGHTS
+            tail = np.abs(integrand @ _TAILS.T).sum(axis=-1)
+            by_apex = -0.5 * half * ((integrand / square[..., 1:-1]) @ _WEIGHTS)
+        force = self._pendulum_force(cosine, square)
+        force = force - _unloading_arm(np.sin(angle), sine, *self._lengths) * torque
+        sound = (tail <= 0.5 * _TAIL_TOLERANCE * total) & (force >= 0).all(axis=-1)
         return _Stretch(half * total, by_apex, sound | (half <= 0))
 
     def _pulse_time(self, start: Floats, end: Floats, apex: Floats | None = None) -> _Stretch:
@@ -325,43 +347,39 @@ class PulsedGait:
         )
 
     def _single_stance(self, apex: Floats) -> _Stretch:
-        """Time of single stance: R_F, and R_D for its derivative (DLMF 19.18.1)."""
-        model = self._model
+        """
+        Time of single stance: R_F, and R_D for its derivative (DLMF 19.18.1).
+
+        Where toe-off comes after the apex, a walker too slow for the apex itself counts as fallen.
+        """
         time, by_apex = np.zeros_like(apex), np.zeros_like(apex)
-        with np.errstate(invalid="ignore"):
-            moving = apex > 0
+        moving = np.nan_to_num(apex, nan=-1.0) > 0
         apex = np.where(moving, apex, np.nan)
-        # An apex after toe-off is passed on both sides; before it only the far side counts.
-        sides = (
-            ((1.0 if model.toe_off_position < 0 else -1.0), model.toe_off_half_sine),
-            (
-                1.0,
-                model.strike_half_sine,
-            ),
-        )
-        for sign, z in sides:
-            x, y, w = apex * (1 - z), apex + 2 * model.per_drop * z, apex
-            time += sign * 2 * np.sqrt(z) * elliprf(x, y, w)
+        p = self.parameters
+        # An apex after toe-off is passed from both sides; one before it only from the far side.
+        for sign, angle in (
+            (math.copysign(1, p.toe_off_angle), p.toe_off_angle),
+            (1, p.leg_angle),
+        ):
+            z = math.sin(angle / 2) ** 2
+            x, y, w = apex * (1 - z), apex + 2 * self._per_drop * z, apex
+            time += sign * 2 * math.sqrt(z) * elliprf(x, y, w)
             derivative = (1 - z) * elliprd(y, w, x) + elliprd(x, w, y) + elliprd(x, y, w)
-            by_apex -= sign * np.sqrt(z) / 3 * derivative
-        struck = _pendulum_force(
-            np.cos(self.parameters.leg_angle),
-            apex + model.per_drop * model.strike_drop,
-            model.mass,
-            model.gravity,
-            model.leg_length,
-        )
-        return _Stretch(time, by_apex, moving & (struck >= 0))
+            by_apex -= sign * math.sqrt(z) / 3 * derivative
+        struck = self._pendulum_force(np.cos(p.leg_angle), apex + self._strike_gain)
+        with np.errstate(invalid="ignore"):
+            return _Stretch(time, by_apex, moving & (struck >= 0))
+
+    def _pendulum_force(self, cosine: Any, square: Floats) -> Any:
+        p = self.parameters
+        return _pendulum_force(cosine, square, p.mass, p.gravity, p.leg_length)
 
     def _collide(self, apex: Floats) -> Floats:
-        model = self._model
-        lost = (1 - model.restitution) * model.per_drop * model.strike_drop
-        return model.restitution * apex - lost
+        return self._kept * apex - (1 - self._kept) * self._strike_gain
 
     # The whole gait and the derivative of the map
 
     def _gaits(self, start: Floats, end: Floats, kind: str) -> Gaits:
-        model = self._model
         apex = self._apex(start, end)
         pulse_gain = self._pulse_gain(start, end)
         here, there = np.full_like(apex, self.heel_strike), np.full_like(apex, self.toe_off)
@@ -386,19 +404,19 @@ class PulsedGait:
             at_end = self._velocity(end, apex, start)[..., column]
         if begins:
             d_start = at_start * (d_onset - before.by_apex[..., column] * d_apex)
-        torque_gain = model.per_energy * self._pulse_torque(start)[..., column]
+        torque_gain = self._per_energy * self._pulse_torque(start)[..., column]
         d_pulse = pulse.by_apex[..., column] * (d_apex - torque_gain * d_start)
         if ends:
             d_acting = 0.0 if begins else d_onset
             d_end = at_end * (d_acting + d_start / at_start - d_pulse)
-        d_gain = model.per_energy * self._pulse_torque(end)[..., column] * d_end
+        d_gain = self._per_energy * self._pulse_torque(end)[..., column] * d_end
         d_leaving = d_apex + d_gain - torque_gain * d_start
         d_period = (
             before.by_apex[..., column] * d_apex
             + d_pulse
             + (after.by_apex + swing.by_apex)[..., column] * d_leaving
         )
-        d_next = model.restitution * d_leaving
+        d_next = self._kept * d_leaving
 
         period, sound = step, before.sound & pulse.sound & after.sound & swing.sound
         arriving = self._collide(leaving)
@@ -407,7 +425,7 @@ class PulsedGait:
             swing = self._single_stance(arriving + self._step_gain)
             period = period + whole.time + swing.time
             d_period = d_period + (whole.by_apex + swing.by_apex)[..., column] * d_next
-            d_next = model.restitution * d_next
+            d_next = self._kept * d_next
             sound = sound & whole.sound & swing.sound
             arriving = self._collide(arriving + self._step_gain)
         jacobian = np.stack([d_next, d_onset - d_period], axis=-2)
