@@ -26,6 +26,7 @@ import os
 import struct
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
@@ -228,12 +229,15 @@ class BagRecorder(Participant, Node):
 
     def lost(self) -> dict[str, int]:
         """Return how many messages each topic lacks against its publisher's count."""
-        lacking = {}
+        published: Counter[str] = Counter()
         for counts in self.published.values():
-            for topic, count in counts.items():
-                if topic in self.bag.counts and self.bag.counts[topic] < count:
-                    lacking[topic] = count - self.bag.counts[topic]
-        return lacking
+            published.update(counts)
+        recorded = self.bag.counts
+        return {
+            topic: count - recorded[topic]
+            for topic, count in published.items()
+            if topic in recorded and recorded[topic] < count
+        }
 
     def next_deadline(self) -> float:
         """Return when topics and the file are looked after next."""
@@ -241,7 +245,8 @@ class BagRecorder(Participant, Node):
 
     def on_deadline(self) -> None:
         """Look for new topics, bring data to the file, end where everything is there."""
-        self._care_at = time.monotonic() + (CARE_PERIOD if self.final_at is None else 0.01)
+        closing = self.final_at is not None and bool(self.expected)
+        self._care_at = time.monotonic() + (0.01 if closing else CARE_PERIOD)
         try:
             self.subscribe_to_new_topics()
             self.bag.flush()

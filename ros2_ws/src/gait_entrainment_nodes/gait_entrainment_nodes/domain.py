@@ -46,19 +46,41 @@ def claimed_domain() -> Iterator[int]:
     if wanted is not None and not (wanted.isdigit() and int(wanted) <= 232):
         raise DomainError(f"ROS_DOMAIN_ID: {wanted!r}; allowed: 0 to 232, or unset for a free one")
     candidates = DOMAINS if wanted is None else [int(wanted)]
-    # Another user's claims are honoured too: the files can be opened and locked by all.
-    folder = Path(tempfile.gettempdir()) / "gait_entrainment_domains"
-    folder.mkdir(exist_ok=True)
     for domain in candidates:
-        with (folder / str(domain)).open("a") as file:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                continue
+        file = _claim_file(domain)
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            os.close(file)
+            continue
+        try:
             yield domain
-            return
+        finally:
+            os.close(file)
+        return
     if wanted is None:
         raise DomainError(f"every ROS domain from {DOMAINS[0]} to {DOMAINS[-1]} is in use")
     raise DomainError(
         f"ROS_DOMAIN_ID: {wanted} is in use by another run; choose another or unset it"
     )
+
+
+def _claim_file(domain: int) -> int:
+    """
+    Open the file whose lock is the claim on a domain.
+
+    Another user's claims are honoured too: everyone may make such files, and reading suffices to
+    lock one.
+    """
+    folder = Path(tempfile.gettempdir()) / "gait_entrainment_domains"
+    try:
+        folder.mkdir()
+        folder.chmod(0o1777)
+    except FileExistsError:
+        pass
+    try:
+        return os.open(folder / str(domain), os.O_RDONLY)
+    except FileNotFoundError:
+        return os.open(folder / str(domain), os.O_RDONLY | os.O_CREAT, 0o644)
+    except OSError as error:
+        raise DomainError(f"{folder / str(domain)}: {error.strerror}; remove it") from None

@@ -20,13 +20,14 @@ of the walker with a horizon. What to perturb and when is the core's Conductor; 
 for, and for how long, is decided here.
 """
 
+import contextlib
 import sys
 import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
+from lifecycle_msgs.msg import State, Transition
+from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
 from rclpy.node import Node
 from rclpy.task import Future
@@ -36,7 +37,7 @@ from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.device import PulseTrain
 from gait_entrainment.events import GaitEvent
 from gait_entrainment.experiment import Conductor, Phase
-from gait_entrainment.protocol import ProtocolError, read_protocol
+from gait_entrainment.protocol import Protocol, ProtocolError, read_protocol
 from gait_entrainment_msgs import msg
 from gait_entrainment_msgs.action import DeliverPulseTrain, RunProtocol
 from gait_entrainment_msgs.srv import StartRun
@@ -53,6 +54,17 @@ from gait_entrainment_nodes.topics import (
 
 # How often waiting is looked after [s].
 TICK = 0.02
+# A tick that is so late [s] says that this process was held up: others are not blamed for it.
+HELD_UP = 1.0
+# How long each step of ending a failed run may take [s]: who fails may not answer any more.
+FAREWELL = 0.5
+
+
+_TRANSITIONS = {
+    Transition.TRANSITION_CONFIGURE: "be configured",
+    Transition.TRANSITION_ACTIVATE: "be activated",
+    Transition.TRANSITION_DEACTIVATE: "be deactivated",
+}
 
 
 class ExperimentError(Exception):
@@ -103,6 +115,7 @@ class Experiment(Participant, Node):
         self.states = self.publisher(EXPERIMENT_STATE)
 
         self.run_number = 0
+        self.busy = False  # a protocol has been accepted and has not ended yet
         self.conductor: Conductor | None = None  # of the run that goes on
         self._goal: Any = None
         self._tick_at = time.monotonic() + TICK
@@ -115,6 +128,7 @@ class Experiment(Participant, Node):
         self.subscription(RECORDER_PROGRESS, self.on_recorder_progress)
         self._start = self.create_client(StartRun, "walker_sim/start")
         self._change_state = self.create_client(ChangeState, "perturbator/change_state")
+        self._get_state = self.create_client(GetState, "perturbator/get_state")
         self._deliver = ActionClient(self, DeliverPulseTrain, "perturbator/deliver_pulse_train")
         # Ready services are looked up by name: a participant may be any node that offers one.
         self._ready = {p: self.create_client(Trigger, f"{p}/ready") for p in self.participants}
@@ -123,13 +137,18 @@ class Experiment(Participant, Node):
             RunProtocol,
             "~/run_protocol",
             execute_callback=self.execute,
-            goal_callback=lambda _: (
-                GoalResponse.REJECT if self._goal is not None else GoalResponse.ACCEPT
-            ),
+            goal_callback=self.on_goal,
             cancel_callback=lambda _: CancelResponse.ACCEPT,
         )
 
     # The run
+
+    def on_goal(self, _: RunProtocol.Goal) -> GoalResponse:
+        """Accept one protocol at a time."""
+        if self.busy:
+            return GoalResponse.REJECT
+        self.busy = True
+        return GoalResponse.ACCEPT
 
     async def execute(self, goal: Any) -> RunProtocol.Result:
         """Conduct one protocol; the result says how it ended."""
@@ -138,36 +157,64 @@ class Experiment(Participant, Node):
         self.begin_run()
         result = RunProtocol.Result(run=self.run_number, outcome=RunProtocol.Result.FAILED)
         try:
-            protocol = read_protocol(goal.request.protocol)
-            await self.participants_ready()
-            await self.transition(Transition.TRANSITION_CONFIGURE)
-            await self.transition(Transition.TRANSITION_ACTIVATE)
-            conductor = Conductor(protocol, self.lookahead)
-            start = await self.start_walker()
-            self.conductor = conductor
-            self.publish_horizon(start)
-            final = await self.ended
+            final = await self.conduct(read_protocol(goal.request.protocol))
             result.outcome = RunProtocol.Result.FINISHED
             result.reproducible = final.reproducible
             result.message = final.message or "every stride of the protocol was walked"
-            if final.state != msg.Progress.FINISHED:
-                raise ExperimentError(final.message or "the walker ended the run")
             self.publish_state(Phase.FINISHED, result.message)
             await self.transition(Transition.TRANSITION_DEACTIVATE)
             goal.succeed()
         except (ExperimentError, ProtocolError) as failure:
             result.message = str(failure)
-            cancelled = goal.is_cancel_requested
-            result.outcome = (
-                RunProtocol.Result.CANCELLED if cancelled else RunProtocol.Result.FAILED
-            )
-            self.publish_state(Phase.FAILED, result.message)
-            self.diagnose(self.known_until, DiagnosticStatus.ERROR, result.message)
-            self._change_state.call_async(_transition(Transition.TRANSITION_DEACTIVATE))
-            goal.canceled() if cancelled else goal.abort()
+            await self.give_up(result.message)
+            if goal.is_cancel_requested:
+                result.outcome = RunProtocol.Result.CANCELLED
+                goal.canceled()
+            else:
+                goal.abort()
+        except Exception as error:
+            result.message = str(error)
+            self.fail_with(error)
+            goal.abort()
         self.publish_counts(self.run_number, self.known_until)
         self.conductor = self._goal = None
+        self.busy = False
         return result
+
+    async def conduct(self, protocol: Protocol) -> msg.Progress:
+        """Conduct a protocol to its end; return the walker's last word."""
+        await self.participants_ready()
+        await self.activate_perturbator()
+        conductor = Conductor(protocol, self.lookahead)
+        start = await self.start_walker()
+        self.conductor = conductor
+        self.publish_horizon(start)
+        final = await self.ended
+        await self.close_run(self.silence_timeout)
+        if final.state != msg.Progress.FINISHED:
+            raise ExperimentError(final.message or "the walker ended the run")
+        return final
+
+    async def close_run(self, timeout: float) -> None:
+        """
+        Say that the run is over at the end of what was promised, and wait until that is heard.
+
+        After that nobody has torque left to stop, and deactivation says nothing new.
+        """
+        self.known_until = self.promised_until
+        self.closed = Future()
+        self.send_horizon(self.promised_until, last=True)
+        await self.within(self.closed, "perturbator does not answer", timeout)
+
+    async def give_up(self, reason: str) -> None:
+        """End a failed run, torque first, as far as the others still answer."""
+        self.publish_state(Phase.FAILED, reason)
+        self.diagnose(self.known_until, DiagnosticStatus.ERROR, reason)
+        with contextlib.suppress(ExperimentError):
+            await self.transition(Transition.TRANSITION_DEACTIVATE, FAREWELL)
+        if self.promised_until and self.closed is None:
+            with contextlib.suppress(ExperimentError):
+                await self.close_run(FAREWELL)
 
     def begin_run(self) -> None:
         """Forget the run before."""
@@ -175,12 +222,13 @@ class Experiment(Participant, Node):
         self.known_until = 0  # all events up to this instant have been seen [ns since 1970]
         self.events = 0
         self.progress: msg.Progress | None = None  # received, not answered yet
-        self.progress_at = self.profile_at = time.monotonic()
+        # Since when an answer is owed, or was last heard, on steady time [s].
+        self.progress_at = self.profile_at = self.planning_at = self.recorded_at = 0.0
         self.grant = self.recorded_grant = -1
-        self.recorder_heard = False
         self.horizons_sent = self.profiles_received = 0
         self.promised_until = 0  # by the latest horizon [ns since 1970]
         self.planning = False  # a train has been requested and not been accepted yet
+        self.closed: Future | None = None  # the horizon that closes the run has been answered
         self.shown: tuple[Phase, int] | None = None
 
     # Bringing the participants together
@@ -218,15 +266,26 @@ class Experiment(Participant, Node):
                 return f"{name} waits for {response.message}"
         return f"experiment waits for {self.not_ready()}" if self.not_ready() else ""
 
-    async def transition(self, number: int) -> None:
+    async def activate_perturbator(self) -> None:
+        """Bring the perturbator from where a run before has left it to active."""
+        response = await self.within(
+            self._get_state.call_async(GetState.Request()), "perturbator does not answer"
+        )
+        if response.current_state.id == State.PRIMARY_STATE_UNCONFIGURED:
+            await self.transition(Transition.TRANSITION_CONFIGURE)
+        if response.current_state.id != State.PRIMARY_STATE_ACTIVE:
+            await self.transition(Transition.TRANSITION_ACTIVATE)
+
+    async def transition(self, number: int, timeout: float | None = None) -> None:
         """Take the perturbator through one lifecycle transition."""
         response = await self.within(
-            self._change_state.call_async(_transition(number)), "perturbator does not answer"
+            self._change_state.call_async(ChangeState.Request(transition=Transition(id=number))),
+            "perturbator does not answer",
+            timeout,
         )
         if not response.success:
-            raise ExperimentError(
-                "perturbator refused to be configured, activated or deactivated; see its log"
-            )
+            name = _TRANSITIONS[number]
+            raise ExperimentError(f"perturbator refused to {name}; its log says why")
 
     async def start_walker(self) -> int:
         """Start the walker; return the instant of heel strike 0 [ns since 1970]."""
@@ -265,7 +324,10 @@ class Experiment(Participant, Node):
         """Take the walker's progress; it is answered once all that it covers is here."""
         if self.conductor is None or progress.run != self.run_number:
             return
-        self.progress, self.progress_at, self.grant = progress, time.monotonic(), progress.grant
+        self.progress, self.progress_at = progress, time.monotonic()
+        if self.recorded_grant >= self.grant:
+            self.recorded_at = self.progress_at
+        self.grant = progress.grant
         self.answer_progress()
 
     def answer_progress(self) -> None:
@@ -293,13 +355,17 @@ class Experiment(Participant, Node):
         horizon = self.conductor.horizon(known_until)
         if horizon.until == self.promised_until:
             return  # in real time progress goes on while the last stretch is walked
-        self.promised_until = horizon.until
+        self.send_horizon(horizon.until, horizon.last)
+
+    def send_horizon(self, until: int, last: bool) -> None:
+        """Publish a horizon, which is owed an answer from now on."""
+        self.promised_until = until
         self.horizons.publish(
             msg.Horizon(
-                header=header(known_until),
+                header=header(self.known_until),
                 run=self.run_number,
-                until=to_time(horizon.until),
-                last=horizon.last,
+                until=to_time(until),
+                last=last,
             )
         )
         if self.horizons_sent == self.profiles_received:
@@ -308,7 +374,7 @@ class Experiment(Participant, Node):
 
     def request_pulses(self, train: PulseTrain) -> None:
         """Ask the perturbator for the pulses; no promise goes out until it has accepted."""
-        self.planning = True
+        self.planning, self.planning_at = True, time.monotonic()
         goal = DeliverPulseTrain.Goal(
             run=self.run_number,
             side=train.side,
@@ -318,7 +384,8 @@ class Experiment(Participant, Node):
             torque=train.torque,
             duration=train.duration,
         )
-        self._deliver.send_goal_async(goal).add_done_callback(self.on_pulses_answered)
+        answered = self._deliver.send_goal_async(goal)
+        answered.add_done_callback(self.guarded(self.on_pulses_answered))
 
     def on_pulses_answered(self, future: Future) -> None:
         """Go on once the perturbator has accepted the pulses."""
@@ -327,7 +394,8 @@ class Experiment(Participant, Node):
             self.fail("perturbator rejected the pulse train; its reason is in /diagnostics")
             return
         # Asked for at once: results expire.
-        train_goal.get_result_async().add_done_callback(self.on_pulses_ended)
+        ended = train_goal.get_result_async()
+        ended.add_done_callback(self.guarded(self.on_pulses_ended))
         self.planning = False
         self.answer_progress()
 
@@ -345,11 +413,14 @@ class Experiment(Participant, Node):
         if profile.run == self.run_number and not profile.stop:
             self.profiles_received += 1
             self.profile_at = time.monotonic()
+            closed = self.closed
+            if closed is not None and not closed.done():
+                closed.set_result(None)
 
     def on_recorder_progress(self, progress: msg.Progress) -> None:
         """Note how far the recorder is, to name it where it is what the walker waits for."""
         if progress.run == self.run_number:
-            self.recorder_heard, self.recorded_grant = True, progress.grant
+            self.recorded_at, self.recorded_grant = time.monotonic(), progress.grant
 
     # Waiting, on steady time
 
@@ -360,6 +431,8 @@ class Experiment(Participant, Node):
     def on_deadline(self) -> None:
         """Look after everything that is waited for."""
         now = time.monotonic()
+        if now > self._tick_at + HELD_UP:
+            self.excuse_everyone(now)
         self._tick_at = now + TICK
         waits, self._waits = self._waits, []
         for future, deadline, reason in waits:
@@ -379,19 +452,27 @@ class Experiment(Participant, Node):
             elif silent:
                 self.fail(f"{silent} has been silent for {self.silence_timeout:g} s")
 
+    def excuse_everyone(self, now: float) -> None:
+        """Begin all waiting anew: what came meanwhile has not been heard yet."""
+        self.progress_at = self.profile_at = self.planning_at = self.recorded_at = now
+        self._waits = [
+            (future, deadline + now - self._tick_at, reason)
+            for future, deadline, reason in self._waits
+        ]
+
     def silent_participant(self, now: float) -> str:
         """Return who has owed an answer for too long, or an empty text."""
-        if self.horizons_sent > self.profiles_received:
-            return "perturbator" if now - self.profile_at > self.silence_timeout else ""
-        if now - max(self.progress_at, self.profile_at) <= self.silence_timeout:
-            return ""
-        if self.planning:
+        latest = now - self.silence_timeout
+        if self.planning and self.planning_at < latest:
             return "perturbator"
-        return (
-            "bag_recorder"
-            if self.recorder_heard and self.recorded_grant < self.grant
-            else "walker_sim"
-        )
+        if self.horizons_sent > self.profiles_received:
+            return "perturbator" if self.profile_at < latest else ""
+        if "bag_recorder" in self.participants and self.recorded_grant < self.grant:
+            if self.recorded_at < latest:
+                return "bag_recorder"
+            # In lock-step the walker waits for the recorder, rightly.
+            return ""
+        return "walker_sim" if max(self.progress_at, self.profile_at) < latest else ""
 
     def fail_if_cancelled(self) -> None:
         """Raise where the client has cancelled the run."""
@@ -403,9 +484,10 @@ class Experiment(Participant, Node):
         if not self.ended.done():
             self.ended.set_exception(ExperimentError(reason))
 
-    async def within(self, future: Future, reason: str) -> Any:
-        """Wait for an answer, at most for the silence timeout."""
-        self._waits.append((future, time.monotonic() + self.silence_timeout, reason))
+    async def within(self, future: Future, reason: str, timeout: float | None = None) -> Any:
+        """Wait for an answer, at most for a time [s], by default the silence timeout."""
+        timeout = self.silence_timeout if timeout is None else timeout
+        self._waits.append((future, time.monotonic() + timeout, reason))
         return await future
 
     async def tick(self) -> None:
@@ -439,10 +521,6 @@ class Experiment(Participant, Node):
         self.states.publish(state)
         if self._goal is not None:
             self._goal.publish_feedback(RunProtocol.Feedback(state=state))
-
-
-def _transition(number: int) -> ChangeState.Request:
-    return ChangeState.Request(transition=Transition(id=number))
 
 
 def main() -> int:

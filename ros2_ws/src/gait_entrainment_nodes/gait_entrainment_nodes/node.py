@@ -19,9 +19,12 @@ The loop is a series of ``spin_once`` of the EventsExecutor: it receives ten tim
 default executor, and between two calls the node meets its own deadlines on steady time.
 """
 
+import functools
+import math
 import signal
 import sys
 import time
+import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import fields
 from typing import Any
@@ -29,11 +32,17 @@ from typing import Any
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
-from rclpy.exceptions import ParameterException
+from rclpy.duration import Duration
+from rclpy.exceptions import (
+    InvalidParameterTypeException,
+    InvalidParameterValueException,
+    ParameterException,
+)
 from rclpy.experimental import EventsExecutor
 from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
 from std_srvs.srv import Trigger
 
 from gait_entrainment_msgs.msg import PublishedCounts
@@ -44,6 +53,14 @@ from gait_entrainment_nodes.topics import DIAGNOSTICS, PUBLISHED_COUNTS, Topic
 LONGEST_SLEEP = 0.1
 # How often a full writer is tried again [s], while its slowest reader catches up.
 RETRY_PERIOD = 0.002
+# A writer that waits for a reader says so in the log after so long, and again [s].
+LAG_REPORT_PERIOD = 1.0
+# At the end of a node its last messages, a stop among them, have so long to arrive [s].
+LAST_WORDS = 0.5
+
+
+class StopRequestedError(Exception):
+    """The node must end while a publisher waits for a reader that lags."""
 
 
 class CountedPublisher:
@@ -66,17 +83,37 @@ class CountedPublisher:
         return max(known - self._publisher.get_subscription_count(), 0)
 
     def publish(self, message: Any) -> None:
-        """Publish a message, or its serialized bytes; wait while the history is full."""
+        """
+        Publish a message, or its serialized bytes; wait while the history is full.
+
+        Raises
+        ------
+        StopRequestedError
+            where the node is to end meanwhile.
+
+        """
+        report_at = time.monotonic() + LAG_REPORT_PERIOD
         while True:
             try:
                 self._publisher.publish(message)
             except rclpy._rclpy_pybind11.RCLError:
-                if self._node.stopping:
-                    raise
+                if self._node.stopping or not rclpy.ok():
+                    raise StopRequestedError from None
+                if time.monotonic() > report_at:
+                    report_at += LAG_REPORT_PERIOD
+                    readers = self._node.get_subscriptions_info_by_topic(self.topic_name)
+                    names = ", ".join(sorted({reader.node_name for reader in readers}))
+                    self._node.get_logger().warning(
+                        f"{self.topic_name} waits: one of its readers does not keep up ({names})"
+                    )
                 time.sleep(RETRY_PERIOD)
             else:
                 self.count += 1
                 return
+
+    def wait_until_received(self, timeout: float) -> None:
+        """Wait until every reader has acknowledged what was published, or for ``timeout`` [s]."""
+        self._publisher.wait_for_all_acked(Duration(seconds=timeout))
 
 
 class Participant:
@@ -88,16 +125,15 @@ class Participant:
     """
 
     get_logger: Callable[[], RcutilsLogger]
+    stopping = False  # set from outside: the node is to end
 
     def begin_participation(self) -> None:
-        """Set up what every participant has; to be called at the end of the constructor."""
-        self.stopping = False
+        """Set up what every participant has: behind its parameters, before its publishers."""
+        refuse_unknown_parameters(self)
         self.failure: str | None = None  # why the node must end with exit code 1
         self.finished = False  # set to end the loop with exit code 0
         self._publishers_counted: list[CountedPublisher] = []
-        self._diagnostics = self.create_publisher(
-            DIAGNOSTICS.type, DIAGNOSTICS.name, DIAGNOSTICS.qos
-        )
+        self._diagnostics = self.publisher(DIAGNOSTICS)
         self._counts = self.create_publisher(
             PUBLISHED_COUNTS.type, PUBLISHED_COUNTS.name, PUBLISHED_COUNTS.qos
         )
@@ -112,6 +148,31 @@ class Participant:
     def subscription(self, topic: Topic, callback: Callable[[Any], None], **options: Any) -> Any:
         """Create a subscription with the quality of service of its topic."""
         return self.create_subscription(topic.type, topic.name, callback, topic.qos, **options)
+
+    def guarded(self, callback: Callable[..., Any]) -> Callable[..., Any]:
+        """
+        Return the callback of an action server or of a future, made safe to raise exceptions.
+
+        The EventsExecutor hands on what a subscription, a service or a timer raises, but an
+        exception in a task crashes the process. Here it ends the node in order instead.
+        """
+
+        @functools.wraps(callback)
+        def call(*arguments: Any) -> Any:
+            try:
+                return callback(*arguments)
+            except Exception as error:
+                self.fail_with(error)
+                return None
+
+        return call
+
+    def fail_with(self, error: Exception) -> None:
+        """End the node because of an exception that nobody foresaw, or of a requested stop."""
+        if isinstance(error, StopRequestedError):
+            return
+        traceback.print_exception(error)
+        self.failure = f"{type(error).__name__}: {error}"
 
     def not_ready(self) -> str:
         """Return what this node still waits for before a run, or an empty text."""
@@ -156,6 +217,17 @@ class Participant:
     def on_stop(self) -> None:
         """Bring things to a safe end: torque to zero, files closed."""
 
+    def end(self) -> None:
+        """End the node's part, however it came to its end, and see its last messages off."""
+        self.stopping = True
+        try:
+            self.on_stop()
+        except Exception as error:
+            self.fail_with(error)
+        deadline = time.monotonic() + LAST_WORDS
+        for publisher in self._publishers_counted:
+            publisher.wait_until_received(max(deadline - time.monotonic(), 0.0))
+
 
 def declare(
     node: Node,
@@ -168,10 +240,20 @@ def declare(
     maximum: float | None = None,
     read_only: bool = True,
 ) -> Any:
-    """Declare a parameter with description, unit and range, and return its value."""
+    """
+    Declare a parameter with description, unit and range, and return its value.
+
+    Raises
+    ------
+    ValueError
+        where the value that was given is of another type or out of range.
+
+    """
     text = f"{description} [{unit}]" if unit else description
     descriptor = ParameterDescriptor(description=text, read_only=read_only)
+    allowed = f"a value like {default!r}"
     if minimum is not None and maximum is not None:
+        allowed = f"{minimum:g} to {maximum:g}" + (f" {unit}" if unit else "")
         if isinstance(default, int):
             descriptor.integer_range = [
                 IntegerRange(from_value=int(minimum), to_value=int(maximum))
@@ -180,7 +262,16 @@ def declare(
             descriptor.floating_point_range = [
                 FloatingPointRange(from_value=float(minimum), to_value=float(maximum))
             ]
-    return node.declare_parameter(name, default, descriptor).value
+    try:
+        value = node.declare_parameter(name, default, descriptor).value
+    except (InvalidParameterValueException, InvalidParameterTypeException):
+        given = node._parameter_overrides[name].value
+        if isinstance(default, float) and type(given) is int:
+            allowed = f"a number with a decimal point, such as {float(given)!r}"
+        raise ValueError(f"{name}: {given!r}; allowed: {allowed}") from None
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError(f"{name}: {value!r}; allowed: {allowed}")
+    return value
 
 
 def declare_fields(node: Node, dataclass_type: Any, prefix: str = "") -> Any:
@@ -205,52 +296,77 @@ def declare_fields(node: Node, dataclass_type: Any, prefix: str = "") -> Any:
     return dataclass_type(**values)
 
 
-def run_node(make_node: Callable[[], Any], arguments: Sequence[str] | None = None) -> int:
+def refuse_unknown_parameters(node: Any) -> None:
+    """Raise ValueError where a parameter was given that the node does not have."""
+    unknown = [
+        name
+        for name in node._parameter_overrides
+        if not node.has_parameter(name) and not name.startswith("qos_overrides.")
+    ]
+    if unknown:
+        known = ", ".join(sorted(node._parameters))
+        raise ValueError(f"{unknown[0]}: unknown parameter; allowed: {known}")
+
+
+def run_node(make_node: Callable[[], Any], arguments: Sequence[str]) -> int:
     """
     Run a node until it is finished, it fails, or SIGINT or SIGTERM arrives.
 
     Returns
     -------
     int
-        0 for a clean stop, 1 for a failure, 2 for a parameter that was refused; the reason is
-        one line on standard error.
+        0 for a clean stop, 1 for a failure, 2 for an argument or a parameter that was refused;
+        the reason is one line on standard error, for an unforeseen failure behind its traceback.
 
     """
     stop_requested = False
+    node: Any = None
 
     def request_stop(*_: object) -> None:
         nonlocal stop_requested
         stop_requested = True
+        if node is not None:
+            node.stopping = True
 
     # rclpy's own handlers shut the context down at once: no last message could be sent.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, request_stop)
-    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
-    node = None
+    name = arguments[0].rpartition("/")[2]
     try:
-        node = make_node()
+        try:
+            rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+            if extra := remove_ros_args(arguments)[1:]:
+                raise ValueError(
+                    f"unknown argument {extra[0]!r}; allowed: --ros-args -p PARAMETER:=VALUE ..."
+                )
+            node = make_node()
+        except (ParameterException, ValueError, rclpy._rclpy_pybind11.RCLError) as error:
+            print(f"{name}: {' '.join(str(error).split())}", file=sys.stderr)
+            return 2
+        except rclpy._rclpy_pybind11.UnknownROSArgsError as error:
+            print(f"{name}: unknown ROS arguments {error}", file=sys.stderr)
+            return 2
         executor = EventsExecutor()
         executor.add_node(node)
-        while not (stop_requested or node.finished or node.failure):
-            deadline = node.next_deadline()
-            sleep = LONGEST_SLEEP
-            if deadline is not None:
-                sleep = min(max(deadline - time.monotonic(), 0.0), LONGEST_SLEEP)
-            executor.spin_once(timeout_sec=sleep)
-            deadline = node.next_deadline()
-            if deadline is not None and time.monotonic() >= deadline:
-                node.on_deadline()
-        node.stopping = True
-        node.on_stop()
+        try:
+            while not (stop_requested or node.finished or node.failure):
+                deadline = node.next_deadline()
+                sleep = LONGEST_SLEEP
+                if deadline is not None:
+                    sleep = min(max(deadline - time.monotonic(), 0.0), LONGEST_SLEEP)
+                executor.spin_once(timeout_sec=sleep)
+                deadline = node.next_deadline()
+                if deadline is not None and time.monotonic() >= deadline:
+                    node.on_deadline()
+        except Exception as error:
+            node.fail_with(error)
+        node.end()
         executor.shutdown()
         if node.failure:
-            print(f"{node.get_name()}: {node.failure}", file=sys.stderr)
+            print(f"{name}: {node.failure}", file=sys.stderr)
             return 1
-    except (ParameterException, ValueError) as error:
-        print(f"{' '.join(str(error).split())}", file=sys.stderr)
-        return 2 if node is None else 1
+        return 0
     finally:
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
-    return 0

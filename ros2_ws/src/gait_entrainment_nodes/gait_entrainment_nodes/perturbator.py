@@ -17,7 +17,10 @@ perturbator: lifecycle node that holds one ankle robot and turns pulse trains in
 
 It answers every horizon of the experiment with a torque profile and the promise that nothing in
 it will change. It knows nothing of gait. Torque ends with deactivation, with cancelling, with
-the latched stop service and with the process.
+the latched stop service and with the process, whatever ends that.
+
+A horizon that is known to its end closes the run: it is answered with a profile without length,
+after which there is no torque that could be stopped.
 """
 
 import sys
@@ -37,6 +40,7 @@ from gait_entrainment.device import (
     PulseTrain,
     find_driver,
 )
+from gait_entrainment.device import TorqueProfile as CoreProfile
 from gait_entrainment_msgs.action import DeliverPulseTrain
 from gait_entrainment_msgs.msg import AnkleRobotState, Horizon, TorqueProfile, TorquePulse
 from gait_entrainment_nodes.node import Participant, declare, declare_fields, run_node
@@ -68,7 +72,7 @@ class Perturbator(Participant, LifecycleNode):
         self.revision = 0
         self.now = 0  # latest instant that is known to be over [ns since 1970]
         self._goal: Any = None
-        self._goal_ended: Future | None = None  # its result: (outcome, message)
+        self._goal_ended: Future | None = None  # its result: (outcome, message, delivered)
 
         self.subscription(HORIZON, self.on_horizon)
         self.create_service(Trigger, "~/stop", self.on_stop_service)
@@ -78,7 +82,7 @@ class Perturbator(Participant, LifecycleNode):
             "~/deliver_pulse_train",
             execute_callback=self.execute,
             goal_callback=self.on_goal,
-            cancel_callback=lambda _: CancelResponse.ACCEPT,
+            cancel_callback=self.guarded(self.on_cancel),
         )
 
     # Lifecycle
@@ -129,6 +133,7 @@ class Perturbator(Participant, LifecycleNode):
 
     def end_torque(self, outcome: int, reason: str) -> None:
         """Bring the torque to zero now, whatever was promised."""
+        self.end_goal(outcome, reason)
         if self.robot is not None and self.robot.committed:
             self.robot.cancel()
             self.profiles.publish(
@@ -143,13 +148,16 @@ class Perturbator(Participant, LifecycleNode):
             )
             self.revision += 1
             self.publish_state(self.now, 0.0)
-        self.end_goal(outcome, reason)
 
     # The action
 
     def on_goal(self, goal: DeliverPulseTrain.Goal) -> GoalResponse:
         """Accept a train that the robot can deliver, one at a time."""
-        reason = self.schedule(goal)
+        try:
+            reason = self.schedule(goal)
+        except Exception as error:  # it must not reach the executor, which would crash
+            self.fail_with(error)
+            return GoalResponse.REJECT
         if reason:
             self.get_logger().error(f"pulse train rejected: {reason}")
             self.diagnose(self.now, DiagnosticStatus.WARN, f"pulse train rejected: {reason}")
@@ -186,37 +194,56 @@ class Perturbator(Participant, LifecycleNode):
         """Wait for the end of a train and say how it ended."""
         assert self._goal_ended is not None
         self._goal = goal
-        outcome, message = await self._goal_ended
+        outcome, message, delivered = await self._goal_ended
         if outcome == DeliverPulseTrain.Result.CANCELLED:
             goal.canceled()
         elif outcome == DeliverPulseTrain.Result.DELIVERED:
             goal.succeed()
         else:
             goal.abort()
-        delivered = self.robot.delivered if self.robot is not None else 0
         self._goal = self._goal_ended = None
         return DeliverPulseTrain.Result(outcome=outcome, delivered=delivered, message=message)
 
     def end_goal(self, outcome: int, message: str) -> None:
         """Let the running goal, if any, end."""
         if self._goal_ended is not None and not self._goal_ended.done():
-            self._goal_ended.set_result((outcome, message))
+            delivered = self.robot.delivered if self.robot is not None else 0
+            self._goal_ended.set_result((outcome, message, delivered))
+
+    def on_cancel(self, _: Any) -> CancelResponse:
+        """Bring the torque to zero now: the next horizon may be long in coming."""
+        self.end_torque(DeliverPulseTrain.Result.CANCELLED, "cancelled by the client")
+        return CancelResponse.ACCEPT
 
     # Promises
 
     def on_horizon(self, message: Horizon) -> None:
         """Answer a horizon with the torque up to it, promised."""
-        if not self.active:
+        new = message.run != self.run_number
+        if not (self.active if new else self.robot is not None):
             return
         self.now = to_nanoseconds(message.header.stamp)
-        if self.robot is None or message.run != self.run_number:
+        if new:
             self.robot = self.make_robot(self.side, self.now, self.limits)
             self.run_number, self.revision = message.run, 0
+        assert self.robot is not None
         until = to_nanoseconds(message.until)
-        if self._goal is not None and self._goal.is_cancel_requested:
-            self.end_torque(DeliverPulseTrain.Result.CANCELLED, "cancelled by the client")
+        if self.now >= until:
+            self.end_goal(DeliverPulseTrain.Result.ENDED, "the run ended before the last pulse")
+            self.publish_profile(CoreProfile(self.side, (until,), (0.0,), (), until), message.last)
+            self.robot = None
+            self.publish_counts(self.run_number, until)
+            return
         first = self.robot.delivered + 1
         profile = self.robot.promise(until)
+        self.publish_profile(profile, message.last)
+        for number, onset in enumerate(profile.onsets, first):
+            self.announce_pulse(number, onset)
+        if not self.robot.busy:
+            self.end_goal(DeliverPulseTrain.Result.DELIVERED, "every pulse was delivered")
+
+    def publish_profile(self, profile: CoreProfile, last: bool) -> None:
+        """Publish a promise, and the robot's state at every change of torque in it."""
         self.profiles.publish(
             TorqueProfile(
                 header=header(profile.times[0]),
@@ -226,20 +253,13 @@ class Perturbator(Participant, LifecycleNode):
                 times=[to_time(t) for t in profile.times],
                 torques=profile.torques,
                 onsets=[to_time(t) for t in profile.onsets],
-                valid_until=message.until,
-                last=message.last,
+                valid_until=to_time(profile.valid_until),
+                last=last,
             )
         )
         self.revision += 1
-        for number, onset in enumerate(profile.onsets, first):
-            self.announce_pulse(number, onset)
         for instant, torque in zip(profile.times, profile.torques, strict=True):
             self.publish_state(instant, torque)
-        if not self.robot.busy:
-            self.end_goal(DeliverPulseTrain.Result.DELIVERED, "every pulse was delivered")
-        if message.last:
-            self.end_goal(DeliverPulseTrain.Result.ENDED, "the run ended before the last pulse")
-            self.publish_counts(self.run_number, until)
 
     def announce_pulse(self, number: int, onset: int) -> None:
         """Tell people, tools and the client of one pulse."""
@@ -262,12 +282,13 @@ class Perturbator(Participant, LifecycleNode):
 
     def publish_state(self, instant: int, torque: float) -> None:
         """Publish the robot's state; the ideal robot changes only where its torque does."""
+        status = AnkleRobotState.ACTIVE if self.active else AnkleRobotState.INACTIVE
         self.states.publish(
             AnkleRobotState(
                 header=header(instant),
                 run=self.run_number,
                 side=self.side,
-                status=AnkleRobotState.STOPPED if self.stopped else AnkleRobotState.ACTIVE,
+                status=AnkleRobotState.STOPPED if self.stopped else status,
                 commanded_torque=torque,
                 measured_torque=torque,
                 angle=float("nan"),

@@ -15,13 +15,16 @@
 """The client of a run: asks the experiment to conduct a protocol, and shows how it goes."""
 
 import time
+from functools import partial
 from typing import Any
 
 import rclpy
+from action_msgs.msg import GoalStatus
 from rclpy.action import ActionClient
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from std_srvs.srv import Trigger
 from tqdm import tqdm
 
 from gait_entrainment.protocol import Protocol
@@ -31,9 +34,15 @@ from gait_entrainment_nodes.node_list import NODES
 from gait_entrainment_nodes.supervisor import Supervisor
 from gait_entrainment_nodes.topics import PULSE_PHASES, STRIDES
 
-# How long the experiment may take to appear, and the analyzer to lag behind it [s].
+# How long the experiment may take to appear [s].
 APPEARANCE_TIMEOUT = 30.0
-ANALYZER_TIMEOUT = 5.0
+# Nodes for whom nothing in the chain of promises waits, and who therefore are asked for a sign of
+# life: how often, and how long they may owe it [s]. The experiment watches the others.
+ASKED = ("experiment", "gait_analyzer")
+ASKING_PERIOD = 0.5
+SILENCE_TIMEOUT = 3.0
+# A pause between two looks that is so long [s] says that this process was held up itself.
+HELD_UP = 1.0
 
 
 class RunClient:
@@ -64,8 +73,9 @@ class RunClient:
             total=protocol.strides, unit="stride", disable=True if quiet else None, leave=False
         )
         self._stride_period = self._phase_lag = ""
-        self._strides_walked = self._strides_analyzed = 0
-        self._analyzed_at = time.monotonic()
+        self._asking = {n: self._node.create_client(Trigger, f"{n}/ready") for n in ASKED}
+        self._asked_at = self._looked_at = time.monotonic()
+        self._heard_at = dict.fromkeys(ASKED, self._looked_at)
 
     def conduct(self, protocol_text: str) -> tuple[str, str]:
         """
@@ -99,13 +109,14 @@ class RunClient:
                 if not goal.accepted:
                     return "experiment rejected the protocol: it conducts another", "experiment"
                 result_future = goal.get_result_async()
-                self._analyzed_at = time.monotonic()
         self._bar.close()
-        result = result_future.result().result
-        if result.outcome == RunProtocol.Result.FINISHED:
+        answer = result_future.result()
+        result = answer.result
+        if answer.status == GoalStatus.STATUS_SUCCEEDED:
             return "", ""
         blamed = [node for node in NODES if node in result.message]
-        return result.message, blamed[0] if blamed else ""
+        message = result.message or "experiment failed"
+        return message, blamed[0] if blamed else "experiment"
 
     def close(self) -> None:
         """Leave the ROS graph."""
@@ -121,21 +132,36 @@ class RunClient:
             # The recorder ends by itself once the record is complete.
             if node != "bag_recorder" or code != 0:
                 return f"{node} ended unexpectedly with exit code {code}", node
-        behind = self._strides_walked - self._strides_analyzed
-        if behind <= 0:
-            self._analyzed_at = time.monotonic()
-        elif time.monotonic() - self._analyzed_at > ANALYZER_TIMEOUT:
-            return f"gait_analyzer is {behind} strides behind and silent", "gait_analyzer"
+        silent = self._silent_node()
+        if silent:
+            return f"{silent} has been silent for {SILENCE_TIMEOUT:g} s", silent
         return None
+
+    def _silent_node(self) -> str:
+        """Ask the nodes for a sign of life; return one that has owed it for too long."""
+        now = time.monotonic()
+        if now - self._looked_at > HELD_UP:
+            self._heard_at = dict.fromkeys(ASKED, now)
+        self._looked_at = now
+        if now - self._asked_at > ASKING_PERIOD:
+            self._asked_at = now
+            for node, client in self._asking.items():
+                if client.service_is_ready():
+                    answer = client.call_async(Trigger.Request())
+                    answer.add_done_callback(partial(self._on_answer, node))
+                else:  # it is still starting; should it have ended, the supervisor knows
+                    self._heard_at[node] = now
+        silent = [node for node in ASKED if now - self._heard_at[node] > SILENCE_TIMEOUT]
+        return silent[0] if silent else ""
+
+    def _on_answer(self, node: str, _: Any) -> None:
+        self._heard_at[node] = time.monotonic()
 
     def _on_feedback(self, message: Any) -> None:
         state: ExperimentState = message.feedback.state
-        self._strides_walked = state.stride
         self._bar.update(state.stride - self._bar.n)
 
     def _on_stride(self, stride: Stride) -> None:
-        self._strides_analyzed = stride.number
-        self._analyzed_at = time.monotonic()
         self._stride_period = f"period {stride.period:.4f} s"
         self._show()
 

@@ -18,6 +18,7 @@ import argparse
 import json
 import math
 import os
+import shutil
 import signal
 import sys
 import tempfile
@@ -29,7 +30,7 @@ from typing import Any
 import yaml
 from ament_index_python.packages import get_package_share_directory
 
-from gait_entrainment.bags import BagError
+from gait_entrainment.bags import BagError, BagReader, UnreadableBagError, recover
 from gait_entrainment.commands.protocol_options import add_protocol_options, chosen_protocol
 from gait_entrainment.device import DeviceLimits, LimitError, find_driver
 from gait_entrainment.protocol import Protocol, ProtocolError, write_protocol
@@ -88,8 +89,7 @@ def run(options: argparse.Namespace) -> int:
         if not 0 <= options.sample_rate <= 1000:
             raise ProtocolError(f"--sample-rate: {options.sample_rate:g}; allowed: 0 to 1000 Hz")
         bag = options.out or Path("bags") / f"{datetime.now():%Y%m%d-%H%M%S}_{protocol.name}"
-        if bag.exists():
-            raise ProtocolError(f"--out: {bag} is already there; a bag is never overwritten")
+        check_output(bag)
     except (ProtocolError, LimitError) as error:
         print(f"entrain run: {error}", file=sys.stderr)
         return 2
@@ -100,10 +100,43 @@ def run(options: argparse.Namespace) -> int:
             conduct(protocol, bag, domain, options)
         return report(bag, options)
     except KeyboardInterrupt:
-        print(f"entrain run: interrupted; what was recorded is in {bag}", file=sys.stderr)
+        print(f"entrain run: interrupted{kept(bag)}", file=sys.stderr)
     except (RunError, DomainError, BagError) as error:
         print(f"entrain run: {error}", file=sys.stderr)
     return 1
+
+
+def check_output(bag: Path) -> None:
+    """Raise ProtocolError where a bag cannot be made, before anything is started for it."""
+    if os.path.lexists(bag):
+        raise ProtocolError(f"--out: {bag} is already there; a bag is never overwritten")
+    parent = next(folder for folder in bag.absolute().parents if folder.exists())
+    if not parent.is_dir():
+        raise ProtocolError(f"--out: {parent} is not a folder; allowed: a new folder in a folder")
+    if not os.access(parent, os.W_OK | os.X_OK) or os.statvfs(parent).f_flag & os.ST_RDONLY:
+        raise ProtocolError(f"--out: {parent} cannot be written to; choose another folder")
+
+
+def kept(bag: Path) -> str:
+    """
+    Say what is left of a run that failed, having made it readable.
+
+    A recorder that was killed could not close the bag; what reached the file is rescued.
+    """
+    if not bag.exists():
+        return ""
+    try:
+        BagReader(bag).close()
+    except UnreadableBagError:
+        damaged = bag.with_name(f"{bag.name}_unfinished")
+        try:
+            bag.rename(damaged)
+            recover(damaged, bag)
+            shutil.rmtree(damaged)
+        except (BagError, OSError) as error:
+            return f"; the bag was not closed and could not be rescued: {error}"
+        return f"; the bag was not closed, what could be rescued of it is {bag}"
+    return f"; the bag of the run so far is {bag}"
 
 
 def conduct(protocol: Protocol, bag: Path, domain: int, options: argparse.Namespace) -> None:
@@ -157,8 +190,7 @@ def conduct(protocol: Protocol, bag: Path, domain: int, options: argparse.Namesp
             supervisor.stop(STOP_ORDER)
         if failure:
             lines = supervisor.last_lines(blamed) if blamed else ""
-            kept = f"\nthe bag of the run so far is {bag}" if bag.exists() else ""
-            raise RunError(f"{failure}{kept}" + (f"\n{lines}" if lines else ""))
+            raise RunError(f"{failure}{kept(bag)}" + (f"\n{lines}" if lines else ""))
     (bag / "protocol.yaml").write_text(text)
 
 
@@ -172,6 +204,21 @@ def provenance(protocol: Protocol, text: str, real_time: bool) -> dict[str, str]
         "mode": "real time" if real_time else "lock-step",
         "versions": json.dumps({package: version(package) for package in packages}),
     }
+
+
+def publish_lateness(bag: Path) -> dict[str, float]:
+    """Return how late the walker's samples were [ms] as its last diagnostics say, if they do."""
+    from gait_entrainment_nodes.topics import DIAGNOSTICS
+
+    lateness = {}
+    with BagReader(bag) as reader:
+        topics = [name for name in reader.topics if name == DIAGNOSTICS.name]
+        for _, message in reader.decoded(topics):
+            for status in message.status:
+                for value in status.values:
+                    if value.key.startswith("publish_late_"):
+                        lateness[value.key.split("_")[2]] = float(value.value)
+    return lateness
 
 
 def report(bag: Path, options: argparse.Namespace) -> int:
@@ -194,6 +241,9 @@ def report(bag: Path, options: argparse.Namespace) -> int:
         "lost": recorded.lost,
         "real_time_factor": None if math.isnan(factor) else factor,
     }
+    lateness = publish_lateness(bag)
+    if lateness:
+        outcome["publish_lateness_ms"] = lateness
     figures = []
     if not options.no_figures:
         from gait_entrainment.report.figures import draw_figures
@@ -205,6 +255,11 @@ def report(bag: Path, options: argparse.Namespace) -> int:
     print(summary(outcome))
     if not math.isnan(factor):
         print(f"speed            {factor:.0f} times real time")
+    if lateness:
+        print(
+            f"real time        samples published {lateness['p50']:.2f} ms after they were due"
+            f" (median), {lateness['p99']:.2f} ms (99 %), {lateness['worst']:.2f} ms (worst)"
+        )
     print(f"messages         {recorded.messages} recorded, {recorded.lost} lost")
     print(f"bag              {bag}")
     for figure in figures:

@@ -40,6 +40,7 @@ from gait_entrainment.walker import Stretch, WalkerRun
 from gait_entrainment_msgs.msg import AnkleTorque, GaitEvent, Progress
 from gait_entrainment_msgs.msg import TorqueProfile as TorqueProfileMessage
 from gait_entrainment_msgs.srv import StartRun
+from gait_entrainment_nodes.lateness import Lateness
 from gait_entrainment_nodes.node import Participant, declare, declare_fields, run_node
 from gait_entrainment_nodes.raw_messages import MessageTemplate, mark
 from gait_entrainment_nodes.stamps import header, to_nanoseconds, to_time
@@ -119,9 +120,10 @@ class WalkerSim(Participant, Node):
         self.grant = 0
         self.acknowledged_grants = 0
         self.granted: deque[tuple[int, bool]] = deque()  # lock-step: (until, last), not yet walked
-        self.end: int | None = None  # end of the run [ns since its start], once known
+        self.end_of_run: int | None = None  # end of the run [ns since its start], once known
         self.reproducible = True
         self.late = 0  # [ns] of promises that came after their instant
+        self.lateness = Lateness()  # real time: of samples, from due to published
         self.next_progress = 0  # [ns since the start]
 
         self.subscription(TORQUE_PROFILE, self.on_profile)
@@ -151,7 +153,8 @@ class WalkerSim(Participant, Node):
         else:
             self.start = LOCK_STEP_START * NANOSECONDS_PER_SECOND
         self.grant = self.acknowledged_grants = 0
-        self.end, self.reproducible, self.late, self.next_progress = None, True, 0, 0
+        self.end_of_run, self.reproducible, self.late, self.next_progress = None, True, 0, 0
+        self.lateness = Lateness()
         response.success, response.start = True, to_time(self.start)
         return response
 
@@ -178,15 +181,17 @@ class WalkerSim(Participant, Node):
             self.reproducible = False
             return
         until = to_nanoseconds(message.valid_until) - self.start
-        late = run.accept(
-            TorqueProfile(
-                Side(message.side),
-                tuple(to_nanoseconds(t) - self.start for t in message.times),
-                tuple(message.torques),
-                (),
-                until,
-            )
-        )
+        times = tuple(to_nanoseconds(t) - self.start for t in message.times)
+        late = 0
+        # A profile without length only says where the run ends.
+        if times != (until,):
+            try:
+                late = run.accept(
+                    TorqueProfile(Side(message.side), times, tuple(message.torques), (), until)
+                )
+            except (ValueError, IndexError) as error:
+                self.failure = f"torque profile {message.revision} cannot be walked: {error}"
+                return
         if late:
             self.late += late
             self.reproducible = False
@@ -197,7 +202,7 @@ class WalkerSim(Participant, Node):
                 late_ms=late / 1e6,
             )
         if self.real_time:
-            self.end = until if message.last else None
+            self.end_of_run = until if message.last else None
         else:
             self.granted.append((until, message.last))
             self.walk_granted()
@@ -231,8 +236,8 @@ class WalkerSim(Participant, Node):
         if run is None or not self.real_time or run.ended:
             return None
         due = min(run.next_sample, self.next_progress)
-        if self.end is not None:
-            due = min(due, self.end)
+        if self.end_of_run is not None:
+            due = min(due, self.end_of_run)
         return (self.steady_offset + due) / NANOSECONDS_PER_SECOND
 
     def on_deadline(self) -> None:
@@ -242,8 +247,9 @@ class WalkerSim(Participant, Node):
         now = time.monotonic_ns() - self.steady_offset
         if now < 0:
             return
-        last = self.end is not None and now >= self.end
-        until = self.end if last and self.end is not None else now
+        end = self.end_of_run
+        last = end is not None and now >= end
+        until = now if end is None else min(now, end)
         starved = run.starved
         self.send(run.advance(until, last=last))
         if run.starved > starved:
@@ -307,8 +313,12 @@ class WalkerSim(Participant, Node):
         ):
             for message in messages:
                 publisher.publish(message)
+        if self.real_time:
+            published = time.monotonic_ns() - self.steady_offset
+            for instant in stretch.sample_times:
+                self.lateness.add((published - int(instant)) / NANOSECONDS_PER_SECOND)
 
-    def report_progress(self, run: WalkerRun) -> None:
+    def report_progress(self, run: WalkerRun, aborted: bool = False) -> None:
         """Tell how far everything has been sent; at the end of a run, how it ended."""
         stamp = self.start + run.reached
         message = Progress(
@@ -322,21 +332,38 @@ class WalkerSim(Participant, Node):
         if run.ending is not None:
             message.state = Progress.FELL if run.ending.kind == "fall" else Progress.FLEW_OFF
             message.message = run.ending.message
+        elif aborted:
+            message.state = Progress.ABORTED
+            message.message = "walker_sim was shut down"
         elif run.ended:
             message.state = Progress.FINISHED
         self.progress.publish(message)
         if self.clock_publisher is not None:
             self.clock_publisher.publish(ClockMessage(clock=to_time(stamp)))
         self.grant += 1
-        if run.ended:
-            self.publish_counts(self.run_number, stamp)
+        if message.state != Progress.WALKING:
             self.diagnose(
                 stamp,
                 DiagnosticStatus.OK if self.reproducible else DiagnosticStatus.WARN,
                 message.message or "finished",
                 late_ms=self.late / 1e6,
                 starved_ms=run.starved / 1e6,
+                **self.publish_lateness(),
             )
+            self.publish_counts(self.run_number, stamp)
+
+    def publish_lateness(self) -> dict[str, float]:
+        """Return how late samples were published, from the instant at which they were due."""
+        late = self.lateness
+        if not late.count:
+            return {}
+        quantiles = {"p50": late.quantile(0.5), "p99": late.quantile(0.99), "worst": late.worst}
+        return {f"publish_late_{name}_ms": 1e3 * value for name, value in quantiles.items()}
+
+    def on_stop(self) -> None:
+        """End of the process: say so where a run goes on."""
+        if self.run is not None and not self.run.ended:
+            self.report_progress(self.run, aborted=True)
 
     def _make_templates(self) -> None:
         marked = [[mark(i), 0.0, 0.0, 0.0] for i in range(3)]
