@@ -101,7 +101,8 @@ class WalkerParameters:
         if least >= most:
             raise ParameterError(
                 f"foot_length {self.foot_length:g} m is too long for legs of"
-                f" {self.leg_length:g} m; allowed: below {2 * self.leg_length * math.sin(most):g} m"
+                f" {self.leg_length:g} m; allowed:"
+                f" below {2 * self.leg_length * math.sin(most):g} m"
             )
         if not least < self.leg_angle < most:
             raise ParameterError(

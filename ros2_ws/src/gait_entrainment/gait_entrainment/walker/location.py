@@ -15,20 +15,23 @@
 """
 Where in a segment the walker is at a given time: the quadrature, inverted.
 
-A quintic through position, velocity and acceleration at both ends is a first guess. One quadrature
+A quintic through value, velocity and acceleration at both ends is a first guess. One quadrature
 tells the time at the guess, and the rest of the way is a second-order Taylor step in time, whose
 error is the cube of the time left.
 """
 
+import math
 from typing import Final
 
 from gait_entrainment.walker.compiled import compiled
+from gait_entrainment.walker.linkage import ankle_cosine
 from gait_entrainment.walker.model import Floats, Model
 from gait_entrainment.walker.segment import (
     SINGLE_STANCE,
     Segment,
     double_stance_time,
     motion,
+    sine_motion,
 )
 from gait_entrainment.walker.single_stance import pendulum_time
 
@@ -58,20 +61,41 @@ def travel_time_onward(
 
 
 @compiled
-def quintic(model: Model, segment: Segment, elapsed: float) -> float:
-    """Position at a time of the segment by Hermite interpolation between its ends."""
-    span = segment.duration
-    velocity_0, acceleration_0 = motion(model, segment, segment.position)
-    velocity_1, acceleration_1 = motion(model, segment, segment.end)
+def quintic(
+    span: float,
+    elapsed: float,
+    start: tuple[float, float, float],
+    end: tuple[float, float, float],
+) -> float:
+    """Value after `elapsed` of `span` [s], from value, velocity and acceleration at both ends."""
     s = elapsed / span
-    v0, v1 = velocity_0 * span, velocity_1 * span
-    a0, a1 = acceleration_0 * span * span, acceleration_1 * span * span
-    gap = segment.end - segment.position - v0 - 0.5 * a0
+    v0, v1 = start[1] * span, end[1] * span
+    a0, a1 = start[2] * span * span, end[2] * span * span
+    gap = end[0] - start[0] - v0 - 0.5 * a0
     speed, bend = v1 - v0 - a0, a1 - a0
     c3 = 10.0 * gap - 4.0 * speed + 0.5 * bend
     c4 = -15.0 * gap + 7.0 * speed - bend
     c5 = 6.0 * gap - 3.0 * speed + 0.5 * bend
-    return segment.position + s * (v0 + s * (0.5 * a0 + s * (c3 + s * (c4 + s * c5))))
+    return start[0] + s * (v0 + s * (0.5 * a0 + s * (c3 + s * (c4 + s * c5))))
+
+
+@compiled
+def guess(model: Model, segment: Segment, elapsed: float) -> float:
+    """
+    Position after `elapsed` seconds, by Hermite interpolation between the segment's ends.
+
+    In double stance of sin(theta), which is far smoother in time than psi.
+    """
+    low, high = segment.position, segment.end
+    if segment.phase == SINGLE_STANCE:
+        velocity_0, acceleration_0 = motion(model, segment, low)
+        velocity_1, acceleration_1 = motion(model, segment, high)
+        start, end = (low, velocity_0, acceleration_0), (high, velocity_1, acceleration_1)
+        return quintic(segment.duration, elapsed, start, end)
+    start, end = sine_motion(model, segment, low), sine_motion(model, segment, high)
+    sine = quintic(segment.duration, elapsed, start, end)
+    cosine = ankle_cosine(sine, model.leg_length, model.foot_length, model.separation)
+    return math.acos(max(-1.0, min(1.0, cosine)))
 
 
 @compiled
@@ -82,7 +106,7 @@ def position_at(model: Model, work: Floats, segment: Segment, elapsed: float) ->
         return low
     if elapsed >= segment.duration:
         return high
-    position = quintic(model, segment, elapsed)
+    position = guess(model, segment, elapsed)
     if not low < position < high:
         position = 0.5 * (low + high)
     left = elapsed - travel_time(model, work, segment, low, position)

@@ -24,7 +24,7 @@ there. So, with h = 1 - cos(theta),
 constant in single stance, and in double stance the spring's work is a parabola in psi.
 """
 
-from typing import NamedTuple
+from typing import Any, Final, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,9 +34,16 @@ from gait_entrainment.parameters import WalkerParameters, greatest
 
 Floats = NDArray[np.float64]
 
-# Gauss-Legendre nodes of one panel. At Table 1 the whole unperturbed double stance is one panel:
-# its integrand's Legendre coefficients fall by 3 each, so 24 nodes leave 3^-48 of it.
+# Gauss-Legendre nodes of one panel of double stance, and of a whole single stance. At Table 1 the
+# Legendre coefficients of the whole unperturbed double stance fall by 3 each, so 24 nodes leave
+# 3^-48 of it; those of single stance, which comes near a stall at the apex, fall by 2.2 each.
 PANEL_NODES = 24
+SINGLE_STANCE_NODES = 32
+
+# Rows of a quadrature rule.
+NODES: Final = 0
+WEIGHTS: Final = 1
+TAILS: Final = 2
 
 # A panel is accepted if its last two Legendre coefficients are this small beside its mean. They
 # fall like rho^-n and the quadrature error like rho^-2n, so the error is then about their square.
@@ -50,7 +57,7 @@ BOUNDED_PULSE = 0.25
 FORCE_MARGIN = 1e-6
 
 
-class Model(NamedTuple):
+class Model(Protocol):
     """Constants of one walker. Positions in double stance are psi, in single stance -theta."""
 
     mass: float
@@ -79,18 +86,17 @@ class Model(NamedTuple):
     """`apex` right after a collision in the period-one gait."""
     toe_off_half_sine: float
     """sin(theta / 2)^2 at toe-off."""
-    strike_half_sine: float
-    """sin(theta / 2)^2 at heel strike."""
-    nodes: Floats
-    weights: Floats
-    tails: Floats
-    """Weights (2, nodes) that give a panel's last two Legendre coefficients."""
-    whole_gain: Floats
-    """Gain in squared rate from heel strike to each node of the unperturbed double stance."""
-    whole_weights: Floats
-    """Weights of its duration, transmission included."""
-    whole_least_apex: float
-    """Above this `apex` the whole unperturbed double stance is one converged panel."""
+    strike_hold: float
+    """Force on the stance leg right before heel strike, but for the centrifugal part of apex."""
+    rule: Floats
+    """Gauss-Legendre panel, rows: nodes, weights, and what gives the last two coefficients."""
+    whole_double_stance: Floats
+    """The unperturbed double stance, rows: gain in squared rate since heel strike, weights."""
+    whole_double_stance_apex: float
+    """From this `apex` on up that quadrature has converged."""
+    whole_single_stance: Floats
+    """The same for a whole single stance."""
+    whole_single_stance_apex: float
     least_gain: float
     """Least gain in squared rate over the unperturbed double stance."""
     least_hold: float
@@ -100,24 +106,44 @@ class Model(NamedTuple):
     """The same with a pulse of `bounded_pulse` from heel strike on."""
 
 
-def _whole_least_apex(gain: Floats, transmission: Floats, weights: Floats, tails: Floats) -> float:
+# One record in memory, of which the compiled functions hand on the address only.
+_SHAPES: Final[dict[str, tuple[int, ...]]] = {
+    "rule": (4, PANEL_NODES),
+    "whole_double_stance": (2, PANEL_NODES),
+    "whole_single_stance": (2, SINGLE_STANCE_NODES),
+}
+MODEL = np.dtype([(name, np.float64, _SHAPES.get(name, ())) for name in Model.__annotations__])
+
+
+def _record(**values: Any) -> Model:
+    record = np.zeros(1, MODEL)[0]
+    for name in MODEL.fields or ():
+        record[name] = values.pop(name)
+    return cast(Model, record)
+
+
+def _gauss_legendre(count: int) -> Floats:
+    """Rows: nodes, weights, and the weights that give the last two Legendre coefficients."""
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    degrees = np.arange(count - 2, count)
+    last_two = np.polynomial.legendre.legvander(nodes, count - 1)[:, degrees].T
+    return np.vstack([nodes, weights, (degrees[:, None] + 0.5) * last_two * weights])
+
+
+def _converged_apex(whole: Floats, rule: Floats) -> float:
     """
-    Least `apex` from which on up the whole unperturbed double stance converges in one panel.
+    Least `apex` from which on up a fixed quadrature (rows: gain, weights) has converged.
 
     The slower the walk, the closer the integrand's singularity; so the first of these speeds (from
-    stall up, by 5 %) that a panel would accept, and every later one too.
+    a stall up, by 5 %) that a panel would accept, and every later one too.
     """
-    rates = np.geomspace(1e-3, 1e4, 331) * np.ptp(gain)
-    apexes = rates - gain.min()
-    integrand = transmission / np.sqrt(apexes[:, None] + gain)
-    mean = 0.5 * integrand @ weights
-    accepted = np.abs(integrand @ tails.T).sum(axis=1) < TAIL_TOLERANCE * mean
-    refused = np.flatnonzero(~accepted)
-    if refused.size == 0:
-        return float(apexes[0])
-    if refused[-1] + 1 == apexes.size:
-        return float("inf")
-    return float(apexes[refused[-1] + 1])
+    gain, weights = whole
+    apexes = np.geomspace(1e-3, 1e4, 331) * np.ptp(gain) - gain.min()
+    integrand = weights / rule[1] / np.sqrt(apexes[:, None] + gain)
+    tail = np.abs(integrand @ rule[2:].T).sum(axis=1)
+    refused = np.flatnonzero(tail > TAIL_TOLERANCE * 0.5 * (integrand @ rule[1]))
+    first = refused[-1] + 1 if refused.size else 0
+    return float(apexes[first]) if first < apexes.size else float("inf")
 
 
 def make_model(p: WalkerParameters) -> Model:
@@ -153,14 +179,17 @@ def make_model(p: WalkerParameters) -> Model:
         )
         return carried - arm * torque
 
-    nodes, weights = np.polynomial.legendre.leggauss(PANEL_NODES)
+    rule = _gauss_legendre(PANEL_NODES)
     half = 0.5 * (end - start)
-    psi = start + half + half * nodes
-    whole_gain = np.array([gain(x) for x in psi])
-    whole_weights = half * weights * np.array([transmission(x) for x in psi])
-    degrees = np.arange(PANEL_NODES - 2, PANEL_NODES)
-    tails = (degrees[:, None] + 0.5) * np.array(
-        [np.polynomial.legendre.Legendre.basis(n)(nodes) * weights for n in degrees]
+    psi = start + half + half * rule[0]
+    double_stance = np.array(
+        [[gain(x) for x in psi], [transmission(x) * half for x in psi] * rule[1]]
+    )
+    single_rule = _gauss_legendre(SINGLE_STANCE_NODES)
+    half = 0.5 * (p.leg_angle + p.toe_off_angle)
+    theta = p.toe_off_angle - half + half * single_rule[0]
+    single_stance = np.array(
+        [per_drop * geometry.drop(np.sin(theta), np.cos(theta)), half * single_rule[1]]
     )
     least_gain = -greatest(lambda x: -gain(x), start, end)
     pulse = BOUNDED_PULSE * p.peak_torque
@@ -173,7 +202,7 @@ def make_model(p: WalkerParameters) -> Model:
         end, toe_off, transmission(end), reach, *lengths
     )
     ankle_slope = (p.toe_off_angle + p.leg_angle) / transmission(end)
-    return Model(
+    return _record(
         mass=p.mass,
         leg_length=p.leg_length,
         foot_length=p.foot_length,
@@ -193,13 +222,14 @@ def make_model(p: WalkerParameters) -> Model:
         restitution=p.restitution**2,
         start_apex=(p.speed_after_collision / p.leg_length) ** 2 - per_drop * strike_drop,
         toe_off_half_sine=0.5 * geometry.drop(toe_off, np.sqrt(1 - toe_off**2)),
-        strike_half_sine=0.5 * strike_drop,
-        nodes=nodes,
-        weights=weights,
-        tails=tails,
-        whole_gain=whole_gain,
-        whole_weights=whole_weights,
-        whole_least_apex=_whole_least_apex(whole_gain, whole_weights / weights, weights, tails),
+        strike_hold=geometry.pendulum_force(
+            np.cos(p.leg_angle), per_drop * strike_drop, p.mass, p.gravity, p.leg_length
+        ),
+        rule=rule,
+        whole_double_stance=double_stance,
+        whole_double_stance_apex=_converged_apex(double_stance, rule),
+        whole_single_stance=single_stance,
+        whole_single_stance_apex=max(0.0, _converged_apex(single_stance, single_rule)),
         least_gain=least_gain,
         least_hold=-greatest(lambda x: -hold(x, 0.0), start, end) - FORCE_MARGIN,
         bounded_pulse=pulse,

@@ -23,7 +23,7 @@ from gait_entrainment.walker.model import Floats
 from gait_entrainment.walker.trajectory import Stamps
 
 # Before all time: the first entry, torque zero, so that every instant has an entry before it.
-_EVER = -(2**62)
+EVER = -(2**62)
 
 
 class PromisedTorque:
@@ -36,7 +36,7 @@ class PromisedTorque:
     def __init__(self) -> None:
         """Begin with nothing promised."""
         self.valid_until = 0
-        self._changes = [_EVER]
+        self._changes = [EVER]
         self._torques = [0.0]
         self._arrays: tuple[Stamps, Floats] | None = None
 

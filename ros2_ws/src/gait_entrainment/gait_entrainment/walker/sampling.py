@@ -19,9 +19,9 @@ Each sample follows from the start of its segment alone, never from the sample b
 instant gives the same bits however the instants are asked for.
 
 The massless swing leg has no dynamics. For display its hip and ankle follow a cubic in the
-progress of single stance, u = (theta_toe_off - theta) / (theta_toe_off + alpha), that leaves the posture of
-toe-off with its rates and arrives at the posture of the next heel strike, hip and ankle at alpha,
-with rate zero.
+progress of single stance, u = (theta_toe_off - theta) / (theta_toe_off + alpha), that leaves the
+posture of toe-off with its rates and arrives at the posture of the next heel strike, hip and ankle
+at alpha, with rate zero.
 """
 
 import math
@@ -43,7 +43,7 @@ from gait_entrainment.walker.location import position_at
 from gait_entrainment.walker.model import Floats, Model
 from gait_entrainment.walker.segment import (
     DOUBLE_STANCE,
-    WORK_ROWS,
+    WORK_SHAPE,
     Log,
     Segment,
     effective_torque,
@@ -132,17 +132,19 @@ def fill_samples(
     model: Model,
     log: Log,
     times: Stamps,
-    changes: tuple[Stamps, Stamps],
-    torques: tuple[Floats, Floats],
+    changes: Stamps,
+    torques: Floats,
+    right: int,
     table: Floats,
 ) -> None:
     """Fill the columns of `table` (ROWS, n), zero before, with the walker at `times` [ns]."""
-    work = np.empty((WORK_ROWS, model.nodes.size))
+    work = np.empty(WORK_SHAPE)
     after = log["after"]
     rows = np.searchsorted(after, times)
-    for side in range(2):
-        for i, change in enumerate(np.searchsorted(changes[side], times)):
-            table[DELIVERED + side, i] = torques[side][change - 1]
+    for i, change in enumerate(np.searchsorted(changes[:right], times)):
+        table[DELIVERED, i] = torques[change - 1]
+    for i, change in enumerate(np.searchsorted(changes[right:], times)):
+        table[DELIVERED + 1, i] = torques[right + change - 1]
     for i in range(times.size):
         segment = log[rows[i] - 1]
         elapsed = (times[i] - segment.stamp) / NANO - segment.rest

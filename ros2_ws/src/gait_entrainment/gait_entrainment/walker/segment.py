@@ -39,7 +39,16 @@ from gait_entrainment.walker.linkage import (
     torque_work,
     unloading_arm,
 )
-from gait_entrainment.walker.model import TAIL_TOLERANCE, Floats, Model
+from gait_entrainment.walker.model import (
+    NODES,
+    PANEL_NODES,
+    SINGLE_STANCE_NODES,
+    TAIL_TOLERANCE,
+    TAILS,
+    WEIGHTS,
+    Floats,
+    Model,
+)
 
 # The compiled functions read plain integers; the enumerations name them for everyone else.
 DOUBLE_STANCE: Final = 0
@@ -111,7 +120,7 @@ NARROWEST_PANEL: Final = 1e-12
 OFFSET: Final = 0
 STRETCH: Final = 1
 TIME: Final = 2
-WORK_ROWS: Final = 3
+WORK_SHAPE: Final = (3, max(PANEL_NODES, SINGLE_STANCE_NODES))
 
 
 @compiled
@@ -188,6 +197,22 @@ def motion(model: Model, segment: Segment, position: float) -> tuple[float, floa
 
 
 @compiled
+def sine_motion(model: Model, segment: Segment, position: float) -> tuple[float, float, float]:
+    """
+    sin(theta), its velocity and its acceleration at a position of double stance.
+
+    theta_ddot is half the derivative of theta_dot^2 by theta.
+    """
+    sine = leg_sine_at(model, DOUBLE_STANCE, position)
+    cosine = math.sqrt(1.0 - sine * sine)
+    slope = leg_per_ankle(math.sin(position), cosine, model.foot_length, model.separation)
+    square = max(0.0, squared_rate(model, segment, position))
+    push = model.per_energy * effective_torque(segment, position) / slope
+    acceleration = 0.5 * (model.per_drop * sine - push)
+    return sine, -cosine * math.sqrt(square), cosine * acceleration - sine * square
+
+
+@compiled
 def panel(
     model: Model, work: Floats, segment: Segment, start: float, end: float, up_to_stall: bool
 ) -> tuple[float, bool]:
@@ -199,21 +224,22 @@ def panel(
     it has an inverse square root, the variable is sqrt(stall - psi) and the integrand smooth.
     """
     offset, stretch, time = work[OFFSET], work[STRETCH], work[TIME]
+    nodes = model.rule[NODES]
     middle, half = 0.5 * (start + end), 0.5 * (end - start)
     if up_to_stall:
         centre = segment.end - 0.5 * (start * start + end * end)
-        for i in range(model.nodes.size):
-            root = middle + half * model.nodes[i]
+        for i in range(nodes.size):
+            root = middle + half * nodes[i]
             offset[i] = segment.end - root * root - centre
             stretch[i] = -2.0 * root
     else:
         centre = middle
-        for i in range(model.nodes.size):
-            offset[i] = half * model.nodes[i]
+        for i in range(nodes.size):
+            offset[i] = half * nodes[i]
             stretch[i] = 1.0
     sin_centre, cos_centre = math.sin(centre), math.cos(centre)
     rotation = centre - segment.position
-    for i in range(model.nodes.size):
+    for i in range(nodes.size):
         x = offset[i]
         s, c = short_sine(x), short_cosine(x)
         sin_ankle = sin_centre * c + cos_centre * s
@@ -224,13 +250,26 @@ def panel(
         square = segment.apex + model.per_energy * gain + model.per_drop * drop(sine, cosine)
         slope = leg_per_ankle(sin_ankle, cosine, model.foot_length, model.separation)
         time[i] = stretch[i] * slope / math.sqrt(square)
-    total, tail_1, tail_2 = 0.0, 0.0, 0.0
-    for i in range(model.nodes.size):
-        total += model.weights[i] * time[i]
-        tail_1 += model.tails[0, i] * time[i]
-        tail_2 += model.tails[1, i] * time[i]
-    converged = abs(tail_1) + abs(tail_2) <= 0.5 * TAIL_TOLERANCE * abs(total)
-    return half * total, converged
+    weights, tails = model.rule[WEIGHTS], model.rule[TAILS:]
+    for i in range(nodes.size):
+        offset[i] = tails[0, i] * time[i]
+        stretch[i] = tails[1, i] * time[i]
+        time[i] = weights[i] * time[i]
+    total = ordered_sum(time, nodes.size)
+    tail = abs(ordered_sum(offset, nodes.size)) + abs(ordered_sum(stretch, nodes.size))
+    return half * total, tail <= 0.5 * TAIL_TOLERANCE * abs(total)
+
+
+@compiled
+def ordered_sum(values: Floats, count: int) -> float:
+    """Sum of the first `count` values, a multiple of 4, as four sums side by side."""
+    s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
+    for i in range(0, count, 4):
+        s0 += values[i]
+        s1 += values[i + 1]
+        s2 += values[i + 2]
+        s3 += values[i + 3]
+    return (s0 + s1) + (s2 + s3)
 
 
 @compiled

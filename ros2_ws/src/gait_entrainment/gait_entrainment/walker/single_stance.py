@@ -25,9 +25,14 @@ integrals, 1995; DLMF 19.29.4), accurate to rounding also beside a stall, where 
 """
 
 import math
+from typing import Final
 
 from gait_entrainment.walker.compiled import compiled
 from gait_entrainment.walker.model import Model
+
+# Turning points this close to the apex, as sin(theta / 2)^2, are not told apart: the last of the
+# way there takes the longer the closer it is, forever at the apex itself.
+NEAREST_TURN: Final = 1e-60
 
 
 @compiled
@@ -69,12 +74,18 @@ def time_from_apex(per_drop: float, apex: float, half_sine: float) -> float:
 
 
 @compiled
-def time_on_one_side(per_drop: float, apex: float, low: float, high: float) -> float:
-    """Time [s] between two angles on one side of the apex, sin(theta / 2)^2 = low < high."""
+def time_on_one_side(
+    per_drop: float, apex: float, low: float, high: float, low_square: float
+) -> float:
+    """
+    Time [s] between two angles on one side of the apex, sin(theta / 2)^2 = low < high.
+
+    `low_square` is the squared rate at `low`: at a turning point that is zero, which the energy
+    would give with an error whose root shows in the time.
+    """
     low_1, high_1 = math.sqrt(low), math.sqrt(high)
     low_2, high_2 = math.sqrt(1.0 - low), math.sqrt(1.0 - high)
-    # At a turning point the rate is zero, and rounding may make its square negative.
-    low_3 = math.sqrt(max(0.0, apex + 2.0 * per_drop * low))
+    low_3 = math.sqrt(low_square)
     high_3 = math.sqrt(max(0.0, apex + 2.0 * per_drop * high))
     width = high - low
     u12 = (high_1 * high_2 * low_3 + low_1 * low_2 * high_3) / width
@@ -98,20 +109,18 @@ def pendulum_time(per_drop: float, apex: float, start: float, end: float) -> flo
         return 0.0
     if start < 0.0 < end:
         return time_from_apex(per_drop, apex, first) + time_from_apex(per_drop, apex, last)
-    return time_on_one_side(per_drop, apex, min(first, last), max(first, last))
+    low, high = min(first, last), max(first, last)
+    return time_on_one_side(per_drop, apex, low, high, max(0.0, apex + 2.0 * per_drop * low))
 
 
 @compiled
-def whole_single_stance_time(model: Model, apex: float) -> float:
-    """Duration [s] of a single stance from toe-off before the apex to heel strike; apex > 0."""
-    rise = time_from_apex(model.per_drop, apex, model.toe_off_half_sine)
-    return rise + time_from_apex(model.per_drop, apex, model.strike_half_sine)
-
-
-@compiled
-def turning_position(per_drop: float, apex: float) -> float:
-    """Position before the apex at which a walker with apex < 0 comes to rest."""
-    return -2.0 * math.asin(math.sqrt(-apex / (2.0 * per_drop)))
+def turning_point(model: Model, apex: float) -> tuple[float, float]:
+    """Where before the apex a walker with apex <= 0 comes to rest, and how long after toe-off."""
+    low = max(-apex / (2.0 * model.per_drop), NEAREST_TURN)
+    high = model.toe_off_half_sine
+    if low >= high:
+        return model.toe_off_position, 0.0
+    return -2.0 * math.asin(math.sqrt(low)), time_on_one_side(model.per_drop, apex, low, high, 0.0)
 
 
 @compiled

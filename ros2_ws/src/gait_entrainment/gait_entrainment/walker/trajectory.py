@@ -16,13 +16,14 @@
 From switch to switch: the loop that every use of the walker runs.
 
 The perturbation is a list of changes for each side: from the stamp `changes[i]` on the torque is
-`torques[i]`; the first entry lies before all time with torque zero, and neighbours differ. A gait
-event comes before a torque change of the same stamp, and a change acts only on what comes after
-its stamp. So all that happens up to a stamp depends on the torque before it alone, and an event can be
-told as soon as that is promised.
+`torques[i]`. Both sides share the arrays, the left one first, the right one from index `right` on;
+each begins with an entry before all time, torque zero, and neighbours differ. A gait event comes
+before a torque change of the same stamp, and a change acts only on what comes after its stamp. So
+all that happens up to a stamp depends on the torque before it alone, and an event can be told as
+soon as that is promised.
 """
 
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,7 @@ from gait_entrainment.walker.segment import (
     FLY_OFF,
     HEEL_STRIKE,
     TOE_OFF,
-    WORK_ROWS,
+    WORK_SHAPE,
     Log,
     Segment,
 )
@@ -60,21 +61,22 @@ HELD: Final = 1
 ENDED: Final = 2
 
 
-class Perturbation(NamedTuple):
-    """Torque changes of both sides: stamps [ns] and the torques [N m] that hold from them on."""
-
-    left_changes: Stamps
-    left_torques: Floats
-    right_changes: Stamps
-    right_torques: Floats
+@compiled
+def first_cursors(right: int) -> Stamps:
+    """Index of each side's first change."""
+    cursors = np.zeros(2, np.int64)
+    cursors[1] = right
+    return cursors
 
 
 @compiled
-def skip_changes(changes: Stamps, index: int, after: int) -> int:
-    """Index of the first change later than the stamp `after`, searched from `index` on."""
-    while index < changes.size and changes[index] <= after:
+def skip_changes(changes: Stamps, right: int, cursors: Stamps, side: int, after: int) -> bool:
+    """Move a side's cursor to its first change later than `after`; whether there is one."""
+    index, end = cursors[side], right if side == 0 else changes.size
+    while index < end and changes[index] <= after:
         index += 1
-    return index
+    cursors[side] = index
+    return bool(index < end)
 
 
 @compiled
@@ -82,8 +84,9 @@ def proceed(
     model: Model,
     work: Floats,
     segment: Segment,
-    changes: tuple[Stamps, Stamps],
-    torques: tuple[Floats, Floats],
+    changes: Stamps,
+    torques: Floats,
+    right: int,
     cursors: Stamps,
     until: int,
 ) -> int:
@@ -96,16 +99,16 @@ def proceed(
     end_stamp = rounded_stamp(seconds(end, rest))
     trailing = 1 - segment.leading
     if segment.phase == DOUBLE_STANCE:
-        cursors[trailing] = skip_changes(changes[trailing], cursors[trailing], segment.after)
+        ahead = skip_changes(changes, right, cursors, trailing, segment.after)
         index = cursors[trailing]
-        if index < changes[trailing].size and changes[trailing][index] < end_stamp:
-            stamp = changes[trailing][index]
+        if ahead and changes[index] < end_stamp:
+            stamp = changes[index]
             if stamp >= until:
                 return HELD
             elapsed = (stamp - segment.stamp) / NANO - segment.rest
             position = position_at(model, work, segment, elapsed)
             segment.stamp, segment.rest, segment.after = stamp, 0.0, stamp
-            change_torque(model, segment, position, torques[trailing][index], work)
+            change_torque(model, segment, position, torques[index], work)
             return SWITCHED
     if end_stamp > until:
         return HELD
@@ -115,11 +118,10 @@ def proceed(
     segment.after = max(segment.after, end_stamp - 1)
     if segment.ends == HEEL_STRIKE:
         # The stance leg now trails: its torque is what held before this stamp.
-        side = segment.leading
-        cursors[side] = skip_changes(changes[side], cursors[side], segment.after)
-        collide(model, segment, torques[side][cursors[side] - 1], work)
+        skip_changes(changes, right, cursors, segment.leading, segment.after)
+        collide(model, segment, torques[cursors[segment.leading] - 1], work)
     elif segment.ends == TOE_OFF:
-        leave_double_stance(model, segment)
+        leave_double_stance(model, segment, work)
     else:
         unload(model, segment, work)
     return SWITCHED
@@ -130,8 +132,9 @@ def advance(
     model: Model,
     log: Log,
     count: int,
-    changes: tuple[Stamps, Stamps],
-    torques: tuple[Floats, Floats],
+    changes: Stamps,
+    torques: Floats,
+    right: int,
     until: int,
 ) -> tuple[int, int]:
     """
@@ -139,11 +142,11 @@ def advance(
 
     Returns the new count and HELD, ENDED, or SWITCHED where the log is full.
     """
-    work = np.empty((WORK_ROWS, model.nodes.size))
-    cursors = np.zeros(2, np.int64)
+    work = np.empty(WORK_SHAPE)
+    cursors = first_cursors(right)
     while count < log.size:
         log[count] = log[count - 1]
-        outcome = proceed(model, work, log[count], changes, torques, cursors, until)
+        outcome = proceed(model, work, log[count], changes, torques, right, cursors, until)
         if outcome != SWITCHED:
             return count, outcome
         count += 1
@@ -153,7 +156,7 @@ def advance(
 @compiled
 def start_walking(model: Model, segment: Segment, leading: int, rate: float) -> None:
     """Write the first segment: right after heel strike 0 of `leading`, theta_dot = -rate."""
-    work = np.empty((WORK_ROWS, model.nodes.size))
+    work = np.empty(WORK_SHAPE)
     segment.stamp, segment.rest, segment.after = 0, 0.0, -1
     segment.began, segment.leading, segment.step = HEEL_STRIKE, leading, 1
     segment.apex = rate * rate - model.per_drop * model.strike_drop

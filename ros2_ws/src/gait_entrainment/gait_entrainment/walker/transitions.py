@@ -30,6 +30,8 @@ these switches comes first if the perturbation stays as it is, where, and when.
 import math
 from typing import Final
 
+import numpy as np
+
 from gait_entrainment.walker.compiled import compiled
 from gait_entrainment.walker.linkage import torque_work
 from gait_entrainment.walker.model import Floats, Model
@@ -46,13 +48,13 @@ from gait_entrainment.walker.segment import (
     double_stance_time,
     gained_apex,
     leading_force,
+    ordered_sum,
     squared_rate,
 )
 from gait_entrainment.walker.single_stance import (
     lift_off_position,
     pendulum_time,
-    turning_position,
-    whole_single_stance_time,
+    turning_point,
 )
 
 NANO: Final = 1e9
@@ -87,7 +89,7 @@ def enter_double_stance(model: Model, segment: Segment, perturbation: float, wor
 
 
 @compiled
-def leave_double_stance(model: Model, segment: Segment) -> None:
+def leave_double_stance(model: Model, segment: Segment, work: Floats) -> None:
     """Toe-off: the ankle torque ends, also where a pulse is still on."""
     segment.apex = gained_apex(model, segment, segment.end)
     segment.phase = SINGLE_STANCE
@@ -96,7 +98,7 @@ def leave_double_stance(model: Model, segment: Segment) -> None:
     segment.torque = 0.0
     segment.stiffness = 0.0
     segment.began = TOE_OFF
-    look_ahead_single_stance(model, segment)
+    look_ahead_single_stance(model, segment, work)
 
 
 @compiled
@@ -135,24 +137,24 @@ def load(model: Model, segment: Segment) -> None:
 
 
 @compiled
-def look_ahead_single_stance(model: Model, segment: Segment) -> None:
+def look_ahead_single_stance(model: Model, segment: Segment, work: Floats) -> None:
     """Heel strike, unless the walker turns back before the apex or flies off after it."""
     segment.ends = HEEL_STRIKE
     segment.end = model.strike_position
     segment.shortfall = 0.0
     if segment.apex <= 0.0 and model.toe_off_position < 0.0:
         segment.ends = FALL
-        segment.end = turning_position(model.per_drop, segment.apex)
+        segment.end, segment.duration = turning_point(model, segment.apex)
         segment.shortfall = -segment.apex / model.per_energy
-    else:
-        # The mass is lowest and fastest at heel strike, so the force is least there.
-        force = leading_force(model, segment, segment.end)
-        if force < 0.0:
-            segment.ends = FLY_OFF
-            segment.end = max(segment.position, lift_off_position(model, segment.apex))
-            segment.shortfall = -force
-    if segment.ends == HEEL_STRIKE and segment.apex > 0.0 and model.toe_off_position < 0.0:
-        segment.duration = whole_single_stance_time(model, segment.apex)
+        return
+    # The mass is lowest and fastest at heel strike, so the force is least there.
+    force = model.strike_hold - model.mass * model.leg_length * segment.apex
+    if force < 0.0:
+        segment.ends = FLY_OFF
+        segment.end = max(segment.position, lift_off_position(model, segment.apex))
+        segment.shortfall = -force
+    if segment.ends == HEEL_STRIKE and segment.apex >= model.whole_single_stance_apex:
+        segment.duration = whole_time(model.whole_single_stance, work, segment.apex)
     else:
         segment.duration = pendulum_time(
             model.per_drop, segment.apex, segment.position, segment.end
@@ -175,24 +177,21 @@ def look_ahead_double_stance(model: Model, segment: Segment, work: Floats) -> No
         segment.position == model.double_stance_start
         and segment.ends == TOE_OFF
         and segment.perturbation == 0.0
-        and segment.apex >= model.whole_least_apex
+        and segment.apex >= model.whole_double_stance_apex
     )
     if whole:
-        segment.duration = whole_double_stance_time(model, work, segment.apex)
+        segment.duration = whole_time(model.whole_double_stance, work, segment.apex)
     else:
         segment.duration = double_stance_time(model, work, segment, segment.position, segment.end)
 
 
 @compiled
-def whole_double_stance_time(model: Model, work: Floats, apex: float) -> float:
-    """Duration [s] of an unperturbed double stance: one panel whose geometry was made once."""
-    time = work[0]
-    for i in range(model.nodes.size):
-        time[i] = model.whole_weights[i] / math.sqrt(apex + model.whole_gain[i])
-    total = 0.0
-    for i in range(model.nodes.size):
-        total += time[i]
-    return total
+def whole_time(whole: Floats, work: Floats, apex: float) -> float:
+    """Duration [s] of a whole phase: one quadrature whose geometry was made once."""
+    gain, weights, time = whole[0], whole[1], work[0]
+    for i in range(gain.size):
+        time[i] = weights[i] / math.sqrt(apex + gain[i])
+    return ordered_sum(time, gain.size)
 
 
 @compiled
@@ -309,7 +308,7 @@ def clock(stamp: int, rest: float, elapsed: float) -> tuple[int, float]:
     A double that counts seconds would lose 3e-14 s at each addition after 150 s; this loses none.
     """
     time = rest + elapsed
-    whole = math.floor(time * NANO + 0.5)
+    whole = int(np.rint(time * NANO))
     return stamp + whole, time - whole / NANO
 
 
@@ -322,8 +321,4 @@ def seconds(stamp: int, rest: float) -> float:
 @compiled
 def rounded_stamp(time: float) -> int:
     """Nanoseconds of an instant [s], to the nearest, ties to even: `conventions.nanoseconds`."""
-    scaled = time * NANO
-    whole = math.floor(scaled)
-    over = scaled - whole
-    odd = math.floor(0.5 * whole) * 2.0 != whole
-    return int(whole) + (1 if over > 0.5 or (over == 0.5 and odd) else 0)
+    return int(np.rint(time * NANO))

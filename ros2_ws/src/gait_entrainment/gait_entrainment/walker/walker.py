@@ -177,13 +177,13 @@ class Walker:
             raise ValueError(f"the walker is at {self.time_reached} ns, past {until_ns} ns")
         self._forget()
         self._sampled_from = self.time_reached
-        changes, torques = self._arrays()
+        perturbation = self._perturbation()
         outcome = SWITCHED
         while outcome == SWITCHED:
             if self._count == self._log.size:
                 self._log = np.concatenate([self._log, np.zeros_like(self._log)])
             self._count, outcome = advance(
-                self._model, self._log, self._count, changes, torques, int(until_ns)
+                self._model, self._log, self._count, *perturbation, int(until_ns)
             )
         self.time_reached = int(until_ns)
         if outcome == ENDED:
@@ -209,15 +209,14 @@ class Walker:
                 f" stretch, {self._sampled_from} to {self.time_reached} ns"
             )
         table = np.zeros((ROWS, times.size))
-        changes, torques = self._arrays()
-        fill_samples(self._model, self._log[: self._count], times, changes, torques, table)
+        fill_samples(self._model, self._log[: self._count], times, *self._perturbation(), table)
         return samples_from_table(table)
 
-    def _arrays(self) -> tuple[tuple[Stamps, Stamps], tuple[Floats, Floats]]:
-        (left_changes, left_torques), (right_changes, right_torques) = (
-            promise.arrays() for promise in self._promises
-        )
-        return (left_changes, right_changes), (left_torques, right_torques)
+    def _perturbation(self) -> tuple[Stamps, Floats, int]:
+        """Torque changes of both ankles, as `trajectory` wants them."""
+        left, right = (promise.arrays() for promise in self._promises)
+        changes, torques = (np.concatenate(pair) for pair in zip(left, right, strict=True))
+        return changes, torques, left[0].size
 
     def _forget(self) -> None:
         """Keep of the log and the torque only what the coming stretch and its samples need."""
