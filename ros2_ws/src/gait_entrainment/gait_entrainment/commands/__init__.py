@@ -19,11 +19,16 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import entry_points
 
-from gait_entrainment.commands import simulate
+from gait_entrainment.commands import analyze, bag, paper, simulate
 
 # Commands of other packages, such as those that need ROS, are found under this entry point.
 ENTRY_POINTS = "gait_entrainment.commands"
-COMMANDS = {"simulate": simulate.add_command}
+COMMANDS = {
+    "simulate": simulate.add_command,
+    "analyze": analyze.add_command,
+    "bag": bag.add_command,
+    "paper": paper.add_command,
+}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

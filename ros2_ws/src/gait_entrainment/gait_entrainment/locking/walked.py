@@ -74,11 +74,13 @@ class PulsedWalk:
 
     @property
     def lags(self) -> Floats:
-        """Pulse onset minus the nearest toe-off of the perturbed leg."""
+        """Pulse onset minus the nearest toe-off of the perturbed leg; NaN if that is not known."""
         onsets = self.onsets[self.onsets <= self.toe_offs[-1]]
         after = np.clip(np.searchsorted(self.toe_offs, onsets), 1, self.toe_offs.size - 1)
         before, following = onsets - self.toe_offs[after - 1], onsets - self.toe_offs[after]
         lags: Floats = np.where(before <= -following, before, following)
+        # A stride before the first toe-off of the walk there was another one.
+        lags[onsets < self.toe_offs[0] - self.stride_periods[0] / 2] = np.nan
         return lags
 
     @property

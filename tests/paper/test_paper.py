@@ -1,0 +1,84 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The published numbers: which of ours agree, and that the differences are explained."""
+
+import json
+
+import pytest
+
+from gait_entrainment.commands import main
+from gait_entrainment.paper import compare, explain
+
+
+@pytest.fixture(scope="module")
+def published():
+    return {row.name: row for row in compare()}
+
+
+@pytest.fixture(scope="module")
+def explanations():
+    return {row.name: row for row in explain()}
+
+
+DIFFERENT = {
+    "peak ankle torque": 133.4645,
+    "smallest force F_B on the leading leg": 149.3087,
+    "basin of entrainment, solved": 4.1045,
+    "Fig. 7: stride period converges to 2 tau_0 - 50 ms": 1.88323,
+}
+
+
+def test_everything_published_agrees_but_for_four_known_numbers(published):
+    assert {row.name for row in published.values() if row.agrees is False} == set(DIFFERENT)
+    for name, value in DIFFERENT.items():
+        assert published[name].ours == pytest.approx(value, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    "what",
+    ["2 tau_0 - 50 ms", "smallest F_B", "peak ankle torque", "just-vault-over stiffness"],
+)
+def test_k_and_mu_unrounded_together_give_the_papers_digits(explanations, what):
+    assert explanations[f"both unrounded: {what}"].agrees
+
+
+def test_neither_of_them_alone_does(explanations):
+    for name in ("k unrounded", "mu unrounded"):
+        assert not explanations[f"{name}: 2 tau_0 - 50 ms"].agrees
+
+
+def test_a_grid_of_4_ms_explains_the_basin_and_rounding_does_not(published, explanations):
+    assert published["basin of entrainment, walked on a grid of 4 ms"].agrees
+    assert not explanations["both unrounded: basin of entrainment, solved"].agrees
+
+
+def test_less_than_9_percent_is_tight_for_pulses_in_every_step_only(published):
+    every_stride = published["Fig. 8, pulse in every stride: range of average speeds"]
+    every_step = published["Fig. 8, pulse in every step: range of average speeds"]
+    assert every_stride.ours == pytest.approx(4.280, abs=1e-3)
+    assert every_step.ours == pytest.approx(8.622, abs=1e-3)
+
+
+def test_command_draws_every_figure_and_prints_json(tmp_path, capsys, monkeypatch, published):
+    # The numbers are made above; here only what the command does with them.
+    rows = list(published.values())
+    monkeypatch.setattr("gait_entrainment.paper.compare", lambda: rows)
+    assert main(["paper", "--json", "--out", str(tmp_path / "figures")]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert set(printed[0]) == {"name", "paper", "ours", "unit", "agrees", "note"}
+    drawn = {path.name for path in (tmp_path / "figures").iterdir()}
+    names = ("figure_4", "figure_5", "figure_6b", "figure_7", "figure_8")
+    assert drawn == {name + ending for name in names for ending in (".png", ".svg")}
+    assert all(path.stat().st_size > 10_000 for path in (tmp_path / "figures").iterdir())
