@@ -22,7 +22,7 @@ which a lock-step run drives them. So both give the same events to the nanosecon
 from dataclasses import dataclass
 
 from gait_entrainment.analysis import Analysis, VerdictSettings, analyze
-from gait_entrainment.device import DeviceLimits, PulseTrain, find_driver
+from gait_entrainment.device import DeviceLimits, LimitError, PulseTrain, find_driver
 from gait_entrainment.events import GaitEvent
 from gait_entrainment.experiment import Conductor
 from gait_entrainment.protocol import Protocol
@@ -58,8 +58,16 @@ def simulate(
         where the pulses would overlap at the measured period.
 
     """
-    robot = find_driver(protocol.driver)(protocol.side, 0, limits)
+    driver = find_driver(protocol.driver)
+    if not driver.simulated:
+        raise LimitError(
+            f"driver: {driver.name} runs in real time only; use entrain run --real-time"
+        )
+    robot = driver.make(protocol.side, limits, protocol.seed)
     robot.limits.check_pulse(protocol.pulse_torque, protocol.pulses.width)
+    robot.configure()
+    robot.activate()
+    robot.begin(0)
     conductor = Conductor(protocol)
     run = WalkerRun(protocol.walker, first_heel_strike=protocol.side, sample_rate=None)
     events: list[GaitEvent] = []

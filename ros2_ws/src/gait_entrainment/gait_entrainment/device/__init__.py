@@ -14,17 +14,32 @@
 
 """The ankle robot: pulse trains in, promised torque profiles out."""
 
-from gait_entrainment.device.drivers import find_driver
+from gait_entrainment.device.drivers import Driver, driver_names, find_driver
+from gait_entrainment.device.faults import DeviceError, Fault, LimitError
+from gait_entrainment.device.guard import GuardedRobot
 from gait_entrainment.device.ideal import IdealAnkleRobot
-from gait_entrainment.device.limits import DeviceLimits, LimitError
+from gait_entrainment.device.limits import DeviceLimits
 from gait_entrainment.device.profile import TorqueProfile
 from gait_entrainment.device.pulse_train import PulseTrain
+from gait_entrainment.device.robot import AnkleRobot, Capabilities, RobotState
+from gait_entrainment.device.timing import PulseTiming, TimingAudit, measured_onset
 
 __all__ = [
+    "AnkleRobot",
+    "Capabilities",
+    "DeviceError",
     "DeviceLimits",
+    "Driver",
+    "Fault",
+    "GuardedRobot",
     "IdealAnkleRobot",
     "LimitError",
+    "PulseTiming",
     "PulseTrain",
+    "RobotState",
+    "TimingAudit",
     "TorqueProfile",
+    "driver_names",
     "find_driver",
+    "measured_onset",
 ]

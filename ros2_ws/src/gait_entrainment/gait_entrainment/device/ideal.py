@@ -13,95 +13,73 @@
 # limitations under the License.
 
 """
-The ideal ankle robot: delivers exactly the commanded square pulses, without delay.
+The ideal ankle robot: delivers exactly the commanded pulses, without delay.
 
 Not modelled: torque bandwidth, delay, jitter, noise, resolution, the robot's own inertia and
-friction, a lost command.
+friction, a lost command, and how the torque runs down after a stop.
 """
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.device.limits import DeviceLimits, LimitError
 from gait_entrainment.device.profile import TorqueProfile
 from gait_entrainment.device.pulse_train import PulseTrain
+from gait_entrainment.device.robot import AnkleRobot, Capabilities, RobotState
+
+# A flank is delivered in steps of this length [ns], each at the flank's mean torque in it.
+_STEP = 1_000_000
 
 
-class IdealAnkleRobot:
-    """
-    Turns one pulse train at a time into adjoining torque profiles.
+@dataclass(frozen=True)
+class IdealOptions:
+    """The ideal robot has nothing to choose."""
 
-    Parameters
-    ----------
-    side
-        The ankle on which the robot sits.
-    start
-        Start of the run [ns]: the first profile begins there.
-    limits
-        What may be asked of it.
 
-    """
+class IdealAnkleRobot(AnkleRobot):
+    """See the module's docstring."""
 
-    def __init__(self, side: Side, start: int, limits: DeviceLimits | None = None) -> None:
-        self.side = side
-        self.limits = limits or DeviceLimits()
-        self.promised_until = start  # everything before this instant is promised [ns]
-        self.delivered = 0  # pulses of the train whose onset has been promised
-        self.train: PulseTrain | None = None  # the one scheduled last
+    Options = IdealOptions
+    capabilities = Capabilities(
+        peak_torque=math.inf,
+        torque_rate=math.inf,
+        own_pulse_timer=True,
+        measures_torque=False,
+        simulated=True,
+        state_rate=0.0,
+    )
+
+    def __init__(self, side: Side, options: IdealOptions, seed: int) -> None:  # noqa: ARG002
+        self._side = side
+        self._train: PulseTrain | None = None
+        self._promised = 0
+        self._states: list[RobotState] = []
+
+    def configure(self) -> None:
+        """Nothing to connect."""
+
+    def activate(self) -> None:
+        """Nothing to enable."""
+
+    def begin(self, start: int) -> None:
+        """Start a run."""
+        self._train, self._promised, self._states = None, start, []
 
     def schedule(self, train: PulseTrain) -> None:
-        """
-        Accept a train of pulses.
-
-        Raises
-        ------
-        LimitError
-            where the train is outside the limits, is for the other ankle, begins before what was
-            already promised, or where another train is still under way. Nothing changes then.
-
-        """
-        self.limits.check(train)
-        if train.side is not self.side:
-            raise LimitError(f"side: {train.side.name.lower()}; the robot sits on the other ankle")
-        if self.busy:
-            raise LimitError("a pulse train is under way; allowed: one at a time")
-        if train.first_onset < self.promised_until:
-            late = (self.promised_until - train.first_onset) / 1e9
-            raise LimitError(f"first_onset: lies {late:g} s inside what is already promised")
-        self.train = train
-        self.delivered = 0
-
-    @property
-    def busy(self) -> bool:
-        """Whether some pulse of the train has not been promised to its end."""
-        train = self.train
-        return train is not None and train.end(train.count - 1) > self.promised_until
-
-    @property
-    def committed(self) -> bool:
-        """Whether torque may still come: of a train under way, or promised and not yet over."""
-        return self.train is not None
+        """Take over a train."""
+        self._train = train
 
     def cancel(self) -> None:
-        """Forget the train: profiles from now on hold no torque."""
-        self.train = None
+        """Drop the train: profiles from now on hold no torque."""
+        self._train = None
 
     def promise(self, until: int) -> TorqueProfile:
-        """
-        Return the torque from the last promise up to ``until`` [ns], which becomes binding.
-
-        Raises
-        ------
-        ValueError
-            where ``until`` lies before the last promise.
-
-        """
-        begin = self.promised_until
-        if until < begin:
-            raise ValueError(f"a promise up to {until} ns would take back one up to {begin} ns")
+        """Return the torque from the last promise up to ``until`` [ns]."""
+        begin = self._promised
         times, torques, onsets = [begin], [0.0], []
-        for onset, end, torque in self._pulses(begin, until):
-            for instant, value in ((onset, torque), (end, 0.0)):
+        for onset, pieces in self._pulses(begin, until):
+            for instant, value in pieces:
                 if instant <= begin:
                     torques[0] = value
                 elif instant < until:
@@ -109,19 +87,49 @@ class IdealAnkleRobot:
                     torques.append(value)
             if onset >= begin:
                 onsets.append(onset)
-        self.delivered += len(onsets)
-        self.promised_until = until
-        return TorqueProfile(self.side, tuple(times), tuple(torques), tuple(onsets), until)
+        self._promised = until
+        self._states += [
+            RobotState(instant, torque, torque, math.nan)
+            for instant, torque in zip(times, torques, strict=True)
+        ]
+        return TorqueProfile(self._side, tuple(times), tuple(torques), tuple(onsets), until)
 
-    def _pulses(self, begin: int, until: int) -> Iterator[tuple[int, int, float]]:
-        """Yield onset, end and torque of every pulse that is on somewhere in [begin, until)."""
-        train = self.train
+    def read(self) -> Sequence[RobotState]:
+        """Return one state for each change of torque."""
+        states, self._states = self._states, []
+        return states
+
+    def stop(self) -> None:
+        """Drop the train."""
+        self._train = None
+
+    def deactivate(self) -> None:
+        """Drop the train."""
+        self._train = None
+
+    def close(self) -> None:
+        """Drop the train."""
+        self._train = None
+
+    def _pulses(self, begin: int, until: int) -> Iterator[tuple[int, list[tuple[int, float]]]]:
+        """Yield onset and torque changes of every pulse that is on somewhere in [begin, until)."""
+        train = self._train
         if train is None:
             return
-        # The pulse promised last may still be on at the beginning of this stretch.
-        for number in range(max(self.delivered - 1, 0), train.count):
+        # The pulse that began last may still be on at the beginning of this stretch.
+        for number in range(max(train.latest(begin), 0), train.count):
             onset, end = train.onset(number), train.end(number)
             if onset >= until:
                 return
             if end > begin:
-                yield onset, end, train.torque
+                yield onset, [*_pieces(train, onset, end), (end, 0.0)]
+
+
+def _pieces(train: PulseTrain, onset: int, end: int) -> Iterator[tuple[int, float]]:
+    """Yield the instants [ns] and torques of one pulse: one piece, or steps along its flanks."""
+    if train.ramp == 0:
+        yield onset, train.torque
+        return
+    for instant in range(onset, end, _STEP):
+        middle = (instant + min(instant + _STEP, end)) // 2
+        yield instant, train.height_at(middle - onset)

@@ -15,31 +15,48 @@
 """Limits that every pulse train is held against before a robot sees it."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
+from gait_entrainment.device.faults import LimitError
 from gait_entrainment.device.pulse_train import PulseTrain
 
 
-class LimitError(ValueError):
-    """A pulse train outside the limits of the device; the message names field, value and limit."""
+def _limit(default: float, meaning: str, unit: str, low: float, high: float) -> Any:
+    return field(
+        default=default, metadata={"meaning": meaning, "unit": unit, "range": (low, high)}
+    )
 
 
 @dataclass(frozen=True)
 class DeviceLimits:
     """
-    What may be asked of an ankle robot.
+    What may be asked of an ankle robot, and when its silence counts as a fault.
 
     The default torque lies above the 13.3 N m of the paper's pulse and near the 23 N m of the
-    MIT Anklebot; it is a limit for the wearer, whatever the motor could do.
+    MIT Anklebot; it is a limit for the wearer, whatever the motor could do. The default impulse
+    is that of one pulse at both of its limits.
     """
 
-    torque: float = field(
-        default=30.0,
-        metadata={"meaning": "largest magnitude of a pulse", "unit": "N m", "range": (0.0, 200.0)},
+    torque: float = _limit(30.0, "largest magnitude of a pulse", "N m", 0.0, 200.0)
+    duration: float = _limit(0.5, "longest duration of a pulse", "s", 0.001, 10.0)
+    rate: float = _limit(
+        0.0,
+        "steepest flank of a pulse, which becomes a ramp; 0 leaves it square",
+        "N m/s",
+        0.0,
+        1e6,
     )
-    duration: float = field(
-        default=0.5,
-        metadata={"meaning": "longest duration of a pulse", "unit": "s", "range": (0.001, 10.0)},
+    impulse: float = _limit(15.0, "largest angular impulse within a stride", "N m s", 0.0, 1e3)
+    stride: float = _limit(
+        1.0, "time that counts as a stride: no longer than the wearer's shortest", "s", 0.1, 10.0
+    )
+    duty: float = _limit(0.5, "largest share of the time with torque", "1", 0.0, 1.0)
+    overshoot: float = _limit(
+        0.2, "share by which delivered torque and impulse may exceed their limits", "1", 0.0, 1.0
+    )
+    silence: float = _limit(
+        1.0, "longest silence of the experiment while torque may come (real time)", "s", 0.05, 60.0
     )
 
     def check_pulse(self, torque: float, duration: float) -> None:
@@ -58,6 +75,12 @@ class DeviceLimits:
                 f"width: {duration:g} s is outside the limit of the device; "
                 f"allowed: above 0 and at most {self.duration:g} s"
             )
+        self._check_impulse(abs(torque) * duration)
+        if self.rate and 2 * abs(torque) / self.rate > duration:
+            raise LimitError(
+                f"rate: a pulse of {duration:g} s does not reach {torque:g} N m at "
+                f"{self.rate:g} N m/s; allowed: wider, lower, or a higher limits.rate"
+            )
 
     def check(self, train: PulseTrain) -> None:
         """Raise LimitError where a train must not be delivered."""
@@ -68,4 +91,21 @@ class DeviceLimits:
             raise LimitError(
                 f"period: {train.period:g} s makes pulses of {train.duration:g} s overlap; "
                 "allowed: longer than a pulse"
+            )
+        if train.count > 1 and train.duration > self.duty * train.period:
+            raise LimitError(
+                f"duty: {train.duration / train.period:.3g} of the time with torque; "
+                f"allowed: at most {self.duty:g}"
+            )
+        self._check_impulse(train.impulse_within(self.stride))
+
+    def ramped(self, train: PulseTrain) -> PulseTrain:
+        """Return a checked train with flanks no steeper than the limit."""
+        return replace(train, ramp=abs(train.torque) / self.rate) if self.rate else train
+
+    def _check_impulse(self, impulse: float) -> None:
+        if impulse > self.impulse:
+            raise LimitError(
+                f"impulse: {impulse:.4g} N m s within {self.stride:g} s is outside the limit of "
+                f"the device; allowed: at most {self.impulse:g} N m s"
             )

@@ -22,7 +22,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.device import DeviceLimits, IdealAnkleRobot, LimitError, PulseTrain
+from gait_entrainment.device import DeviceLimits, LimitError, PulseTrain, find_driver
 
 SECOND = 1_000_000_000
 
@@ -37,6 +37,14 @@ def train(**changes):
         "duration": 0.1,
     }
     return PulseTrain(**{**values, **changes})
+
+
+def ideal_robot(start=0, limits=None):
+    robot = find_driver("ideal").make(Side.LEFT, limits)
+    robot.configure()
+    robot.activate()
+    robot.begin(start)
+    return robot
 
 
 def torque_at(profiles, instant):
@@ -60,7 +68,7 @@ def torque_at(profiles, instant):
     probes=st.lists(st.integers(0, 12 * SECOND - 1), min_size=5, max_size=20),
 )
 def test_promises_tell_the_pulses_however_they_are_cut(cuts, first, period, duration, probes):
-    robot = IdealAnkleRobot(Side.LEFT, 0)
+    robot = ideal_robot(limits=DeviceLimits(duty=1.0, impulse=1e3))
     pulses = train(first_onset=first, period=period, duration=duration)
     robot.schedule(pulses)
     profiles = [robot.promise(until) for until in [*sorted(cuts), 12 * SECOND]]
@@ -105,7 +113,7 @@ def test_onsets_are_rounded_from_the_first_one():
     ],
 )
 def test_what_it_must_not_deliver_is_refused_and_changes_nothing(changes, words):
-    robot = IdealAnkleRobot(Side.LEFT, 0)
+    robot = ideal_robot()
     robot.promise(SECOND)
     with pytest.raises(LimitError, match=words):
         robot.schedule(train(**changes))
@@ -114,7 +122,7 @@ def test_what_it_must_not_deliver_is_refused_and_changes_nothing(changes, words)
 
 
 def test_one_train_at_a_time():
-    robot = IdealAnkleRobot(Side.LEFT, 0)
+    robot = ideal_robot()
     robot.schedule(train())
     with pytest.raises(LimitError, match="one at a time"):
         robot.schedule(train())
@@ -123,7 +131,7 @@ def test_one_train_at_a_time():
 
 
 def test_nothing_is_delivered_after_cancelling():
-    robot = IdealAnkleRobot(Side.LEFT, 0)
+    robot = ideal_robot()
     robot.schedule(train())
     robot.promise(3 * SECOND + 1)
     robot.cancel()
@@ -131,7 +139,7 @@ def test_nothing_is_delivered_after_cancelling():
 
 
 def test_a_promise_is_not_taken_back():
-    robot = IdealAnkleRobot(Side.LEFT, 5)
+    robot = ideal_robot(5)
     robot.promise(10)
     with pytest.raises(ValueError, match="take back"):
         robot.promise(9)
