@@ -17,7 +17,7 @@
 import contextlib
 import math
 from bisect import bisect_left
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 from types import TracebackType
@@ -202,6 +202,10 @@ class BagReader:
         plan.sort(key=lambda entry: (entry[2].start, entry[0]))
         return plan
 
+    def decoder(self, topic: str) -> Callable[[bytes], Any]:
+        """Give the decoder of a topic's messages, as `decoding.decoder_for` makes it."""
+        return decoder_for(self.topics[topic])
+
     def decoded(
         self,
         topics: Collection[str] | None = None,
@@ -218,9 +222,7 @@ class BagReader:
 
         """
         decoders = {
-            name: decoder_for(topic)
-            for name, topic in self.topics.items()
-            if topics is None or name in topics
+            name: self.decoder(name) for name in self.topics if topics is None or name in topics
         }
         for message in self.messages(topics, start, end):
             yield message, decoders[message.topic](message.data)

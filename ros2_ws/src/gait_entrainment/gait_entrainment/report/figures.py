@@ -24,12 +24,10 @@ from typing import Any
 import numpy as np
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
-from gait_entrainment.report.recorded_run import RecordedRun
+from gait_entrainment.report.recorded_run import RecordedRun, drawn_strides
 
 # Colours that stay apart for colour-blind readers and in print (Okabe and Ito 2008).
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#777777"
-# Strides drawn in the torque figure: more would not be told apart.
-STRIDES_DRAWN = 24
 
 
 def draw_figures(run: RecordedRun, folder: Path) -> list[Path]:
@@ -110,9 +108,7 @@ def _phase_lag(run: RecordedRun) -> Any:
 
 def _ankle_torque(run: RecordedRun) -> Any:
     """Draw one line of ankle torque per stride, from the other leg's heel strike on, as Fig. 7."""
-    strides = [s for s in run.analysis.strides if s.number <= run.protocol.strides]
-    chosen = np.unique(np.linspace(0, len(strides) - 1, STRIDES_DRAWN).round().astype(int))
-    rows = [strides[i] for i in chosen] if strides else []
+    rows = drawn_strides(run.protocol, run.analysis)
     figure, axes = _axes(height=2 + 0.28 * len(rows))
     torques = run.torques
     peak = run.protocol.walker.peak_torque

@@ -12,23 +12,44 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A run as its bag tells it, without ROS: what happened, and the analysis made anew from it."""
+"""
+One recorded run, read from its bag and analyzed anew, without ROS.
+
+Only what is needed is read, through the index of the bag: of an hour of samples the events, the
+promised pulses and what the analyzer published. Ankle torque is read where a figure shows it.
+"""
 
 import json
 import math
-from dataclasses import dataclass
+import struct
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gait_entrainment.analysis import Analysis, VerdictSettings, analyze
-from gait_entrainment.bags import BagError, BagReader
+from gait_entrainment.analysis import Analysis, Entrainment, PulsePhase, VerdictSettings, analyze
+from gait_entrainment.bags import BagError, BagMessage, BagReader
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
-from gait_entrainment.events import GaitEvent
+from gait_entrainment.events import GaitEvent, Stride
 from gait_entrainment.experiment import Conductor
-from gait_entrainment.protocol import Protocol, read_protocol
+from gait_entrainment.protocol import Protocol, ProtocolError, read_protocol
+
+# Strides of which the ankle torque is read: more would not be told apart in a figure.
+STRIDES_DRAWN = 24
+_EVENTS, _PROFILES = "gait_events", "perturbation/torque_profile"
+_TORQUE = "ankle_torque"
+_STRIDES, _PULSES, _VERDICTS = "gait/strides", "gait/pulse_phases", "gait/entrainment"
+_TYPES = {
+    _EVENTS: "GaitEvent",
+    _PROFILES: "TorqueProfile",
+    _TORQUE: "AnkleTorque",
+    _STRIDES: "Stride",
+    _PULSES: "PulsePhase",
+    _VERDICTS: "Entrainment",
+}
 
 
 @dataclass(frozen=True)
@@ -51,15 +72,29 @@ class RecordedRun:
     measured_period: float  # mean stride period over the baseline [s]; NaN without a plan
     pulse_period: float  # as planned from it [s]; NaN without a plan
     analysis: Analysis
-    torques: AnkleTorques
+    torques: AnkleTorques  # of the strides that figures show; empty unless asked for
     messages: int  # in the bag, on all topics
     lost: int | None  # published but not recorded; None where no publisher gave a count
     real_time_factor: float  # walked time over wall time, first to last /clock; NaN without
+    differences: tuple[str, ...] | None = None
+    """How what the analyzer published live differs from `analysis`, a line per topic; () where
+    they are equal to the last bit, None where nothing was recorded."""
 
 
-def read_run(path: Path | str, settings: VerdictSettings | None = None) -> RecordedRun:
+def read_run(
+    path: Path | str, settings: VerdictSettings | None = None, *, torques: bool = True
+) -> RecordedRun:
     """
     Read a bag of this project and analyze it anew.
+
+    Parameters
+    ----------
+    path
+        Folder or ``.mcap`` file.
+    settings
+        The numbers in the verdict.
+    torques
+        Read the ankle torque of the strides that figures show.
 
     Raises
     ------
@@ -72,65 +107,229 @@ def read_run(path: Path | str, settings: VerdictSettings | None = None) -> Recor
             protocol = read_protocol(bag.custom_data["protocol"])
         except KeyError:
             raise BagError(f"{path}: holds no protocol: not a run of this project") from None
-        names = {
-            suffix: next((topic for topic in bag.topics if topic.endswith(suffix)), None)
-            for suffix in ("/gait_events", "/perturbation/torque_profile", "/ankle_torque")
-        }
-        missing = [suffix for suffix, name in names.items() if name is None]
-        if missing:
-            raise BagError(f"{path}: lacks the topics {', '.join(missing)}")
-        events, onsets, samples = [], [], []
-        for raw, message in bag.decoded([name for name in names.values() if name is not None]):
-            if raw.topic == names["/gait_events"]:
-                events.append(
-                    GaitEvent(
-                        _nanoseconds(message.header.stamp),
-                        EventKind(message.kind),
-                        Side(message.side),
-                        message.step,
-                    )
-                )
-            elif raw.topic == names["/ankle_torque"]:
-                side = protocol.side
-                samples.append(
-                    (
-                        _nanoseconds(message.header.stamp),
-                        message.intrinsic[side],
-                        message.delivered[side],
-                        message.effective_perturbation[side],
-                    )
-                )
-            elif not message.stop:
-                onsets += [_nanoseconds(onset) for onset in message.onsets]
+        except ProtocolError as error:
+            raise BagError(f"{path}: its protocol cannot be read: {error}") from None
+        record = _Record(bag, path)
+        analysis = analyze(record.events, record.onsets, protocol.side, settings)
         conductor = Conductor(protocol)
-        for event in events:
-            conductor.add_event(event)
+        try:
+            for event in record.events:
+                conductor.add_event(event)
+        except ProtocolError:
+            pass  # too few events are left to plan by: the periods stay unknown
         lost = json.loads(bag.custom_data.get("messages_lost", "null"))
         return RecordedRun(
             protocol=protocol,
-            events=tuple(events),
-            onsets=tuple(onsets),
+            events=tuple(record.events),
+            onsets=tuple(record.onsets),
             measured_period=conductor.measured_period,
             pulse_period=conductor.train.period if conductor.train else math.nan,
-            analysis=analyze(events, onsets, protocol.side, settings),
-            torques=AnkleTorques(
-                np.array([s[0] for s in samples], np.int64),
-                *(np.array([s[i] for s in samples], float) for i in (1, 2, 3)),
+            analysis=analysis,
+            differences=record.differences_from(analysis, protocol.side),
+            torques=_read_torques(
+                bag,
+                protocol.side,
+                drawn_strides(protocol, analysis) if torques else [],
+                stamped=record.stamped,
             ),
             messages=bag.message_count,
             lost=None if lost is None else sum(lost.values()),
-            real_time_factor=_real_time_factor(bag),
+            real_time_factor=record.real_time_factor,
         )
+
+
+def drawn_strides(protocol: Protocol, analysis: Analysis) -> list[Stride]:
+    """Return the strides whose ankle torque is drawn: up to 24, evenly spread over the run."""
+    strides = [s for s in analysis.strides if s.number <= protocol.strides]
+    if not strides:
+        return []
+    chosen = np.unique(np.linspace(0, len(strides) - 1, STRIDES_DRAWN).round().astype(int))
+    return [strides[i] for i in chosen]
+
+
+class _Record:
+    """
+    Events, onsets and published results of a bag, read in one pass.
+
+    Messages are taken in the order in which they were received, which is that of the file: the
+    analyzer met them in that order, and a stop voids only what was promised before it.
+    """
+
+    def __init__(self, bag: BagReader, path: Path | str) -> None:
+        self.events: list[GaitEvent] = []
+        self.onsets: list[int] = []
+        self.stamped = True  # log times are the stamps, so that instants can be looked up
+        self._published: dict[str, list[Any]] = {}
+        names = {suffix: _find(bag, suffix) for suffix in (_EVENTS, _PROFILES)}
+        if missing := [suffix for suffix, name in names.items() if name is None]:
+            raise BagError(f"{path}: lacks the topics {', '.join(missing)}")
+        for suffix in (_STRIDES, _PULSES, _VERDICTS):
+            if (name := _find(bag, suffix)) is not None:
+                names[suffix] = name
+                self._published[suffix] = []
+        suffixes = {name: suffix for suffix, name in names.items() if name is not None}
+        clocks: list[BagMessage] = []
+        decoded = []
+        # /clock tells how fast the run went; of its messages the first and the last are kept.
+        clock = ["/clock"] if "/clock" in bag.topics else []
+        for message in bag.messages([*suffixes, *clock]):
+            if message.topic == "/clock":
+                clocks[1:] = [message]
+            else:
+                decoded.append(message)
+        decoded.sort(key=lambda message: message.place)
+        decode = {name: bag.decoder(name) for name in suffixes}
+        for message in decoded:
+            self._add(suffixes[message.topic], message, decode[message.topic](message.data))
+        self.real_time_factor = _real_time_factor(clocks)
+
+    def _add(self, suffix: str, message: BagMessage, content: Any) -> None:
+        stamp = _nanoseconds(content.header.stamp)
+        if suffix == _EVENTS:
+            self.stamped &= message.log_time == stamp
+            try:
+                kind, side = EventKind(content.kind), Side(content.side)
+            except ValueError as error:
+                raise BagError(f"{message.topic}: not a gait event: {error}") from None
+            self.events.append(GaitEvent(stamp, kind, side, content.step))
+        elif suffix == _PROFILES:
+            if content.stop:
+                self.onsets = [onset for onset in self.onsets if onset < stamp]
+            else:
+                self.onsets += [_nanoseconds(onset) for onset in content.onsets]
+        else:
+            self._published[suffix].append(content)
+
+    def differences_from(self, analysis: Analysis, side: Side) -> tuple[str, ...] | None:
+        """Return how the published results differ from an analysis; None where there are none."""
+        if not self._published:
+            return None
+        anew = {
+            _STRIDES: [_stride_values(stride) for stride in analysis.strides],
+            _PULSES: [_pulse_values(pulse, side) for pulse in analysis.pulses],
+            _VERDICTS: [_verdict_values(verdict, side) for verdict in analysis.entrainments],
+        }
+        return tuple(
+            difference
+            for suffix, contents in self._published.items()
+            if (difference := _difference(suffix, contents, anew[suffix]))
+        )
+
+
+def _find(bag: BagReader, suffix: str) -> str | None:
+    """Return the topic of a bag with this relative name and its type, in whatever namespace."""
+    type_name = f"gait_entrainment_msgs/msg/{_TYPES[suffix]}"
+    return next(
+        (
+            name
+            for name, topic in bag.topics.items()
+            if name.endswith(f"/{suffix}") and topic.type == type_name
+        ),
+        None,
+    )
+
+
+# What the analyzer publishes, by the fields of its messages; instants in nanoseconds.
+
+
+def _stride_values(stride: Stride) -> dict[str, Any]:
+    return {
+        "header": stride.end,
+        "side": stride.side,
+        "number": stride.number,
+        "start": stride.start,
+        "period": stride.period,
+        "step_periods": stride.step_periods,
+    }
+
+
+def _pulse_values(pulse: PulsePhase, side: Side) -> dict[str, Any]:
+    return {
+        "header": pulse.onset,
+        "side": side,
+        "number": pulse.number,
+        "stride": pulse.stride,
+        "phase": pulse.phase,
+        "phase_lag": pulse.phase_lag,
+        "unwrapped_lag": pulse.unwrapped_lag,
+        "toe_off": pulse.toe_off or 0,
+    }
+
+
+def _verdict_values(verdict: Entrainment, side: Side) -> dict[str, Any]:
+    # All of its fields but one are published, and all but the stamp under the same name.
+    unnamed = {"stamp", "effective_pulses"}
+    values = {f.name: getattr(verdict, f.name) for f in fields(verdict) if f.name not in unnamed}
+    values |= {"header": verdict.stamp, "side": side}
+    values["entrained_since_stride"] = verdict.entrained_since_stride or 0
+    return values
+
+
+def _difference(suffix: str, published: Sequence[Any], anew: Sequence[dict[str, Any]]) -> str:
+    """Say where published messages first differ from results; an empty text where nowhere."""
+    for number, (content, values) in enumerate(zip(published, anew, strict=False), start=1):
+        for name, value in values.items():
+            found = getattr(content, name)
+            if _bits(found) != _bits(value):
+                return (
+                    f"{suffix}: {name} of message {number}: {_told(found)} recorded, {value} anew"
+                )
+    if len(published) != len(anew):
+        return f"{suffix}: {len(published)} messages recorded, {len(anew)} anew"
+    return ""
+
+
+def _bits(value: Any) -> Any:
+    """Return a value in a form that is equal where every bit of a float is, also of a NaN."""
+    if isinstance(value, float):
+        return struct.pack("<d", value)
+    if isinstance(value, (list, tuple)):
+        return [_bits(item) for item in value]
+    if hasattr(value, "stamp"):
+        return _nanoseconds(value.stamp)
+    return _nanoseconds(value) if hasattr(value, "nanosec") else int(value)
+
+
+def _told(value: Any) -> Any:
+    return _bits(value) if hasattr(value, "stamp") or hasattr(value, "nanosec") else value
 
 
 def _nanoseconds(stamp: Any) -> int:
     return int(stamp.sec) * NANOSECONDS_PER_SECOND + int(stamp.nanosec)
 
 
-def _real_time_factor(bag: BagReader) -> float:
+def _real_time_factor(clocks: Sequence[BagMessage]) -> float:
     """Return simulated over wall time from the first to the last /clock; NaN without two."""
-    if bag.counts.get("/clock", 0) < 2:
+    if len(clocks) < 2 or clocks[1].publish_time <= clocks[0].publish_time:
         return math.nan
-    clocks = list(bag.messages(["/clock"]))
-    wall = clocks[-1].publish_time - clocks[0].publish_time
-    return (clocks[-1].log_time - clocks[0].log_time) / wall
+    wall = clocks[1].publish_time - clocks[0].publish_time
+    return (clocks[1].log_time - clocks[0].log_time) / wall
+
+
+def _read_torques(
+    bag: BagReader, side: Side, strides: Sequence[Stride], *, stamped: bool
+) -> AnkleTorques:
+    """Read the ankle torque of some strides; of all where the log times are not the stamps."""
+    rows: list[tuple[int, float, float, float]] = []
+    name = _find(bag, _TORQUE)
+    spans: Iterable[tuple[int, float]] = [(stride.start, stride.end) for stride in strides]
+    if strides and not stamped:
+        spans = [(0, math.inf)]
+    for start, end in spans if name is not None else []:
+        rows += _torque_rows(bag, str(name), side, start, end)
+    stamps, *columns = zip(*rows, strict=True) if rows else ((), (), (), ())
+    return AnkleTorques(
+        np.array(stamps, np.int64), *(np.array(column, float) for column in columns)
+    )
+
+
+def _torque_rows(
+    bag: BagReader, name: str, side: Side, start: int, end: float
+) -> Iterator[tuple[int, float, float, float]]:
+    for _, message in bag.decoded([name], start, end):
+        yield (
+            _nanoseconds(message.header.stamp),
+            message.intrinsic[side],
+            message.delivered[side],
+            message.effective_perturbation[side],
+        )
