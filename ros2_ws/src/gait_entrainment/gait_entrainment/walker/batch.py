@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.walker.compiled import compiled
 from gait_entrainment.walker.location import position_at
-from gait_entrainment.walker.model import Floats, Model, make_model
+from gait_entrainment.walker.model import Floats, Model, make_model, start_apex
 from gait_entrainment.walker.promise import EVER
 from gait_entrainment.walker.segment import (
     DOUBLE_STANCE,
@@ -84,14 +84,14 @@ def walk(
     The walk starts as a `Walker` does. Where it falls or flies off, its events end there.
     """
     heel_strikes, toe_offs = np.empty(steps), np.empty(steps)
-    speed = parameters.speed_after_collision if initial_speed is None else initial_speed
+    model = make_model(parameters)
     changes, torques = _torque_changes(pulses)
     strikes, offs = walk_steps(
-        make_model(parameters),
+        model,
         np.zeros(1, SEGMENT),
         changes,
         torques,
-        speed / parameters.leg_length,
+        start_apex(model, initial_speed),
         heel_strikes,
         toe_offs,
     )
@@ -115,14 +115,14 @@ def walk_steps(
     log: Log,
     changes: Stamps,
     torques: Floats,
-    rate: float,
+    apex: float,
     heel_strikes: Floats,
     toe_offs: Floats,
 ) -> tuple[int, int]:
     """Fill in the events [s] after heel strike 0, until one array is full; returns how many."""
     segment = log[0]
     work, cursors = np.empty(WORK_SHAPE), first_cursors(1)
-    start_walking(model, segment, 1, rate)
+    start_walking(model, segment, 1, apex)
     strikes, offs = 0, 0
     while strikes < heel_strikes.size:
         outcome = proceed(model, work, segment, changes, torques, 1, cursors, FOREVER)
@@ -174,10 +174,11 @@ def map_steps(model: Model, log: Log, rows: Floats, result: Floats) -> None:
     work = np.empty(WORK_SHAPE)
     segment = log[0]
     for i in range(rows.shape[1]):
-        start_walking(model, segment, 1, rows[0, i] / model.leg_length)
+        rate = rows[0, i] / model.leg_length
+        start_walking(model, segment, 1, rate * rate - model.strike_gain)
         onset, torque = rows[1, i], rows[3, i]
         duration = one_step(model, work, segment, onset, onset + rows[2, i], torque)
-        square = segment.apex + model.per_drop * model.strike_drop
+        square = segment.apex + model.strike_gain
         result[0, i] = model.leg_length * np.sqrt(square) if duration > 0.0 else np.nan
         result[1, i] = duration
 

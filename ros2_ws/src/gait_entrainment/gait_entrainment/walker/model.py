@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait_entrainment import geometry
-from gait_entrainment.parameters import WalkerParameters, greatest
+from gait_entrainment.parameters import WalkerParameters
 
 Floats = NDArray[np.float64]
 
@@ -52,9 +52,16 @@ TAIL_TOLERANCE = 1e-8
 # Pulses up to this fraction of the peak torque are cleared of fly-off by two numbers made once.
 BOUNDED_PULSE = 0.25
 
-# What the bounds must leave before a segment is cleared without a search: far above their own
-# rounding, far below anything a walker would notice [N].
-FORCE_MARGIN = 1e-6
+# The bounds that clear a segment without a search are minima on a grid of this many points. What
+# they must leave is far above what a minimum between two points can hide.
+BOUND_POINTS = 1025
+BOUND_MARGIN = 1e-3
+"""Of the weight, and of the squared rate g / L."""
+
+# Constants are made in extended precision where the machine has it: an error in the last bit of a
+# constant would add up over the steps, one of the arithmetic averages out.
+Extended: Any = np.longdouble
+PI: Any = Extended("3.14159265358979323846264338327950288")
 
 
 class Model(Protocol):
@@ -79,7 +86,8 @@ class Model(Protocol):
     """Squared rate per energy, 2 / (m L^2)."""
     per_drop: float
     """Squared rate per relative height, 2 g / L."""
-    strike_drop: float
+    strike_gain: float
+    """Squared rate at heel strike over that at the apex: `per_drop` times the drop."""
     restitution: float
     """Squared rate after a collision over that before it."""
     start_apex: float
@@ -123,11 +131,21 @@ def _record(**values: Any) -> Model:
 
 
 def _gauss_legendre(count: int) -> Floats:
-    """Rows: nodes, weights, and the weights that give the last two Legendre coefficients."""
-    nodes, weights = np.polynomial.legendre.leggauss(count)
+    """
+    Rows: nodes, weights, and the weights that give the last two Legendre coefficients.
+
+    numpy's nodes are good to rounding, but near the ends its weights only to 1e-13; one Newton
+    step in extended precision mends both.
+    """
+    nodes = np.polynomial.legendre.leggauss(count)[0].astype(Extended)
+    for _ in range(2):
+        legendre = np.polynomial.legendre.legvander(nodes, count).T
+        slope = count * (legendre[count - 1] - nodes * legendre[count]) / (1 - nodes**2)
+        nodes = nodes - legendre[count] / slope
+    weights = 2 / ((1 - nodes**2) * slope**2)
     degrees = np.arange(count - 2, count)
-    last_two = np.polynomial.legendre.legvander(nodes, count - 1)[:, degrees].T
-    return np.vstack([nodes, weights, (degrees[:, None] + 0.5) * last_two * weights])
+    last_two = (degrees[:, None] + 0.5) * legendre[degrees] * weights
+    return np.vstack([nodes, weights, last_two])
 
 
 def _converged_apex(whole: Floats, rule: Floats) -> float:
@@ -148,90 +166,111 @@ def _converged_apex(whole: Floats, rule: Floats) -> float:
 
 def make_model(p: WalkerParameters) -> Model:
     """Work out the constants of a walker."""
-    start, end = p.double_stance_start, p.max_plantarflexion
-    per_energy = 2 / (p.mass * p.leg_length**2)
-    per_drop = 2 * p.gravity / p.leg_length
-    strike_drop = geometry.drop(np.sin(p.leg_angle), np.cos(p.leg_angle))
+    alpha, end = Extended(p.leg_angle), Extended(p.max_plantarflexion)
+    start = PI / 2 - alpha
+    separation = 2 * p.leg_length * np.sin(alpha) - p.foot_length
+    peak_torque = geometry.spring_torque(start, p.ankle_stiffness, end)
+    per_energy = 2 / Extended(p.mass * p.leg_length**2)
+    per_drop = 2 * p.gravity / Extended(p.leg_length)
+    push_off = geometry.torque_work(end - start, peak_torque, p.ankle_stiffness)
+    strike_gain = per_drop * geometry.drop(np.sin(alpha), np.cos(alpha))
+    restitution = np.cos(2 * alpha) ** 2
 
-    def leg_sine(psi: float) -> float:
-        return geometry.leg_sine(np.cos(psi), p.leg_length, p.foot_length, p.toe_separation)
+    # Functions of the ankle's angle over double stance.
 
-    def gain(psi: float) -> float:
+    def leg_sine(psi: Any) -> Any:
+        return geometry.leg_sine(np.cos(psi), p.leg_length, p.foot_length, separation)
+
+    def transmission(psi: Any) -> Any:
+        cosine = np.sqrt(1 - leg_sine(psi) ** 2)
+        return geometry.leg_per_ankle(np.sin(psi), cosine, p.foot_length, separation)
+
+    def gain(psi: Any) -> Any:
         """Squared rate at psi, unperturbed, less `apex` at heel strike."""
         sine = leg_sine(psi)
-        work = geometry.torque_work(psi - start, p.peak_torque, p.ankle_stiffness)
-        return per_energy * work + per_drop * geometry.drop(sine, np.sqrt(1 - sine * sine))
+        work = geometry.torque_work(psi - start, peak_torque, p.ankle_stiffness)
+        return per_energy * work + per_drop * geometry.drop(sine, np.sqrt(1 - sine**2))
 
-    def transmission(psi: float) -> float:
-        cosine = np.sqrt(1 - leg_sine(psi) ** 2)
-        return geometry.leg_per_ankle(np.sin(psi), cosine, p.foot_length, p.toe_separation)
-
-    def hold(psi: float, pulse: float) -> float:
+    def hold(psi: Any, pulse: float) -> Any:
         """Leading-leg force with a pulse on since heel strike, if `apex` was zero there."""
         sine = leg_sine(psi)
-        arm = geometry.unloading_arm(
-            np.sin(psi), sine, p.leg_length, p.foot_length, p.toe_separation
-        )
+        arm = geometry.unloading_arm(np.sin(psi), sine, p.leg_length, p.foot_length, separation)
         torque = pulse + geometry.spring_torque(psi, p.ankle_stiffness, end)
         squared_rate = gain(psi) + per_energy * pulse * (psi - start)
         carried = geometry.pendulum_force(
-            np.sqrt(1 - sine * sine), squared_rate, p.mass, p.gravity, p.leg_length
+            np.sqrt(1 - sine**2), squared_rate, p.mass, p.gravity, p.leg_length
         )
         return carried - arm * torque
 
+    grid = np.linspace(float(start), float(end), BOUND_POINTS)
+    weight = p.mass * p.gravity
+    pulse = BOUNDED_PULSE * p.peak_torque
+
+    # Whole phases, at the nodes of a fixed quadrature.
     rule = _gauss_legendre(PANEL_NODES)
     half = 0.5 * (end - start)
-    psi = start + half + half * rule[0]
-    double_stance = np.array(
-        [[gain(x) for x in psi], [transmission(x) * half for x in psi] * rule[1]]
-    )
+    psi = start + half + half * rule[NODES]
+    double_stance = np.array([gain(psi), half * rule[WEIGHTS] * transmission(psi)])
     single_rule = _gauss_legendre(SINGLE_STANCE_NODES)
-    half = 0.5 * (p.leg_angle + p.toe_off_angle)
-    theta = p.toe_off_angle - half + half * single_rule[0]
+    toe_off_sine = leg_sine(end)
+    toe_off = np.arcsin(toe_off_sine)
+    half = 0.5 * (alpha + toe_off)
+    theta = toe_off - half + half * single_rule[NODES]
     single_stance = np.array(
-        [per_drop * geometry.drop(np.sin(theta), np.cos(theta)), half * single_rule[1]]
+        [per_drop * geometry.drop(np.sin(theta), np.cos(theta)), half * single_rule[WEIGHTS]]
     )
-    least_gain = -greatest(lambda x: -gain(x), start, end)
-    pulse = BOUNDED_PULSE * p.peak_torque
-    toe_off = leg_sine(end)
+
     # The display path of the swing leg (docs/model.md) starts with the posture and the rates at
     # toe-off, here per unit of progress through single stance.
-    lengths = (p.leg_length, p.foot_length, p.toe_separation)
+    lengths = (p.leg_length, p.foot_length, separation)
     reach = geometry.trailing_reach(np.cos(end), p.leg_length, p.foot_length)
     hip_per_ankle = geometry.trailing_leg_per_ankle(
-        end, toe_off, transmission(end), reach, *lengths
+        end, toe_off_sine, transmission(end), reach, *lengths
     )
-    ankle_slope = (p.toe_off_angle + p.leg_angle) / transmission(end)
+    ankle_slope = 2 * half / transmission(end)
     return _record(
         mass=p.mass,
         leg_length=p.leg_length,
         foot_length=p.foot_length,
-        separation=p.toe_separation,
+        separation=separation,
         gravity=p.gravity,
         stiffness=p.ankle_stiffness,
         max_plantarflexion=end,
         double_stance_start=start,
-        strike_position=p.leg_angle,
-        toe_off_position=-p.toe_off_angle,
-        swing_hip=geometry.trailing_leg_angle(end, toe_off, *lengths),
+        strike_position=alpha,
+        toe_off_position=-toe_off,
+        swing_hip=geometry.trailing_leg_angle(end, toe_off_sine, *lengths),
         swing_hip_slope=hip_per_ankle * ankle_slope,
         swing_ankle_slope=ankle_slope,
         per_energy=per_energy,
         per_drop=per_drop,
-        strike_drop=strike_drop,
-        restitution=p.restitution**2,
-        start_apex=(p.speed_after_collision / p.leg_length) ** 2 - per_drop * strike_drop,
-        toe_off_half_sine=0.5 * geometry.drop(toe_off, np.sqrt(1 - toe_off**2)),
+        strike_gain=strike_gain,
+        restitution=restitution,
+        start_apex=per_energy * push_off * restitution / (1 - restitution) - strike_gain,
+        toe_off_half_sine=0.5 * geometry.drop(toe_off_sine, np.cos(toe_off)),
         strike_hold=geometry.pendulum_force(
-            np.cos(p.leg_angle), per_drop * strike_drop, p.mass, p.gravity, p.leg_length
+            np.cos(alpha), strike_gain, p.mass, p.gravity, p.leg_length
         ),
         rule=rule,
         whole_double_stance=double_stance,
         whole_double_stance_apex=_converged_apex(double_stance, rule),
         whole_single_stance=single_stance,
         whole_single_stance_apex=max(0.0, _converged_apex(single_stance, single_rule)),
-        least_gain=least_gain,
-        least_hold=-greatest(lambda x: -hold(x, 0.0), start, end) - FORCE_MARGIN,
+        least_gain=gain(grid).min() - BOUND_MARGIN * p.gravity / p.leg_length,
+        least_hold=hold(grid, 0.0).min() - BOUND_MARGIN * weight,
         bounded_pulse=pulse,
-        bounded_hold=-greatest(lambda x: -hold(x, pulse), start, end) - FORCE_MARGIN,
+        bounded_hold=hold(grid, pulse).min() - BOUND_MARGIN * weight,
     )
+
+
+def start_apex(model: Any, speed: float | None) -> float:
+    """
+    `apex` of a walker right after a heel strike with the mass at `speed` [m/s].
+
+    Without one, that of the period-one gait. Raises ValueError if it is not positive and finite.
+    """
+    if speed is None:
+        return float(model["start_apex"])
+    if not 0.0 < speed < float("inf"):
+        raise ValueError(f"initial_speed {speed} m/s is not a positive, finite number")
+    return float((speed / model["leg_length"]) ** 2 - model["strike_gain"])

@@ -154,10 +154,10 @@ def advance(
 
 
 @compiled
-def start_walking(model: Model, segment: Segment, leading: int, rate: float) -> None:
-    """Write the first segment: right after heel strike 0 of `leading`, theta_dot = -rate."""
+def start_walking(model: Model, segment: Segment, leading: int, apex: float) -> None:
+    """Write the first segment: right after heel strike 0 of `leading`."""
     work = np.empty(WORK_SHAPE)
     segment.stamp, segment.rest, segment.after = 0, 0.0, -1
     segment.began, segment.leading, segment.step = HEEL_STRIKE, leading, 1
-    segment.apex = rate * rate - model.per_drop * model.strike_drop
+    segment.apex = apex
     enter_double_stance(model, segment, 0.0, work)

@@ -29,7 +29,7 @@ import numpy as np
 
 from gait_entrainment.conventions import EventKind, Side, nanoseconds
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment.walker.model import Floats, make_model
+from gait_entrainment.walker.model import Floats, make_model, start_apex
 from gait_entrainment.walker.promise import PromisedTorque
 from gait_entrainment.walker.sampling import ROWS, Samples, fill_samples, samples_from_table
 from gait_entrainment.walker.segment import (
@@ -117,13 +117,7 @@ class Walker:
         """Raise ValueError if `initial_speed` is not a positive, finite number."""
         self.parameters = parameters
         self._model = make_model(parameters)
-        rate = parameters.speed_after_collision / parameters.leg_length
-        if initial_speed is not None:
-            if not 0.0 < initial_speed < float("inf"):
-                raise ValueError(
-                    f"initial_speed {initial_speed} m/s is not a positive, finite number"
-                )
-            rate = initial_speed / parameters.leg_length
+        apex = start_apex(self._model, initial_speed)
         self._promises = (PromisedTorque(), PromisedTorque())
         self._log: Log = np.zeros(16, SEGMENT)
         self._count = 1
@@ -131,7 +125,7 @@ class Walker:
         self._sampled_from = 0
         self.time_reached = 0
         self.ending: Ending | None = None
-        start_walking(self._model, self._log[0], int(first_heel_strike), rate)
+        start_walking(self._model, self._log[0], int(first_heel_strike), apex)
 
     @property
     def valid_until(self) -> int:
