@@ -19,7 +19,15 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import entry_points
 
-from gait_entrainment.commands import analyze, bag, paper, simulate
+from gait_entrainment.commands import (
+    analyze,
+    bag,
+    existence,
+    lock,
+    paper,
+    phase_response,
+    simulate,
+)
 
 # Commands of other packages, such as those that need ROS, are found under this entry point.
 ENTRY_POINTS = "gait_entrainment.commands"
@@ -28,6 +36,9 @@ COMMANDS = {
     "analyze": analyze.add_command,
     "bag": bag.add_command,
     "paper": paper.add_command,
+    "lock": lock.add_command,
+    "existence": existence.add_command,
+    "phase-response": phase_response.add_command,
 }
 
 

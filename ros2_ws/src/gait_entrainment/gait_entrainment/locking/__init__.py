@@ -18,8 +18,11 @@ Phase-locked gaits, solved.
     pulsed_gait    gaits with one pulse a stride, and the exact derivative of their Poincare map
     branches       smooth branches of them, corners and folds, the locked gaits at a pulse period
     walked         walks under pulses by the walker in time, to confirm them
+    attractors     which initial phases each stable lock draws
+    figures        the branches as a picture
 """
 
+from gait_entrainment.locking.attractors import Shares, shares_of
 from gait_entrainment.locking.branches import (
     Border,
     End,
@@ -43,8 +46,10 @@ __all__ = [
     "Place",
     "PulsedGait",
     "PulsedWalk",
+    "Shares",
     "locked_gaits",
     "pieces_of",
+    "shares_of",
     "stable_intervals",
     "walk_under_pulses",
 ]

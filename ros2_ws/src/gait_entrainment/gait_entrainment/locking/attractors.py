@@ -60,15 +60,15 @@ def shares_of(
     enough = _SETTLING_STRIDES + int(1.5 * gait.unperturbed_period / distance)
     outcomes, lags = [], []
     for phase in initial:
-        pulses = min(enough, _LONGEST)
+        strides = min(enough, _LONGEST)
         while True:
             walk = walk_under_pulses(
-                gait.parameters, gait.torque, gait.width, period, float(phase), pulses
+                gait.parameters, gait.torque, gait.width, period, float(phase), strides
             )
             outcome = walk.outcome
-            if outcome is not Outcome.CENSORED or pulses >= _LONGEST:
+            if outcome is not Outcome.CENSORED or strides >= _LONGEST:
                 break
-            pulses = min(4 * pulses, _LONGEST)
+            strides = min(4 * strides, _LONGEST)
         outcomes.append(outcome)
         lags.append(float(walk.lags[-1]) if outcome is Outcome.LOCKED else np.nan)
     final = np.array(lags)

@@ -22,13 +22,16 @@ distance to it in strides, so a shorter walk proves nothing and is reported as c
 
 from dataclasses import dataclass
 from enum import Enum
+from functools import lru_cache
 
 import numpy as np
 
-from gait_entrainment.conventions import EventKind, Side, nanoseconds
+from gait_entrainment.conventions import nanoseconds
 from gait_entrainment.locking.pulsed_gait import Floats
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment.walker import Ending, Walker
+from gait_entrainment.walker.batch import Pulses, Walk, _torque_changes, walk_steps
+from gait_entrainment.walker.model import Model, make_model, start_apex
+from gait_entrainment.walker.segment import SEGMENT
 
 # A lag that creeps by less than this per stride [s], for several strides, is called locked. So a
 # pulse period closer than this to a border is decided by the solver, not by walking.
@@ -50,7 +53,7 @@ class Outcome(str, Enum):
 
 @dataclass(frozen=True)
 class PulsedWalk:
-    """A walk with one pulse on the right leg every `period`; times in s since heel strike 0."""
+    """A walk with a pulse on one leg every `period`; times in s since that leg's heel strike 0."""
 
     period: float
     heel_strikes: Floats
@@ -58,7 +61,8 @@ class PulsedWalk:
     toe_offs: Floats
     """Of the perturbed leg, one in each stride."""
     onsets: Floats
-    ending: Ending | None
+    ended: bool
+    """Whether the walker fell or flew off before the last stride."""
 
     @property
     def stride_periods(self) -> Floats:
@@ -86,7 +90,7 @@ class PulsedWalk:
     @property
     def outcome(self) -> Outcome:
         """Whether it has locked, and whether it was long enough to say that it does not."""
-        if self.ending is not None:
+        if self.ended:
             return Outcome.ENDED
         lags = self.unwrapped_lags
         if (np.abs(np.diff(lags[-_QUIET_STRIDES - 1 :])) < _CREEP).all():
@@ -102,38 +106,46 @@ def walk_under_pulses(
     width: float,
     period: float,
     initial_phase: float,
-    pulses: int,
+    strides: int,
 ) -> PulsedWalk:
     """
-    Walk from the unperturbed gait with pulses on the right leg.
+    Walk `strides` strides from the unperturbed gait with pulses on one leg.
 
     The first comes at this fraction of an unperturbed stride after the leg's heel strike 0.
     Instants of the pulses are whole nanoseconds, as everywhere in the project.
     """
-    walker = Walker(parameters, Side.RIGHT)
-    far = nanoseconds((pulses + 2) * max(period, 1.0)) + 10**10
-    walker.extend_torque(Side.LEFT, [], [], far)
-    step = _unperturbed_step(parameters)
-    first = nanoseconds(2 * step * initial_phase)
-    onsets = first + np.rint(np.arange(pulses) * period * 1e9).astype(np.int64)
-    changes = np.column_stack([onsets, onsets + nanoseconds(width)]).ravel()
-    walker.extend_torque(Side.RIGHT, changes, np.tile([torque, 0.0], pulses), far)
-    events = walker.advance(int(onsets[-1]) + nanoseconds(width))
-    right = [event for event in events if event.side is Side.RIGHT]
-    strikes = [e.time for e in right if e.kind is EventKind.HEEL_STRIKE]
+    model, stride = _prepared(parameters)
+    count = int((strides + 1) * stride / period) + 1
+    onsets = np.rint(np.arange(count) * (period * 1e9)).astype(np.int64)
+    onsets += nanoseconds(initial_phase * stride)
+    walk = _walk(model, 2 * strides, Pulses(onsets, nanoseconds(width), torque))
+    toe_offs = walk.toe_offs[1::2]
+    last = walk.heel_strikes[-1]
     return PulsedWalk(
         period=period,
-        heel_strikes=np.array([0.0, *(time for time in strikes if time > 0)]),
-        toe_offs=np.array([e.time for e in right if e.kind is EventKind.TOE_OFF]),
-        onsets=onsets * 1e-9,
-        ending=walker.ending,
+        heel_strikes=walk.heel_strikes[::2],
+        toe_offs=toe_offs,
+        onsets=onsets[: np.searchsorted(onsets, last * 1e9)] * 1e-9,
+        ended=walk.heel_strikes.size <= 2 * strides,
     )
 
 
-def _unperturbed_step(parameters: WalkerParameters) -> float:
-    """Duration of a step of the unperturbed gait [s]."""
-    walker = Walker(parameters, Side.RIGHT)
-    while True:
-        for event in walker.advance(walker.time_reached + 10**9):
-            if event.kind is EventKind.HEEL_STRIKE and event.step == 1:
-                return event.time
+@lru_cache(maxsize=64)
+def _prepared(parameters: WalkerParameters) -> tuple[Model, float]:
+    """Return the walker's constants, and its unperturbed stride period [s]."""
+    model = make_model(parameters)
+    return model, float(_walk(model, 2, None).heel_strikes[-1])
+
+
+def _walk(model: Model, steps: int, pulses: Pulses | None) -> Walk:
+    """Walk as `walker.batch.walk` does, but without making the constants anew."""
+    strikes, offs = np.empty(steps), np.empty(steps)
+    counts = walk_steps(
+        model,
+        np.zeros(1, SEGMENT),
+        *_torque_changes(pulses),
+        start_apex(model, None),
+        strikes,
+        offs,
+    )
+    return Walk(np.concatenate([[0.0], strikes[: counts[0]]]), offs[: counts[1]])

@@ -38,12 +38,12 @@ def paper_pulses(parameters: WalkerParameters, steps_per_pulse: int = 2) -> Puls
 
 
 def paper_walk(
-    parameters: WalkerParameters, period_offset: float, initial_phase: float, pulses: int
+    parameters: WalkerParameters, period_offset: float, initial_phase: float, strides: int
 ) -> PulsedWalk:
     """Walk under the paper's pulses with this period [s] off the unperturbed stride period."""
     gait = paper_pulses(parameters)
     period = gait.unperturbed_period + period_offset
-    return walk_under_pulses(parameters, gait.torque, PULSE_WIDTH, period, initial_phase, pulses)
+    return walk_under_pulses(parameters, gait.torque, PULSE_WIDTH, period, initial_phase, strides)
 
 
 def speeds_after_collisions(
@@ -117,9 +117,9 @@ def outcomes_along(
     period = paper_pulses(parameters).unperturbed_period
     found = []
     for offset in offsets:
-        pulses = 600 + int(1.5 * period / abs(offset)) if offset else 2000
+        strides = 600 + int(1.5 * period / abs(offset)) if offset else 2000
         outcomes = [
-            paper_walk(parameters, float(offset), float(phase), pulses).outcome
+            paper_walk(parameters, float(offset), float(phase), strides).outcome
             for phase in initial_phases
         ]
         order = [Outcome.LOCKED, Outcome.CENSORED, Outcome.SLIPPING, Outcome.ENDED]

@@ -31,12 +31,17 @@ from gait_entrainment.paper.experiments import (
     torque_profiles,
 )
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment.report.figures import BLUE, GREEN, GREY, ORANGE
-
-# Further colours of Okabe and Ito (2008); lines also differ in their dashes.
-_SKY, _YELLOW, _PINK, _BLACK = "#56B4E9", "#E69F00", "#CC79A7", "#000000"
-_COLOURS = (BLUE, ORANGE, GREEN, _PINK, _YELLOW, _SKY)
-_DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 2)))
+from gait_entrainment.report.drawing import (
+    BLACK,
+    BLUE,
+    COLOURS,
+    DASHES,
+    GREEN,
+    GREY,
+    ORANGE,
+    new_figure,
+    save_figure,
+)
 
 # Pulse periods drawn in Fig. 5, off 2 tau_0 [ms].
 _ENTRAINED = (-76, -60, -50, -40, -20)
@@ -53,31 +58,14 @@ def draw_figures(folder: Path, parameters: WalkerParameters | None = None) -> li
         "figure_7": _torque_profiles(p),
         "figure_8": _speed_curve(p),
     }
-    paths = []
-    for name, figure in figures.items():
-        for ending in (".png", ".svg"):
-            paths.append(folder / (name + ending))
-            figure.savefig(paths[-1], dpi=130)
-    return paths
-
-
-def _figure(
-    *shape: int, size: tuple[float, float] = (7.2, 4.2), **options: Any
-) -> tuple[Any, Any]:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=size, layout="constrained")
-    axes = figure.subplots(*shape, **options)
-    for one in np.atleast_1d(axes).ravel():
-        one.spines[["top", "right"]].set_visible(False)
-    return figure, axes
+    return [path for name, drawn in figures.items() for path in save_figure(drawn, folder, name)]
 
 
 def _convergence(p: WalkerParameters) -> Any:
     """Fig. 4: errors of the angular velocity after the collisions."""
-    figure, axes = _figure()
+    figure, axes = new_figure()
     fixed, steps = p.speed_after_collision, 6
-    for factor, colour, dash in zip((1.2, 1.1, 1.05, 0.95, 0.9), _COLOURS, _DASHES, strict=False):
+    for factor, colour, dash in zip((1.2, 1.1, 1.05, 0.95, 0.9), COLOURS, DASHES, strict=False):
         speeds = speeds_after_collisions(p, factor * fixed, steps)
         errors = (np.array([factor * fixed, *speeds]) - fixed) / p.leg_length
         # Walking on, the angle theta falls: the angular velocity is negative.
@@ -92,12 +80,12 @@ def _convergence(p: WalkerParameters) -> Any:
 
 def _entrainment(p: WalkerParameters) -> Any:
     """Fig. 5: stride period against stride number, entrained and not."""
-    figure, panels = _figure(2, size=(7.2, 7.0), sharex=True, sharey=True)
+    figure, panels = new_figure(2, size=(7.2, 7.0), sharex=True, sharey=True)
     period = paper_pulses(p).unperturbed_period
     titles = ("(a) entrained", "(b) not entrained")
     for axes, offsets, title in zip(panels, (_ENTRAINED, _NOT_ENTRAINED), titles, strict=True):
         axes.axhline(period, color=GREY, lw=0.8, ls="--")
-        for offset, colour, dash in zip(offsets, _COLOURS, _DASHES, strict=False):
+        for offset, colour, dash in zip(offsets, COLOURS, DASHES, strict=False):
             strides = paper_walk(p, offset * 1e-3, 0.9, 110).stride_periods[:100]
             label = rf"$\tau_p = 2\tau_0 {offset:+d}$ ms"
             number = np.arange(1, strides.size + 1)
@@ -114,14 +102,14 @@ def _entrainment(p: WalkerParameters) -> Any:
 
 def _phase_locking(p: WalkerParameters) -> Any:
     """Fig. 6b: pulse onset after toe-off, from many initial phases."""
-    figure, axes = _figure()
+    figure, axes = new_figure()
     axes.axhline(0, color=GREY, ls="--", lw=1.0)
     axes.annotate("toe-off", (60, 0), textcoords="offset points", xytext=(-40, 4), color=GREY)
     for i, phase in enumerate(np.arange(16) / 16):
         lags = paper_walk(p, -0.05, float(phase), 62).lags[:61]
         # Where the lag wraps by a stride the line is broken.
         lags = np.where(np.abs(np.diff(lags, prepend=lags[0])) > 1, np.nan, lags)
-        axes.plot(lags, color=_COLOURS[i % len(_COLOURS)], ls=_DASHES[i // 6], lw=1.1)
+        axes.plot(lags, color=COLOURS[i % len(COLOURS)], ls=DASHES[i // 6], lw=1.1)
     axes.set(xlabel="stride", ylabel="pulse onset after toe-off [s]")
     axes.set_title(
         r"Fig. 6b: phase locking at $\tau_p = 2\tau_0 - 50$ ms, 16 initial phases", fontsize=11
@@ -133,7 +121,7 @@ def _torque_profiles(p: WalkerParameters) -> Any:
     """Fig. 7: torque of the trailing ankle, stride by stride."""
     count = 20
     walk = paper_walk(p, -0.05, 0.86, count + 2)
-    figure, axes = _figure(size=(7.2, 7.0))
+    figure, axes = new_figure(size=(7.2, 7.0))
     spacing = 0.62 * p.peak_torque
     for number, (time, samples) in enumerate(torque_profiles(p, walk, 1200)[:count], start=1):
         base = -number * spacing
@@ -141,7 +129,7 @@ def _torque_profiles(p: WalkerParameters) -> Any:
         delivered = samples.delivered_torque[:, Side.RIGHT]
         idle = np.where((delivered != 0) & (ankle == 0), base + delivered, np.nan)
         intrinsic = samples.intrinsic_torque[:, Side.RIGHT]
-        axes.plot(time, base + ankle, color=_BLACK, lw=0.9)
+        axes.plot(time, base + ankle, color=BLACK, lw=0.9)
         axes.fill_between(
             time, base + intrinsic, base + ankle, where=ankle > intrinsic, color=ORANGE, lw=0
         )
@@ -156,7 +144,7 @@ def _torque_profiles(p: WalkerParameters) -> Any:
     axes.set(xlabel="time since heel strike of the perturbed leg [s]", ylabel="stride")
     axes.set_yticks([-n * spacing for n in range(1, count + 1)], range(1, count + 1), fontsize=8)
     axes.set_xlim(0, 2.2)
-    axes.plot([0.02, 0.02], [0.2 * spacing, 0.2 * spacing + 100], color=_BLACK, lw=2)
+    axes.plot([0.02, 0.02], [0.2 * spacing, 0.2 * spacing + 100], color=BLACK, lw=2)
     axes.annotate("100 N m", (0.05, 0.2 * spacing + 50), va="center", fontsize=8)
     axes.annotate("stride period [s]", (1.9, 0.2 * spacing), color="#C00000", fontsize=8)
     axes.plot([], [], color=ORANGE, lw=6, label="pulse, acting")
@@ -169,7 +157,7 @@ def _torque_profiles(p: WalkerParameters) -> Any:
 
 def _speed_curve(p: WalkerParameters) -> Any:
     """Fig. 8: average speed against the onset of the pulse after the start of double stance."""
-    figure, axes = _figure()
+    figure, axes = new_figure()
     for steps, dash, every in ((2, "-", "stride"), (1, "--", "step")):
         gait = paper_pulses(p, steps)
         slowest = steps * p.step_length / gait.unperturbed_period
@@ -181,7 +169,7 @@ def _speed_curve(p: WalkerParameters) -> Any:
         for gaits, colour in branches:
             speed = steps * p.step_length / gaits.period
             axes.plot(gaits.onset, speed, color=colour, ls=dash, lw=1.8)
-        axes.plot([], [], color=_BLACK, ls=dash, label=f"pulse in every {every}")
+        axes.plot([], [], color=BLACK, ls=dash, label=f"pulse in every {every}")
     toe_off = float(gaits.double_stance[-1])
     axes.plot([-0.25, -0.1], [slowest] * 2, color=GREY, lw=1.8)
     axes.plot([toe_off, 0.5], [slowest] * 2, color=GREY, lw=1.8)

@@ -1,0 +1,149 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""entrain lock: all phase-locked gaits under one kind of pulse, solved."""
+
+import argparse
+import json
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from gait_entrainment.commands.pulse_options import (
+    add_pulse_options,
+    add_walker_options,
+    chosen_torque,
+    chosen_walker,
+)
+
+_EXAMPLES = """examples:
+  entrain lock                                  the paper's pulses at 2 tau_0 - 50 ms
+  entrain lock --period-offset -0.067           where two attractors coexist
+  entrain lock --torque-fraction -0.1 --period-offset 0.02 --out figures
+"""
+
+
+def add_command(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser = commands.add_parser(
+        "lock",
+        help="all phase-locked gaits, stable or not, and the borders of the basin, solved",
+        description="Solve for the 1:1 phase-locked gaits: borders of the pulse periods with a"
+        " stable lock, named as what they are, and the locked gaits at one period with their"
+        " Floquet multipliers and the share of initial phases that each draws.",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "--period-offset",
+        type=float,
+        default=-0.05,
+        metavar="FLOAT",
+        help="pulse period minus the unperturbed stride period [s]",
+    )
+    parser.add_argument(
+        "--phases", type=int, default=32, metavar="INT", help="initial phases walked from"
+    )
+    add_pulse_options(parser)
+    add_walker_options(parser)
+    parser.add_argument("--out", type=Path, metavar="DIR", help="draw the branches into a folder")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Solve, walk, print."""
+    from gait_entrainment.locking import PulsedGait, locked_gaits, pieces_of, shares_of
+    from gait_entrainment.parameters import ParameterError
+
+    try:
+        walker = chosen_walker(options)
+        gait = PulsedGait(walker, chosen_torque(options, walker), options.width)
+    except (ParameterError, ValueError) as error:
+        print(f"entrain lock: {error}", file=sys.stderr)
+        return 2
+    period = gait.unperturbed_period + options.period_offset
+    if period <= options.width or options.phases < 1:
+        print(
+            f"entrain lock: period_offset {options.period_offset:g} s, phases {options.phases};"
+            f" allowed: above {options.width - gait.unperturbed_period:.4g} s, at least 1",
+            file=sys.stderr,
+        )
+        return 2
+    pieces = pieces_of(gait)
+    locks = locked_gaits(gait, period, pieces)
+    shares = shares_of(gait, period, locks, options.phases)
+    drawn = dict(zip(map(id, shares.locks), shares.drawn, strict=True))
+    outcome = {
+        "unperturbed_stride_period": gait.unperturbed_period,
+        "pulse_period": period,
+        "torque": gait.torque,
+        "width": gait.width,
+        "branches": [asdict(piece) for piece in pieces],
+        "locked_gaits": [
+            {
+                **asdict(lock),
+                "multipliers": [[m.real, m.imag] for m in lock.multipliers],
+                "share_of_initial_phases": drawn.get(id(lock)),
+            }
+            for lock in locks
+        ],
+        "walked": {
+            str(kind.value): shares.outcomes.count(kind) for kind in dict.fromkeys(shares.outcomes)
+        },
+    }
+    if options.json:
+        print(json.dumps(outcome))
+    else:
+        print(_summary(outcome))
+    if options.out is not None:
+        from gait_entrainment.locking.figures import draw_branches
+
+        for path in draw_branches(gait, pieces, locks, options.out):
+            if not options.json:
+                print(f"figure           {path}")
+    return 0
+
+
+def _summary(outcome: dict[str, Any]) -> str:
+    unperturbed = outcome["unperturbed_stride_period"]
+    offset = (outcome["pulse_period"] - unperturbed) * 1e3
+    lines = [
+        f"pulses           {outcome['torque']:.3f} N m for {outcome['width']:g} s",
+        f"stride period    {unperturbed:.9f} s unperturbed",
+        "",
+        "Branches, by pulse onset; periods off the unperturbed one [ms]:",
+    ]
+    for piece in outcome["branches"]:
+        ends = [
+            f"{(end['period'] - unperturbed) * 1e3:+.6f} ({end['border'].value})"
+            for end in (piece["first"], piece["last"])
+        ]
+        kind = "stable  " if piece["stable"] else "unstable" if piece["feasible"] else "no gait "
+        lines.append(f"  {kind} {piece['place'].value}: {ends[0]} to {ends[1]}")
+    lines += ["", f"Locked gaits at {offset:+.3f} ms:"]
+    for lock in outcome["locked_gaits"]:
+        first, second = (complex(*m) for m in lock["multipliers"])
+        share = lock["share_of_initial_phases"]
+        lines.append(
+            f"  {'stable  ' if lock['stable'] else 'unstable'} lag {lock['lag'] * 1e3:+.6f} ms,"
+            f" phase {lock['phase']:.6f}, speed {lock['speed']:.6f} m/s, multipliers"
+            f" {first:.4f} {second:.4f}"
+            + (f", draws {share:.1%} of the initial phases" if share is not None else "")
+        )
+    if not outcome["locked_gaits"]:
+        lines.append("  none")
+    walked = ", ".join(f"{count} {name}" for name, count in outcome["walked"].items())
+    return "\n".join([*lines, "", f"Walked from evenly spread initial phases: {walked}"])

@@ -1,0 +1,64 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Options that name a walker and a kind of pulse, for the commands that ask about locking."""
+
+import argparse
+from dataclasses import fields
+
+from gait_entrainment.parameters import WalkerParameters
+
+PAPER_FRACTION = 0.1
+PAPER_WIDTH = 0.1
+
+
+def add_walker_options(parser: argparse.ArgumentParser) -> None:
+    """Add one option per parameter of the walker; the defaults are Table 1."""
+    group = parser.add_argument_group("walker (default: Table 1)")
+    for field in fields(WalkerParameters):
+        text = f"{field.metadata['meaning']} [{field.metadata['unit']}]"
+        option = "--" + field.name.replace("_", "-")
+        group.add_argument(option, type=float, help=text, metavar="FLOAT")
+
+
+def add_pulse_options(parser: argparse.ArgumentParser) -> None:
+    """Add height and width of the pulse; the defaults are the paper's."""
+    group = parser.add_argument_group("pulse (default: the paper's)")
+    height = group.add_mutually_exclusive_group()
+    height.add_argument(
+        "--torque", type=float, metavar="FLOAT", help="height [N m], plantarflexion positive"
+    )
+    height.add_argument(
+        "--torque-fraction",
+        type=float,
+        metavar="FLOAT",
+        default=PAPER_FRACTION,
+        help="the same as a fraction of the peak ankle torque",
+    )
+    group.add_argument(
+        "--width", type=float, metavar="FLOAT", default=PAPER_WIDTH, help="duration [s]"
+    )
+
+
+def chosen_walker(options: argparse.Namespace) -> WalkerParameters:
+    """Return the walker; raises ParameterError where it has no gait."""
+    given = {field.name: getattr(options, field.name) for field in fields(WalkerParameters)}
+    return WalkerParameters(**{name: value for name, value in given.items() if value is not None})
+
+
+def chosen_torque(options: argparse.Namespace, walker: WalkerParameters) -> float:
+    """Return the height of the pulse [N m]."""
+    if options.torque is not None:
+        return float(options.torque)
+    return float(options.torque_fraction * walker.peak_torque)

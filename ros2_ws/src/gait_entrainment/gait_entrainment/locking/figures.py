@@ -1,0 +1,78 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The branches of locked gaits as a picture: pulse period against pulse phase."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from gait_entrainment.locking.branches import Border, LockedGait, Piece, Place
+from gait_entrainment.locking.pulsed_gait import PulsedGait
+from gait_entrainment.report.drawing import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    new_figure,
+    save_figure,
+)
+
+_COLOURS = {Place.EARLY: ORANGE, Place.INSIDE: BLUE, Place.LATE: GREEN}
+
+
+def draw_branches(
+    gait: PulsedGait, pieces: Sequence[Piece], locks: Sequence[LockedGait], folder: Path
+) -> list[Path]:
+    """Draw all branches, stable or not, their borders, and the locked gaits at one period."""
+    figure, axes = new_figure()
+    along = {Place.EARLY: gait.early, Place.INSIDE: gait.inside, Place.LATE: gait.late}
+    named: set[object] = set()
+    for piece in pieces:
+        if not piece.feasible:
+            continue
+        gaits = along[piece.place](np.linspace(piece.first.angle, piece.last.angle, 80))
+        offsets = (gaits.period - gait.unperturbed_period) * 1e3
+        label = None if piece.place in named else piece.place.value
+        named.add(piece.place)
+        dash, width = ("-", 2.2) if piece.stable else ((0, (2, 2)), 1.2)
+        axes.plot(offsets, gaits.lag, color=_COLOURS[piece.place], ls=dash, lw=width, label=label)
+        for end in (piece.first, piece.last):
+            mark = "o" if end.border.value.startswith("corner") else "D"
+            text = "corner" if mark == "o" else end.border.value
+            first = text not in named
+            named.add(text)
+            offset = (end.period - gait.unperturbed_period) * 1e3
+            face = "white" if end.border is not Border.NO_GAIT else BLACK
+            axes.plot(
+                [offset], [end.lag], mark, ms=5, mec=BLACK, mfc=face, label=text if first else None
+            )
+    for lock in locks:
+        offset = (lock.period - gait.unperturbed_period) * 1e3
+        axes.plot([offset], [lock.lag], "*" if lock.stable else "x", color=BLACK, ms=9)
+    axes.axhline(0, color=GREY, ls=":", lw=1.0)
+    axes.annotate("toe-off", (0, 0), xytext=(4, 3), textcoords="offset points", color=GREY)
+    axes.plot([], [], color=GREY, lw=2.2, label="stable")
+    axes.plot([], [], color=GREY, lw=1.2, ls=(0, (2, 2)), label="unstable")
+    axes.set(
+        xlabel=r"pulse period $\tau_p - 2\tau_0$ [ms]",
+        ylabel="pulse onset after toe-off [s]",
+    )
+    axes.set_title(
+        f"Locked gaits: pulses of {gait.torque:.2f} N m for {gait.width:g} s", fontsize=11
+    )
+    axes.legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return save_figure(figure, folder, "locked_gaits")

@@ -1,0 +1,79 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The commands that ask about locking: lock, phase-response, existence."""
+
+import csv
+import json
+
+import pytest
+
+from gait_entrainment.commands import main
+
+
+def printed(capsys, *arguments):
+    assert main([*arguments, "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_lock_shows_both_attractors_with_the_share_that_each_draws(capsys):
+    outcome = printed(capsys, "lock", "--period-offset", "-0.067", "--phases", "16")
+    stable = [lock for lock in outcome["locked_gaits"] if lock["stable"]]
+    assert [lock["place"] for lock in stable] == [
+        "pulse inside double stance",
+        "pulse outlasts double stance",
+    ]
+    assert sum(lock["share_of_initial_phases"] for lock in stable) == 1
+    assert all(lock["share_of_initial_phases"] > 0 for lock in stable)
+    assert outcome["walked"] == {"locked": 16}
+
+
+def test_lock_reports_walks_that_slip(capsys):
+    outcome = printed(capsys, "lock", "--period-offset", "0.02", "--phases", "4")
+    assert outcome["locked_gaits"] == []
+    assert outcome["walked"] == {"slipping": 4}
+
+
+def test_phase_response_writes_curve_and_csv(capsys, tmp_path):
+    outcome = printed(capsys, "phase-response", "--points", "21", "--out", str(tmp_path))
+    assert len(outcome["locks"]) == 1
+    with open(tmp_path / "phase_response.csv", newline="") as file:
+        rows = list(csv.reader(file))
+    assert rows[0][0] == "phase [1]"
+    assert [float(x) for x in rows[30]] == pytest.approx(outcome["curve"][29], rel=1e-11)
+    assert (tmp_path / "phase_response.svg").stat().st_size > 10_000
+
+
+def test_existence_gives_the_range_and_the_map(capsys, tmp_path):
+    outcome = printed(capsys, "existence", "--points", "30", "--out", str(tmp_path))
+    assert outcome["walker"]["just_vault_over"] == pytest.approx(67.4792, abs=1e-4)
+    assert all(row["just_vault_over"] < row["just_fly_off"] for row in outcome["map"])
+    assert (tmp_path / "existence.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["lock", "--leg-angle", "0.9"], "leg_angle 0.9 rad is out of range"),
+        (["lock", "--width", "1.2"], "width 1.2 s is out of range"),
+        (["lock", "--period-offset", "-1.9"], "period_offset -1.9 s"),
+        (["phase-response", "--ankle-stiffness", "10"], "the walker falls"),
+        (["existence", "--foot-length", "-1"], "foot_length -1.0 is not a positive"),
+    ],
+)
+def test_a_users_mistake_is_one_line_and_exit_code_2(arguments, message, capsys):
+    assert main(arguments) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
