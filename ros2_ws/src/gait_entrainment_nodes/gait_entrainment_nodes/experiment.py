@@ -21,6 +21,7 @@ for, and for how long, is decided here.
 """
 
 import contextlib
+import json
 import sys
 import time
 from typing import Any
@@ -264,7 +265,22 @@ class Experiment(Participant, Node):
             )
             if not response.success:
                 return f"{name} waits for {response.message}"
+            for topic in self.reaching_too_few(response.message):
+                return f"{name} waits for subscriptions of {topic}"
         return f"experiment waits for {self.not_ready()}" if self.not_ready() else ""
+
+    def reaching_too_few(self, matched: str) -> list[str]:
+        """
+        Return the topics on which a participant reaches fewer subscriptions than exist.
+
+        It says itself how many it reaches, if it is one of ours. How many there are is known
+        here: every participant has been seen whole.
+        """
+        try:
+            counts = json.loads(matched)
+        except ValueError:
+            return []
+        return [topic for topic, count in counts.items() if count < self.count_subscribers(topic)]
 
     async def activate_perturbator(self) -> None:
         """Bring the perturbator from where a run before has left it to active."""

@@ -65,6 +65,7 @@ class GaitAnalyzerNode(Participant, Node):
         self.run_number = run
         self.analyzer = GaitAnalyzer(self.side, self.settings)
         self.events = 0
+        self.promised_until = 0  # all pulses up to this instant are known [ns since 1970]
         self.final: msg.Progress | None = None
         self.doubts: dict[str, int] = {}  # counts of suspicious events, as reported last
 
@@ -95,7 +96,9 @@ class GaitAnalyzerNode(Participant, Node):
             self.analyzer.stop(to_nanoseconds(profile.header.stamp))
             return
         onsets = [to_nanoseconds(onset) for onset in profile.onsets]
-        self.publish(self.analyzer.add_promise(onsets, to_nanoseconds(profile.valid_until)))
+        self.promised_until = to_nanoseconds(profile.valid_until)
+        self.publish(self.analyzer.add_promise(onsets, self.promised_until))
+        self.finish_if_complete()
 
     def on_progress(self, progress: msg.Progress) -> None:
         """Learn of the end of the run."""
@@ -104,14 +107,16 @@ class GaitAnalyzerNode(Participant, Node):
             self.finish_if_complete()
 
     def finish_if_complete(self) -> None:
-        """Once the run has ended and all its events are here, publish what was waiting."""
+        """Once the run has ended and all of it has arrived here, publish what was waiting."""
         final = self.final
         if final is None or self.events < final.events:
             return
+        end = to_nanoseconds(final.header.stamp)
+        if self.promised_until < end:
+            return
         self.final = None
         self.publish(self.analyzer.finish())
-        stamp = to_nanoseconds(final.header.stamp)
-        self.publish_counts(self.run_number, stamp)
+        self.publish_counts(self.run_number, end)
 
     def report_doubts(self, stamp: int) -> None:
         """Say on /diagnostics when events are missing, doubled, late or contradictory."""

@@ -20,6 +20,7 @@ default executor, and between two calls the node meets its own deadlines on stea
 """
 
 import functools
+import json
 import math
 import signal
 import sys
@@ -46,6 +47,7 @@ from rclpy.utilities import remove_ros_args
 from std_srvs.srv import Trigger
 
 from gait_entrainment_msgs.msg import PublishedCounts
+from gait_entrainment_nodes.raw_messages import serialize
 from gait_entrainment_nodes.stamps import header
 from gait_entrainment_nodes.topics import DIAGNOSTICS, PUBLISHED_COUNTS, Topic
 
@@ -77,10 +79,14 @@ class CountedPublisher:
         return str(self._publisher.topic_name)
 
     @property
+    def matched(self) -> int:
+        """Number of subscriptions that what is published from now on will reach."""
+        return int(self._publisher.get_subscription_count())
+
+    @property
     def unmatched(self) -> int:
         """Number of subscriptions known to exist that have not been matched yet."""
-        known = self._node.count_subscribers(self.topic_name)
-        return max(known - self._publisher.get_subscription_count(), 0)
+        return max(self._node.count_subscribers(self.topic_name) - self.matched, 0)
 
     def publish(self, message: Any) -> None:
         """
@@ -92,10 +98,11 @@ class CountedPublisher:
             where the node is to end meanwhile.
 
         """
+        data = message if isinstance(message, bytes) else serialize(message)
         report_at = time.monotonic() + LAG_REPORT_PERIOD
         while True:
             try:
-                self._publisher.publish(message)
+                self._publisher.publish(data)
             except rclpy._rclpy_pybind11.RCLError:
                 if self._node.stopping or not rclpy.ok():
                     raise StopRequestedError from None
@@ -121,7 +128,9 @@ class Participant:
     Mixin for a node that takes part in a run.
 
     Offers ``~/ready`` (std_srvs/Trigger): true once every subscription that is known to exist on
-    its topics has been matched, so that the first message that must arrive will arrive.
+    its topics has been matched, so that the first message that must arrive will arrive. As
+    discovery may have told others of more subscriptions, the message then says how many have been
+    matched on each topic, as a JSON object.
     """
 
     get_logger: Callable[[], RcutilsLogger]
@@ -137,6 +146,14 @@ class Participant:
         self._counts = self.create_publisher(
             PUBLISHED_COUNTS.type, PUBLISHED_COUNTS.name, PUBLISHED_COUNTS.qos
         )
+
+    def offer_ready(self) -> None:
+        """
+        Offer ``~/ready``, behind everything else that the node offers and listens to.
+
+        Discovery tells of one node's endpoints in the order in which they were made: who sees
+        this service knows all of the node's subscriptions.
+        """
         self.create_service(Trigger, "~/ready", self._on_ready)
 
     def publisher(self, topic: Topic) -> CountedPublisher:
@@ -180,8 +197,9 @@ class Participant:
         return f"subscriptions of {', '.join(waiting)}" if waiting else ""
 
     def _on_ready(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.message = self.not_ready()
-        response.success = not response.message
+        waiting = self.not_ready()
+        matched = {p.topic_name: p.matched for p in self._publishers_counted}
+        response.success, response.message = not waiting, waiting or json.dumps(matched)
         return response
 
     def publish_counts(self, run: int, stamp: int) -> None:
@@ -340,6 +358,7 @@ def run_node(make_node: Callable[[], Any], arguments: Sequence[str]) -> int:
                     f"unknown argument {extra[0]!r}; allowed: --ros-args -p PARAMETER:=VALUE ..."
                 )
             node = make_node()
+            node.offer_ready()
         except (ParameterException, ValueError, rclpy._rclpy_pybind11.RCLError) as error:
             print(f"{name}: {' '.join(str(error).split())}", file=sys.stderr)
             return 2

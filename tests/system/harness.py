@@ -1,0 +1,312 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Runs as processes, and a probe that listens to them: what the system tests share."""
+
+import json
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import rclpy
+import yaml
+from rclpy.action import ActionClient
+from rclpy.context import Context
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from std_srvs.srv import Trigger
+
+from gait_entrainment.bags import BagReader
+from gait_entrainment.protocol import Protocol, write_protocol
+from gait_entrainment_msgs.action import RunProtocol
+from gait_entrainment_nodes.domain import claimed_domain
+from gait_entrainment_nodes.node_list import NODES, STOP_ORDER, parameters
+from gait_entrainment_nodes.supervisor import Supervisor
+from gait_entrainment_nodes.topics import STRIDES, Topic
+
+# Long enough for a machine whose two cores are shared; nothing waits for it to pass.
+PATIENCE = 60.0
+# Similar to the walker of the paper, in a ninefold gravity: angles and torques are the same, and
+# everything takes a third of the time. For what must be waited for in real time.
+QUICK = (
+    "--gravity=88.29",
+    f"--mass={80 / 9}",
+    "--period-offset=-0.0167",
+    "--width=0.0333",
+)
+LONG = (*QUICK, "--pulses=100000")
+# What architecture.md promises to be the same, byte for byte, in two lock-step runs.
+PROMISED_TOPICS = (
+    "/joint_states",
+    "/gait_events",
+    "/ankle_torque",
+    "/ground_reaction/left",
+    "/ground_reaction/right",
+    "/perturbation/torque_profile",
+    "/perturbation/pulses",
+    "/perturbator/state",
+    "/gait/strides",
+    "/gait/pulse_phases",
+    "/gait/entrainment",
+    "/clock",
+)
+
+
+def protocol_of(*options: str) -> Protocol:
+    """Return the protocol that these options of the command line name."""
+    import argparse
+
+    from gait_entrainment.commands.protocol_options import add_protocol_options, chosen_protocol
+
+    parser = argparse.ArgumentParser()
+    add_protocol_options(parser)
+    return chosen_protocol(parser.parse_args(options))
+
+
+def stamp_of(header: Any) -> int:
+    return header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
+
+
+def payloads(bag: Path, topics: Sequence[str]) -> dict[str, list[tuple[int, bytes]]]:
+    """Return log time and bytes of every message, by topic, in the order of the record."""
+    with BagReader(bag) as reader:
+        found: dict[str, list[tuple[int, bytes]]] = {topic: [] for topic in topics}
+        for message in reader.messages([t for t in topics if t in reader.topics]):
+            found[message.topic].append((message.log_time, message.data))
+        return found
+
+
+class Probe:
+    """A node of the tests in one domain, to listen and to ask."""
+
+    def __init__(self, domain: int) -> None:
+        self._context = Context()
+        rclpy.init(context=self._context, domain_id=domain)
+        self.node = Node("probe", context=self._context)
+        self._executor = EventsExecutor(context=self._context)
+        self._executor.add_node(self.node)
+
+    def close(self) -> None:
+        self._executor.shutdown()
+        self.node.destroy_node()
+        rclpy.try_shutdown(context=self._context)
+
+    def until(
+        self, condition: Callable[[], Any], what: str = "", patience: float = PATIENCE
+    ) -> Any:
+        """Serve ROS until a condition holds; return its value."""
+        deadline = time.monotonic() + patience
+        while not (value := condition()):
+            assert time.monotonic() < deadline, f"waited in vain for {what}"
+            self._executor.spin_once(timeout_sec=0.02)
+        return value
+
+    def listen(self, topic: Topic) -> list[Any]:
+        """Return a list that grows with the messages of a topic."""
+        heard: list[Any] = []
+        self.node.create_subscription(topic.type, topic.name, heard.append, topic.qos)
+        return heard
+
+    def call(self, kind: Any, service: str, request: Any = None) -> Any:
+        """Call a service and return its response."""
+        client = self.node.create_client(kind, service)
+        self.until(client.service_is_ready, service)
+        # Sent anew where the response found no way back to a reader not known there yet.
+        future = client.call_async(request or kind.Request())
+        self.until(future.done, f"an answer of {service}")
+        return future.result()
+
+    def send_goal(self, kind: Any, action: str, goal: Any) -> Any:
+        """Send a goal to an action server; return its handle once it is answered."""
+        client = ActionClient(self.node, kind, action)
+        self.until(client.server_is_ready, action)
+        future = client.send_goal_async(goal)
+        self.until(future.done, f"an answer of {action}")
+        return future.result()
+
+    def result(self, handle: Any) -> Any:
+        """Wait for the result of a goal."""
+        future = handle.get_result_async()
+        self.until(future.done, "a result")
+        return future.result()
+
+
+@contextmanager
+def probe(domain: int) -> Iterator[Probe]:
+    """Give a probe in a domain."""
+    node = Probe(domain)
+    try:
+        yield node
+    finally:
+        node.close()
+
+
+def alive(pid: int) -> bool:
+    """Whether a process runs; one that is only waiting to be reaped does not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def cpu_seconds(pid: int) -> float:
+    """Return the processor time that a process has used."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+class EntrainRun:
+    """One ``entrain run`` as a process, with a look at the processes that it starts."""
+
+    def __init__(self, bag: Path, *options: str, **environment: str) -> None:
+        self.bag = bag
+        self.out = bag.with_name(bag.name + ".out")
+        with self.out.open("wb") as out:
+            self.process = subprocess.Popen(
+                ["entrain", "run", "--out", str(bag), "--no-figures", *options],
+                stdin=subprocess.DEVNULL,
+                stdout=out,
+                stderr=subprocess.STDOUT,
+                env={**os.environ, **environment},
+            )
+        self.nodes: dict[str, int] = {}
+
+    @property
+    def text(self) -> str:
+        """What it has printed so far."""
+        return self.out.read_text(errors="replace")
+
+    def outcome(self) -> dict[str, Any]:
+        """Wait for its end, which must be a good one; return what ``--json`` printed."""
+        assert self.process.wait(PATIENCE) == 0, self.text
+        return dict(json.loads(self.text.splitlines()[-1]))
+
+    def find_nodes(self) -> dict[str, int]:
+        """Return the process ids of all its nodes, once they are there."""
+        deadline = time.monotonic() + PATIENCE
+        while self.nodes.keys() != set(NODES):
+            assert self.process.poll() is None, self.text
+            assert time.monotonic() < deadline
+            for folder in Path("/proc").glob("[0-9]*"):
+                try:
+                    parent = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
+                    words = (folder / "cmdline").read_bytes().split(b"\0")
+                except (FileNotFoundError, ProcessLookupError):
+                    continue
+                if parent != self.process.pid:
+                    continue
+                for word in words[:2]:
+                    name = word.decode().rpartition("/")[2]
+                    if name in NODES:
+                        self.nodes[name] = int(folder.name)
+        return self.nodes
+
+    def domain(self) -> int:
+        """Return its domain."""
+        environment = Path(f"/proc/{next(iter(self.find_nodes().values()))}/environ").read_bytes()
+        values = dict(v.split(b"=", 1) for v in environment.split(b"\0") if b"=" in v)
+        return int(values[b"ROS_DOMAIN_ID"])
+
+    def wait_for_stride(self, number: int) -> None:
+        """Wait until the analyzer has seen a stride."""
+        with probe(self.domain()) as listener:
+            strides = listener.listen(STRIDES)
+            listener.until(
+                lambda: (
+                    self.process.poll() is not None or (strides and strides[-1].number >= number)
+                ),
+                "strides",
+            )
+        assert self.process.poll() is None, self.text
+
+    def survivors(self) -> list[int]:
+        """Return which of its processes are still there."""
+        return [pid for pid in (self.process.pid, *self.nodes.values()) if alive(pid)]
+
+    def end(self) -> None:
+        """Leave nothing behind, whatever the test found."""
+        for pid in self.survivors():
+            os.kill(pid, signal.SIGKILL)
+        self.process.wait()
+
+
+@contextmanager
+def entrain_run(bag: Path, *options: str, **environment: str) -> Iterator[EntrainRun]:
+    """Start ``entrain run``, and see that nothing of it stays."""
+    run = EntrainRun(bag, *options, **environment)
+    try:
+        yield run
+    finally:
+        run.end()
+
+
+class Session:
+    """The nodes of an experiment without ``entrain run``: the test conducts."""
+
+    def __init__(self, folder: Path, domain: int, options: Sequence[str], real_time: bool) -> None:
+        self.bag = folder / "bag"
+        self.protocol = protocol_of(*options)
+        node_parameters = parameters(
+            self.protocol, str(self.bag), "{}", real_time=real_time, sampling={}
+        )
+        del node_parameters["bag_recorder"]["publishers"]  # it records until it is stopped
+        file = folder / "parameters.yaml"
+        file.write_text(
+            yaml.safe_dump({f"/{n}": {"ros__parameters": p} for n, p in node_parameters.items()})
+        )
+        self.supervisor = Supervisor(folder, {**os.environ, "ROS_DOMAIN_ID": str(domain)})
+        self.arguments = ["--ros-args", "--params-file", str(file)]
+        self.probe = Probe(domain)
+
+    def start(self, *nodes: str) -> None:
+        """Start nodes and wait until each of them answers."""
+        for node in nodes:
+            self.supervisor.start(node, self.arguments)
+        for node in nodes:
+            client = self.probe.node.create_client(Trigger, f"{node}/ready")
+            self.probe.until(
+                lambda client=client: client.service_is_ready() or self.supervisor.ended(), node
+            )
+            assert not self.supervisor.ended(), self.supervisor.last_lines(node)
+
+    def conduct(self) -> Any:
+        """Ask the experiment to conduct the protocol; return the goal's handle."""
+        goal = RunProtocol.Goal(protocol=write_protocol(self.protocol))
+        return self.probe.send_goal(RunProtocol, "experiment/run_protocol", goal)
+
+    def pid(self, node: str) -> int:
+        return self.supervisor._processes[node].pid
+
+    def signal(self, node: str, number: int) -> None:
+        os.kill(self.pid(node), number)
+
+
+@contextmanager
+def session(
+    folder: Path, *options: str, nodes: Sequence[str] = NODES, real_time: bool = True
+) -> Iterator[Session]:
+    """Start nodes in a domain of their own; stop them in the end."""
+    with claimed_domain() as domain:
+        running = Session(folder, domain, options, real_time)
+        try:
+            running.start(*nodes)
+            yield running
+        finally:
+            running.probe.close()
+            running.supervisor.stop(STOP_ORDER)

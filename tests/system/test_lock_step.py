@@ -1,0 +1,161 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What is promised of a lock-step run: the simulated events, and the same bytes every time."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from harness import PROMISED_TOPICS, entrain_run, payloads, stamp_of
+
+from gait_entrainment.bags import BagReader, check
+from gait_entrainment.protocol import read_protocol
+from gait_entrainment.report.recorded_run import read_run
+from gait_entrainment.simulation import simulate
+
+# Pulses later than the strides: the last of them are on, or still to come, when the run ends.
+UNFINISHED = ("--side=left", "--period-offset=0.04", "--washout=0", "--initial-phase=0.9")
+
+
+@pytest.fixture(scope="module")
+def paper_example(tmp_path_factory):
+    """Run the default protocol in lock-step, undisturbed."""
+    bag = tmp_path_factory.mktemp("lock_step") / "undisturbed"
+    with entrain_run(bag, "--json") as run:
+        return bag, run.outcome()
+
+
+def events_since_start(bag):
+    """Return instant, kind, side and step of every recorded gait event."""
+    with BagReader(bag) as reader:
+        events = [message for _, message in reader.decoded(["/gait_events"])]
+    start = stamp_of(events[0].header)
+    return [(stamp_of(e.header) - start, e.kind, e.side, e.step) for e in events]
+
+
+def simulated_events(bag):
+    with BagReader(bag) as reader:
+        simulation = simulate(read_protocol(reader.custom_data["protocol"]))
+    return [(e.stamp, int(e.kind), int(e.side), e.step) for e in simulation.events]
+
+
+def test_events_are_those_of_the_simulation_to_the_nanosecond(paper_example):
+    bag, _ = paper_example
+    events = events_since_start(bag)
+    assert len(events) > 4 * 80
+    assert events == simulated_events(bag)
+
+
+def test_outcome_says_what_happened(paper_example):
+    bag, outcome = paper_example
+    assert outcome["verdict"] == "entrained"
+    assert len(outcome["stride_period"]) == 80
+    assert len(outcome["pulses"]) == 50
+    assert outcome["lost"] == 0
+    with BagReader(bag) as reader:
+        assert outcome["messages"] == reader.message_count
+    assert outcome["bag"] == str(bag)
+    assert outcome["real_time_factor"] > 1
+    assert (bag / "protocol.yaml").is_file()
+    assert [f for f in check(bag) if f.severity.name == "ERROR"] == []
+
+
+def test_offline_analysis_repeats_what_the_analyzer_published(paper_example):
+    bag, _ = paper_example
+    analysis = read_run(bag).analysis
+    with BagReader(bag) as reader:
+        strides = [m for _, m in reader.decoded(["/gait/strides"])]
+        pulses = [m for _, m in reader.decoded(["/gait/pulse_phases"])]
+        verdicts = [m for _, m in reader.decoded(["/gait/entrainment"])]
+    assert [(stamp_of(m.header), m.number, m.period, *m.step_periods) for m in strides] == [
+        (s.end, s.number, s.period, *s.step_periods) for s in analysis.strides
+    ]
+    assert [
+        (stamp_of(m.header), m.number, m.stride, m.phase, m.phase_lag, m.unwrapped_lag)
+        for m in pulses
+    ] == [
+        (p.onset, p.number, p.stride, p.phase, p.phase_lag, p.unwrapped_lag)
+        for p in analysis.pulses
+    ]
+    assert len(verdicts) > 20
+    # As text, in which NaN equals NaN.
+    assert [
+        f"{stamp_of(m.header)} {m.verdict} {m.stride} {m.since_stride} {m.mean_period!r} "
+        f"{m.drift!r} {m.drift_interval!r} {m.entrained_since_stride}"
+        for m in verdicts
+    ] == [
+        f"{e.stamp} {int(e.verdict)} {e.stride} {e.since_stride} {e.mean_period!r} "
+        f"{e.drift!r} {e.drift_interval!r} {e.entrained_since_stride or 0}"
+        for e in analysis.entrainments
+    ]
+
+
+def test_no_message_of_the_promised_topics_lacks_a_stamp_as_log_time(paper_example):
+    bag, _ = paper_example
+    with BagReader(bag) as reader:
+        for raw, message in reader.decoded(["/joint_states", "/gait_events", "/gait/strides"]):
+            assert raw.log_time == stamp_of(message.header)
+        assert reader.counts["/joint_states"] == reader.counts["/ground_reaction/left"]
+        assert reader.counts["/joint_states"] > 200 * 80 * 1.8
+
+
+def test_load_and_delayed_processes_change_no_byte(paper_example, tmp_path):
+    undisturbed, _ = paper_example
+    chance = random.Random(1)
+    burners = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2)]
+    delays = 0
+    try:
+        with entrain_run(tmp_path / "disturbed", "--json") as run:
+            nodes = list(run.find_nodes().values())
+            while run.process.poll() is None:
+                node = chance.choice(nodes)
+                try:
+                    os.kill(node, signal.SIGSTOP)
+                    time.sleep(chance.uniform(0.01, 0.3))  # the disturbance, not a wait
+                    os.kill(node, signal.SIGCONT)
+                except ProcessLookupError:
+                    continue
+                delays += 1
+                time.sleep(chance.uniform(0.0, 0.1))
+            assert run.outcome()["lost"] == 0
+    finally:
+        for burner in burners:
+            burner.kill()
+            burner.wait()
+    assert delays > 20
+    expected = payloads(undisturbed, PROMISED_TOPICS)
+    found = payloads(tmp_path / "disturbed", PROMISED_TOPICS)
+    for topic in PROMISED_TOPICS:
+        assert len(expected[topic]) > 0
+        assert found[topic] == expected[topic], topic
+
+
+def test_concurrent_runs_do_not_hear_each_other(tmp_path):
+    options = ("--json", "--sample-rate=0", "--no-ground-reaction", *UNFINISHED)
+    with (
+        entrain_run(tmp_path / "one", *options) as one,
+        entrain_run(tmp_path / "other", *options) as other,
+    ):
+        assert one.domain() != other.domain()
+        assert one.outcome()["lost"] == other.outcome()["lost"] == 0
+    found = payloads(tmp_path / "one", PROMISED_TOPICS)
+    assert found == payloads(tmp_path / "other", PROMISED_TOPICS)
+    assert not found["/ground_reaction/left"]
+    assert len(found["/joint_states"]) == len(found["/gait_events"])
+    assert events_since_start(tmp_path / "one") == simulated_events(tmp_path / "one")
