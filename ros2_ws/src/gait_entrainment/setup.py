@@ -30,5 +30,10 @@ setup(
     ],
     install_requires=["setuptools"],
     zip_safe=False,
-    entry_points={"console_scripts": ["entrain = gait_entrainment.commands:main"]},
+    entry_points={
+        "console_scripts": [
+            "entrain = gait_entrainment.commands:main",
+            "ak_motor_emulator = gait_entrainment.device.ak_motor_emulator:main",
+        ]
+    },
 )

@@ -38,6 +38,7 @@ ENTRY_POINTS = "gait_entrainment.drivers"
 OWN_DRIVERS = {
     "ideal": "gait_entrainment.device.ideal:IdealAnkleRobot",
     "emulated": "gait_entrainment.device.emulated:EmulatedAnkleRobot",
+    "ak_mit_can": "gait_entrainment.device.ak_mit_can:AkMitCanRobot",
 }
 
 

@@ -24,6 +24,7 @@ What this cannot do, since it is software beside others on a system that is not 
 docs/safety.md.
 """
 
+import atexit
 import contextlib
 import itertools
 import math
@@ -158,6 +159,8 @@ class GuardedRobot:
         self._active = True
         self._armed = self.capabilities.simulated
         if not self.capabilities.simulated:
+            # The interpreter's end kills the threads of a driver: zero torque comes before it.
+            atexit.register(self.close)
             self._watching.set()
             threading.Thread(target=self._watch, name="experiment watchdog", daemon=True).start()
 
@@ -198,6 +201,7 @@ class GuardedRobot:
         self.deactivate()
         self._configured = False
         self._quietly(self._robot.close)
+        atexit.unregister(self.close)
 
     def __enter__(self) -> "GuardedRobot":
         """Return the robot; leaving the context closes it, however it is left."""
@@ -324,6 +328,8 @@ class GuardedRobot:
         """Call the driver; whatever it raises, the torque goes to zero first."""
         try:
             return function()
+        except LimitError:
+            raise  # refused, nothing has changed
         except BaseException as error:
             if self._active:
                 self.stop(DRIVER_FAILED)

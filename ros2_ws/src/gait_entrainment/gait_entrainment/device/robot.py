@@ -68,7 +68,8 @@ class AnkleRobot(ABC):
     activate       activate      enable the device at zero torque                     DeviceError
     begin          first horizon start the account of a run: profiles adjoin from     DeviceError
                                  its first instant on
-    schedule       goal          take over a train                                    DeviceError
+    schedule       goal          take over a train; one that it cannot deliver it     DeviceError,
+                                 refuses, and nothing changes                         LimitError
     cancel         goal's cancel zero torque from now on, ready for another train     DeviceError
     promise        horizon       tell the delivered torque                            DeviceError
     read           each promise  hand over the states since the last call             DeviceError

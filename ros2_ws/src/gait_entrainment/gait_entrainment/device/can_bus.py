@@ -1,0 +1,53 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A CAN bus by python-can, with one line for whatever keeps it from opening."""
+
+from typing import Any
+
+from gait_entrainment.device.faults import DeviceError
+
+
+def open_bus(interface: str, channel: str, bitrate: int) -> Any:
+    """
+    Open a bus; python-can is loaded here, so that nobody else waits for it.
+
+    Raises
+    ------
+    DeviceError
+        where python-can is missing, does not know the interface, or cannot open the bus.
+
+    """
+    try:
+        import can
+    except ImportError:
+        raise DeviceError("python-can is missing: pip install python-can msgpack") from None
+    try:
+        # udp_multicast has no bit rate; the others take it, or ignore it where the system sets it.
+        rate: dict[str, Any] = {} if interface == "udp_multicast" else {"bitrate": bitrate}
+        return can.Bus(interface=interface, channel=channel, ignore_config=True, **rate)
+    except (
+        can.CanError,
+        OSError,
+        ValueError,
+        TypeError,
+        ImportError,
+        NotImplementedError,
+    ) as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise DeviceError(
+            f"CAN bus {interface} {channel} cannot be opened: {reason}; "
+            "allowed: an interface that python-can knows, and a channel that is up "
+            "(ip link set can0 up type can bitrate 1000000)"
+        ) from None

@@ -1,0 +1,59 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The motor emulator as a process of its own, on a multicast group of its own."""
+
+import contextlib
+import os
+import subprocess
+import sys
+import time
+from itertools import count
+
+_groups = count()
+
+
+@contextlib.contextmanager
+def emulator(*arguments, trace=None):
+    """Run the emulator; yields the text that names the driver for it."""
+    # A group for each process and test: concurrent test runs do not hear each other.
+    process_id, number = os.getpid(), next(_groups)
+    channel = f"239.74.{process_id % 254 + 1}.{(process_id // 254 + 17 * number) % 254 + 1}"
+    command = [sys.executable, "-m", "gait_entrainment.device.ak_motor_emulator"]
+    command += ["--channel", channel, *arguments]
+    if trace is not None:
+        command += ["--trace", str(trace)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    try:
+        assert "ready" in process.stdout.readline()
+        yield f"ak_mit_can:interface=udp_multicast,channel={channel},rate=250,silence=0.3,lateness=0.5"
+    finally:
+        process.terminate()
+        process.wait(10)
+        process.stdout.close()
+
+
+def read_trace(path):
+    """Time [ns], command and torque [N m] of each complete line."""
+    lines = path.read_text().splitlines(keepends=True)
+    rows = [line.split() for line in lines if line.endswith("\n")]
+    return [(int(time_ns), float(command), float(torque)) for time_ns, command, torque in rows]
+
+
+def until(condition, patience=10.0):
+    """Wait for a condition, with an end."""
+    give_up = time.monotonic() + patience
+    while not condition():
+        assert time.monotonic() < give_up, "it did not happen in time"
+        time.sleep(0.005)

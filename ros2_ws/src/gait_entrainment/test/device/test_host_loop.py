@@ -1,0 +1,149 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The torque loop of host-timed robots: what was measured is told once, and lateness is a fault."""
+
+import math
+import threading
+import time
+from dataclasses import dataclass
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gait_entrainment.conventions import Side
+from gait_entrainment.device import Capabilities, PulseTrain
+from gait_entrainment.device.guard import GuardedRobot, contract_breach
+from gait_entrainment.device.host_loop import HostTimedRobot, Reading
+
+from .emulator_process import until
+
+SECOND = 1_000_000_000
+
+
+@dataclass(frozen=True)
+class NoOptions:
+    pass
+
+
+class Echo(HostTimedRobot):
+    """A device that measures what it was asked for; a test can hold it up."""
+
+    Options = NoOptions
+    capabilities = Capabilities(50.0, math.inf, False, True, False, 500.0)
+
+    def __init__(self, lateness=0.5):
+        super().__init__(Side.LEFT, rate=500.0, silence=5.0, lateness=lateness)
+        self.sent = []
+        self.disabled_after = None
+        self.gate = threading.Event()
+        self.gate.set()
+        self.failing = False
+
+    def _open(self):
+        pass
+
+    def _enable(self):
+        pass
+
+    def _exchange(self, torque, patience):  # noqa: ARG002
+        self.gate.wait(5)
+        if self.failing:
+            raise OSError("bus gone")
+        self.sent.append(torque)
+        return Reading(torque, 0.0)
+
+    def _disable(self):
+        self.disabled_after = self.sent[-3:]
+
+    def _shut(self):
+        pass
+
+
+def guarded(device):
+    robot = GuardedRobot(device, Side.LEFT)
+    robot.configure()
+    robot.activate()
+    robot.arm()
+    robot.begin(time.time_ns())
+    return robot
+
+
+def push(robot):
+    onset = time.time_ns() + SECOND // 20
+    robot.schedule(PulseTrain(Side.LEFT, onset, 2.0, 1, 5.0, 0.5))
+
+
+@settings(derandomize=True, deadline=None, max_examples=100)
+@given(
+    gaps=st.lists(st.integers(1, 5), min_size=1, max_size=30),
+    torques=st.lists(st.integers(-3, 3), min_size=30, max_size=30),
+    cuts=st.lists(st.integers(0, 120), max_size=15),
+)
+def test_each_sample_holds_until_the_next_however_it_is_asked_for(gaps, torques, cuts):
+    device = Echo()
+    device.begin(10)
+    stamps = []
+    for gap in gaps:
+        stamps.append((stamps[-1] if stamps else 0) + gap)
+    device._samples = [(s, float(t)) for s, t in zip(stamps, torques, strict=False)]
+    known = list(device._samples)
+    told, begin = {}, 10
+    for cut in [*sorted(c for c in cuts if c >= 10), 200]:
+        profile = device.promise(max(cut, begin))
+        assert contract_breach(profile, begin, max(cut, begin)) == ""
+        begin = profile.valid_until
+        ends = [*profile.times[1:], profile.valid_until]
+        for start, end, torque in zip(profile.times, ends, profile.torques, strict=True):
+            told |= dict.fromkeys(range(start, end), torque)
+    assert sorted(told) == list(range(10, max(stamps[-1], 10)))
+    for instant, torque in told.items():
+        before = [t for s, t in known if s <= instant]
+        assert torque == (before[-1] if before else 0.0)
+
+
+def test_a_loop_that_wakes_up_late_is_a_fault():
+    device = Echo(lateness=0.02)
+    with guarded(device) as robot:
+        push(robot)
+        until(lambda: any(device.sent))
+        device.gate.clear()
+        time.sleep(0.1)
+        device.gate.set()
+        until(lambda: robot.read() and robot.faults)
+        assert "host_loop_late" in [fault.name for fault in robot.faults]
+        until(lambda: device.sent[-1] == 0.0)
+
+
+def test_a_loop_that_fails_is_a_fault_and_disables_at_zero():
+    device = Echo()
+    with guarded(device) as robot:
+        push(robot)
+        until(lambda: any(device.sent))
+        device.failing = True
+        until(lambda: robot.read() and robot.faults)
+        assert "driver_failed" in [fault.name for fault in robot.faults]
+        assert not robot.active
+
+
+@pytest.mark.parametrize("leave", ["deactivate", "close"])
+def test_zero_torque_is_sent_before_disabling(leave):
+    device = Echo()
+    robot = guarded(device)
+    push(robot)
+    until(lambda: any(device.sent))
+    getattr(robot, leave)()
+    assert device.disabled_after == [0.0, 0.0, 0.0]
+    robot.close()
