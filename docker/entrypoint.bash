@@ -1,0 +1,8 @@
+#!/bin/bash
+# Puts ROS and the workspace on the path, then becomes the command.
+set -eo pipefail
+if [ -f /opt/ros/jazzy/setup.bash ]; then
+    source /opt/ros/jazzy/setup.bash
+fi
+source "$(dirname "${BASH_SOURCE[0]}")/../env.bash"
+exec "$@"
