@@ -22,11 +22,13 @@ from importlib.metadata import entry_points
 from gait_entrainment.commands import (
     analyze,
     bag,
+    driver,
     existence,
     lock,
     paper,
     phase_response,
     simulate,
+    sweep,
 )
 
 # Commands of other packages, such as those that need ROS, are found under this entry point.
@@ -35,10 +37,12 @@ COMMANDS = {
     "simulate": simulate.add_command,
     "analyze": analyze.add_command,
     "bag": bag.add_command,
+    "driver": driver.add_command,
     "paper": paper.add_command,
     "lock": lock.add_command,
     "existence": existence.add_command,
     "phase-response": phase_response.add_command,
+    "sweep": sweep.add_command,
 }
 
 

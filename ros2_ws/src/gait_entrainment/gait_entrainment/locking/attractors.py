@@ -65,7 +65,7 @@ def shares_of(
             walk = walk_under_pulses(
                 gait.parameters, gait.torque, gait.width, period, float(phase), strides
             )
-            outcome = walk.outcome
+            outcome = walk.outcome()
             if outcome is not Outcome.CENSORED or strides >= _LONGEST:
                 break
             strides = min(4 * strides, _LONGEST)

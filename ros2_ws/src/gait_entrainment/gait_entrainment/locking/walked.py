@@ -31,11 +31,11 @@ from gait_entrainment.locking.pulsed_gait import Floats
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.walker.batch import Pulses, Walk, _torque_changes, walk_steps
 from gait_entrainment.walker.model import Model, make_model, start_apex
-from gait_entrainment.walker.segment import SEGMENT
+from gait_entrainment.walker.segment import FALL, SEGMENT
 
 # A lag that creeps by less than this per stride [s], for several strides, is called locked. So a
 # pulse period closer than this to a border is decided by the solver, not by walking.
-_CREEP = 1e-7
+CREEP = 1e-7
 _QUIET_STRIDES = 5
 
 # Gait cycles that the pulses must slip through: one, and what the first strides may have skipped.
@@ -46,9 +46,11 @@ class Outcome(str, Enum):
     """What became of a walk under pulses."""
 
     LOCKED = "locked"
+    ALTERNATING = "locked 2:2: every other stride alike"
     SLIPPING = "slipping"
     CENSORED = "censored: too short to tell"
-    ENDED = "fell or flew off"
+    FELL = "fell"
+    FLEW_OFF = "flew off"
 
 
 @dataclass(frozen=True)
@@ -61,8 +63,8 @@ class PulsedWalk:
     toe_offs: Floats
     """Of the perturbed leg, one in each stride."""
     onsets: Floats
-    ended: bool
-    """Whether the walker fell or flew off before the last stride."""
+    ending: Outcome | None
+    """FELL or FLEW_OFF where the walker did so before the last stride."""
 
     @property
     def stride_periods(self) -> Floats:
@@ -88,13 +90,21 @@ class PulsedWalk:
         return lags
 
     @property
-    def outcome(self) -> Outcome:
+    def last_lag(self) -> float:
+        """Onset of the last pulse minus the nearest toe-off, of those that have been walked."""
+        onset = self.onsets[self.onsets <= self.toe_offs[-1]][-1]
+        differences = onset - self.toe_offs[-2:]
+        return float(differences[np.argmin(np.abs(differences))])
+
+    def outcome(self, creep: float = CREEP) -> Outcome:
         """Whether it has locked, and whether it was long enough to say that it does not."""
-        if self.ended:
-            return Outcome.ENDED
+        if self.ending is not None:
+            return self.ending
         lags = self.unwrapped_lags
-        if (np.abs(np.diff(lags[-_QUIET_STRIDES - 1 :])) < _CREEP).all():
+        if (np.abs(np.diff(lags[-_QUIET_STRIDES - 1 :])) < creep).all():
             return Outcome.LOCKED
+        if (np.abs(lags[2:] - lags[:-2])[-2 * _QUIET_STRIDES :] < creep).all():
+            return Outcome.ALTERNATING
         if abs(lags[-1] - lags[0]) > _SLIPPED_CYCLES * self.stride_periods[-1]:
             return Outcome.SLIPPING
         return Outcome.CENSORED
@@ -118,7 +128,11 @@ def walk_under_pulses(
     count = int((strides + 1) * stride / period) + 1
     onsets = np.rint(np.arange(count) * (period * 1e9)).astype(np.int64)
     onsets += nanoseconds(initial_phase * stride)
-    walk = _walk(model, 2 * strides, Pulses(onsets, nanoseconds(width), torque))
+    pulses = Pulses(onsets, nanoseconds(width), torque)
+    walk, ends = _walk(model, 2 * strides, pulses)
+    ending = None
+    if walk.heel_strikes.size <= 2 * strides:
+        ending = Outcome.FELL if ends == FALL else Outcome.FLEW_OFF
     toe_offs = walk.toe_offs[1::2]
     last = walk.heel_strikes[-1]
     return PulsedWalk(
@@ -126,7 +140,7 @@ def walk_under_pulses(
         heel_strikes=walk.heel_strikes[::2],
         toe_offs=toe_offs,
         onsets=onsets[: np.searchsorted(onsets, last * 1e9)] * 1e-9,
-        ended=walk.heel_strikes.size <= 2 * strides,
+        ending=ending,
     )
 
 
@@ -134,18 +148,14 @@ def walk_under_pulses(
 def _prepared(parameters: WalkerParameters) -> tuple[Model, float]:
     """Return the walker's constants, and its unperturbed stride period [s]."""
     model = make_model(parameters)
-    return model, float(_walk(model, 2, None).heel_strikes[-1])
+    walk, _ = _walk(model, 2, None)
+    return model, float(walk.heel_strikes[-1])
 
 
-def _walk(model: Model, steps: int, pulses: Pulses | None) -> Walk:
-    """Walk as `walker.batch.walk` does, but without making the constants anew."""
-    strikes, offs = np.empty(steps), np.empty(steps)
-    counts = walk_steps(
-        model,
-        np.zeros(1, SEGMENT),
-        *_torque_changes(pulses),
-        start_apex(model, None),
-        strikes,
-        offs,
-    )
-    return Walk(np.concatenate([[0.0], strikes[: counts[0]]]), offs[: counts[1]])
+def _walk(model: Model, steps: int, pulses: Pulses | None) -> tuple[Walk, int]:
+    """Walk as `walker.batch.walk` does, the constants made before; also what ended it."""
+    log, strikes, offs = np.zeros(1, SEGMENT), np.empty(steps), np.empty(steps)
+    apex = start_apex(model, None)
+    counts = walk_steps(model, log, *_torque_changes(pulses), apex, strikes, offs)
+    walk = Walk(np.concatenate([[0.0], strikes[: counts[0]]]), offs[: counts[1]])
+    return walk, int(log[0]["ends"])

@@ -119,10 +119,16 @@ def outcomes_along(
     for offset in offsets:
         strides = 600 + int(1.5 * period / abs(offset)) if offset else 2000
         outcomes = [
-            paper_walk(parameters, float(offset), float(phase), strides).outcome
+            paper_walk(parameters, float(offset), float(phase), strides).outcome()
             for phase in initial_phases
         ]
-        order = [Outcome.LOCKED, Outcome.CENSORED, Outcome.SLIPPING, Outcome.ENDED]
+        order = [
+            Outcome.LOCKED,
+            Outcome.CENSORED,
+            Outcome.SLIPPING,
+            Outcome.FELL,
+            Outcome.FLEW_OFF,
+        ]
         found.append(max(outcomes, key=order.index))
     return found
 

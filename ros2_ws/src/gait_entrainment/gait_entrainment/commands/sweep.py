@@ -1,0 +1,173 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""entrain sweep: the Arnold tongue."""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from gait_entrainment.commands.pulse_options import (
+    PAPER_WIDTH,
+    add_walker_options,
+    chosen_walker,
+)
+
+# The exact borders are drawn at this many torques or more: a coarse sweep has smooth borders too.
+_BORDER_TORQUES = 50
+
+_EXAMPLES = """examples:
+  entrain sweep --out tongue                 100 offsets x 50 torques x 16 initial phases
+  entrain sweep --out tongue                 again, after an interruption: goes on
+  entrain sweep --out both --torque-fractions -0.2 0.2 81 --period-offsets -0.2 0.2 81
+  entrain sweep --out tongue --scheduler tcp://host:8786
+"""
+
+
+def add_command(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser = commands.add_parser(
+        "sweep",
+        help="Arnold tongue: pulse period x torque x initial phase",
+        description="Two maps: whether a stable lock exists (solved), and the share of initial"
+        " phases locked by the last stride (walked). Writes tongue.parquet and a picture.",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    for option, default, text in (
+        ("--period-offsets", (-0.12, 0.02, 100), "pulse period minus stride period [s]"),
+        ("--torque-fractions", (0.005, 0.25, 50), "torque over the peak ankle torque"),
+    ):
+        parser.add_argument(
+            option,
+            nargs=3,
+            type=float,
+            default=default,
+            metavar=("MIN", "MAX", "COUNT"),
+            help=f"{text}; default {default}",
+        )
+    parser.add_argument("--phases", type=int, default=16, metavar="INT", help="initial phases")
+    parser.add_argument("--strides", type=int, default=100, metavar="INT", help="of each walk")
+    parser.add_argument(
+        "--width", type=float, default=PAPER_WIDTH, metavar="FLOAT", help="of the pulse [s]"
+    )
+    add_walker_options(parser)
+    parser.add_argument("--out", type=Path, default=Path("sweep"), metavar="DIR", help="results")
+    parser.add_argument("--jobs", type=int, metavar="INT", help="processes; default: all cores")
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="use a Dask cluster instead")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Sweep what is missing, join, draw."""
+    from gait_entrainment.parameters import ParameterError
+    from gait_entrainment.sweep import Axis, SweepError, SweepPlan, SweepStore
+
+    try:
+        plan = SweepPlan(
+            walker=chosen_walker(options),
+            period_offsets=Axis(*_range(options.period_offsets)),
+            torque_fractions=Axis(*_range(options.torque_fractions)),
+            phases=options.phases,
+            strides=options.strides,
+            width=options.width,
+        )
+        store = SweepStore(options.out, plan)
+    except (ParameterError, SweepError) as error:
+        print(f"entrain sweep: {error}", file=sys.stderr)
+        return 2
+    try:
+        _fill(plan, store, options)
+    except SweepError as error:
+        print(f"entrain sweep: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        done = plan.torque_fractions.count - len(store.missing())
+        print(
+            f"entrain sweep: interrupted after {done} of {plan.torque_fractions.count} torques;"
+            " the same command goes on",
+            file=sys.stderr,
+        )
+        return 1
+    _report(plan, store, options)
+    return 0
+
+
+def _range(values: list[float]) -> tuple[float, float, int]:
+    least, most, count = values
+    return least, most, int(count)
+
+
+def _fill(plan: Any, store: Any, options: argparse.Namespace) -> None:
+    """Make and write the rows that are missing."""
+    from tqdm import tqdm
+
+    from gait_entrainment.sweep import available_cores, rows_by_dask, rows_by_processes
+
+    missing = store.missing()
+    if not missing:
+        return
+    if options.scheduler:
+        rows = rows_by_dask(plan, missing, options.scheduler)
+    else:
+        rows = rows_by_processes(plan, missing, options.jobs or available_cores())
+    walks = plan.walks // plan.torque_fractions.count
+    total = plan.torque_fractions.count * walks
+    with tqdm(total=total, initial=total - len(missing) * walks, unit="walk", disable=None) as bar:
+        for index, row in rows:
+            store.add(index, row)
+            bar.update(walks)
+
+
+def _report(plan: Any, store: Any, options: argparse.Namespace) -> None:
+    import numpy as np
+
+    from gait_entrainment.sweep import exact_borders, read_sweep
+    from gait_entrainment.sweep.figures import draw_tongue
+
+    table, _ = read_sweep(store.finish())
+    torques = plan.torque_fractions
+    fractions = np.linspace(torques.least, torques.most, max(torques.count, _BORDER_TORQUES))
+    borders = exact_borders(plan.walker, fractions, plan.width)
+    paths = [store.table_path, *draw_tongue(plan, table, borders, options.out)]
+    columns = {name: np.asarray(table[name]) for name in table.column_names}
+    # Where walks were long enough to tell, both maps must agree.
+    told = (columns["share_censored"] == 0) & (columns["problem"] == "")
+    told &= columns["share_alternating"] == 0
+    told &= columns["share_fell"] + columns["share_flew_off"] == 0
+    agree = (columns["stable_locks"] > 0) == (columns["share_locked"] > 0)
+    outcome = {
+        "walks": plan.walks,
+        "strides": plan.walks * plan.strides,
+        "cells": int(told.size),
+        "cells_with_a_stable_lock": int((columns["stable_locks"] > 0).sum()),
+        "cells_told_by_walking": int(told.sum()),
+        "of_these_agreeing": int((told & agree).sum()),
+        "cells_with_2_2_locks": int((columns["share_alternating"] > 0).sum()),
+        "cells_with_falls": int((columns["share_fell"] > 0).sum()),
+        "cells_with_flights": int((columns["share_flew_off"] > 0).sum()),
+        "cells_not_asked": int((columns["problem"] != "").sum()),
+        "borders": [vars(one) for one in borders],
+    }
+    if options.json:
+        print(json.dumps(outcome))
+        return
+    for name, value in outcome.items():
+        if name != "borders":
+            print(f"{name.replace('_', ' '):25} {value}")
+    for path in paths:
+        print(f"{'written':25} {path}")

@@ -1,0 +1,96 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Who makes the rows: processes of this machine, or the workers of a Dask cluster.
+
+Rows come back as they are made and are written at once; nothing else is kept.
+"""
+
+import importlib
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from typing import Any
+
+from gait_entrainment.sweep.plan import SweepError, SweepPlan
+from gait_entrainment.sweep.row import Row, sweep_row
+
+# A scheduler that does not answer is named within this time [s].
+SCHEDULER_TIMEOUT = 8.0
+
+# Rows handed out ahead of those that are made: enough to keep every worker busy.
+_AHEAD = 2
+
+Rows = Iterator[tuple[int, Row]]
+
+
+def available_cores() -> int:
+    """Return the number of cores that this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+def rows_by_processes(plan: SweepPlan, indices: Sequence[int], jobs: int) -> Rows:
+    """Make rows in `jobs` processes, in any order; one job makes them in this process."""
+    if jobs == 1:
+        for index in indices:
+            yield index, sweep_row(plan, index)
+        return
+    # Not forked: a copy of a process with threads, such as a progress bar's, may hang.
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["gait_entrainment.sweep.row"])
+    # Ctrl-C reaches every process of the terminal; only this one answers it.
+    pool = ProcessPoolExecutor(
+        jobs, context, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)
+    )
+    try:
+        yield from _in_flight(lambda index: pool.submit(sweep_row, plan, index), indices, jobs)
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _in_flight(submit: Callable[[int], "Future[Row]"], indices: Sequence[int], jobs: int) -> Rows:
+    waiting = iter(indices)
+    running: dict[Future[Row], int] = {}
+    while True:
+        for index in waiting:
+            running[submit(index)] = index
+            if len(running) >= _AHEAD * jobs:
+                break
+        if not running:
+            return
+        for future in wait(running, return_when=FIRST_COMPLETED).done:
+            yield running.pop(future), future.result()
+
+
+def rows_by_dask(plan: SweepPlan, indices: Sequence[int], scheduler: str) -> Rows:
+    """Make rows on a Dask cluster. Raises SweepError where its scheduler does not answer."""
+    try:
+        dask: Any = importlib.import_module("distributed")
+    except ImportError:
+        raise SweepError("--scheduler needs Dask: pip install distributed") from None
+    try:
+        client = dask.Client(scheduler, timeout=SCHEDULER_TIMEOUT)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise SweepError(
+            f"scheduler {scheduler} does not answer within {SCHEDULER_TIMEOUT:g} s"
+            f" ({type(error).__name__}): start it, or leave out --scheduler"
+        ) from None
+    with client:
+        futures = {client.submit(sweep_row, plan, index, pure=False): index for index in indices}
+        for future in dask.as_completed(list(futures)):
+            yield futures.pop(future), future.result()
+            future.release()

@@ -1,0 +1,100 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The Arnold tongue: what is solved and what is walked, side by side, never mixed."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gait_entrainment.report.drawing import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    new_figure,
+    save_figure,
+)
+from gait_entrainment.sweep.borders import StableInterval
+from gait_entrainment.sweep.plan import SweepPlan
+
+_FIRST_COLOURS = (ORANGE, BLUE, GREEN)
+
+
+def draw_tongue(
+    plan: SweepPlan, table: Any, borders: Sequence[StableInterval], folder: Path
+) -> list[Path]:
+    """Draw the exact map and the walked one, with the exact borders over both."""
+    figure, (left, right) = new_figure(1, 2, size=(9.6, 4.6), sharex=True, sharey=True)
+    shape = plan.torque_fractions.count, plan.period_offsets.count
+    offsets, fractions = plan.period_offsets.values * 1e3, plan.torque_fractions.values
+    extent = [*_edges(offsets), *_edges(fractions)]
+    places = {"pulse begins before double stance": ORANGE, "pulse inside double stance": BLUE}
+    for place in dict.fromkeys(one.place for one in borders):
+        colour = places.get(place, GREEN)
+        rows = [one for one in borders if one.place == place]
+        for one, following in _neighbours(rows):
+            low = [one.shortest * 1e3, following.shortest * 1e3]
+            high = [one.longest * 1e3, following.longest * 1e3]
+            heights = [one.torque_fraction, following.torque_fraction]
+            left.fill_betweenx(heights, low, high, color=colour, alpha=0.35, lw=0)
+            for axes in (left, right):
+                axes.plot(low, heights, color=BLACK if axes is left else "white", lw=0.8)
+                axes.plot(high, heights, color=BLACK if axes is left else "white", lw=0.8)
+        left.fill_between([], [], [], color=colour, alpha=0.35, label=f"stable: {place}")
+    share = np.asarray(table["share_locked"]).reshape(shape)
+    image = right.imshow(
+        share, origin="lower", extent=extent, aspect="auto", vmin=0, vmax=1, cmap="cividis"
+    )
+    figure.colorbar(image, ax=right, label="share of the initial phases")
+    ended = np.asarray(table["share_fell"]) + np.asarray(table["share_flew_off"])
+    where = np.argwhere(np.nan_to_num(ended.reshape(shape)) > 0)
+    if where.size:
+        label = "a walk fell or flew off"
+        right.plot(
+            offsets[where[:, 1]], fractions[where[:, 0]], ".", color=ORANGE, ms=2, label=label
+        )
+        right.legend(fontsize=8, loc="lower right")
+    for axes in (left, right):
+        axes.axvline(0, color=GREY, lw=0.6, ls=":")
+        axes.set(xlabel=r"pulse period $\tau_p - 2\tau_0$ [ms]", xlim=extent[:2], ylim=extent[2:])
+    left.set(ylabel="torque of the pulse / peak ankle torque")
+    left.set_title("a stable 1:1 lock exists (solved)", fontsize=10)
+    right.set_title(f"locked by stride {plan.strides} (walked)", fontsize=10)
+    if left.get_legend_handles_labels()[0]:
+        left.legend(fontsize=7, loc="lower left")
+    return save_figure(figure, folder, "tongue")
+
+
+def _edges(values: Any) -> list[float]:
+    """Outer edges of the cells around evenly spaced values."""
+    half = 0.5 * (values[1] - values[0]) if values.size > 1 else 0.5
+    return [float(values[0] - half), float(values[-1] + half)]
+
+
+def _neighbours(rows: Sequence[StableInterval]) -> list[tuple[StableInterval, StableInterval]]:
+    """Pairs of intervals at neighbouring torques that continue each other: they overlap."""
+    torques = sorted({one.torque_fraction for one in rows})
+    following = dict(pairwise(torques))
+    return [
+        (one, other)
+        for one in rows
+        for other in rows
+        if following.get(one.torque_fraction) == other.torque_fraction
+        and max(one.shortest, other.shortest) < min(one.longest, other.longest)
+    ]
