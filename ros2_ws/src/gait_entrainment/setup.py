@@ -34,6 +34,7 @@ setup(
         "console_scripts": [
             "entrain = gait_entrainment.commands:main",
             "ak_motor_emulator = gait_entrainment.device.ak_motor_emulator:main",
-        ]
+        ],
+        "pytest11": ["ankle_robots = gait_entrainment.device.pytest_plugin"],
     },
 )

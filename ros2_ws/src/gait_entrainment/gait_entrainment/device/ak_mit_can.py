@@ -128,13 +128,15 @@ class AkMitCanRobot(HostTimedRobot):
         # The motor holds its last command, also across modes: zero before and after.
         self._send(self._zero)
         self._ask(ENTER)
-        reply = self._ask(self._zero)
-        if abs(reply.torque) > 0.05 * self._motor.torque:
-            self._disable()
-            raise DeviceError(
-                f"motor {self._options.motor_id} shows {reply.torque:g} N m at zero command: is "
-                f"it {self._options.motor}? is the joint free?"
-            )
+        give_up = time.monotonic() + _ANSWER_TIMEOUT
+        while abs((reply := self._ask(self._zero)).torque) > 0.05 * self._motor.torque:
+            if time.monotonic() > give_up:
+                self._disable()
+                raise DeviceError(
+                    f"motor {self._options.motor_id} shows {reply.torque:g} N m at zero command: "
+                    f"is it {self._options.motor}? is the joint free?"
+                )
+            time.sleep(1 / self._options.rate)
 
     def _exchange(self, torque: float, patience: float) -> Reading | None:
         command = Command(torque=torque / self._options.ratio)

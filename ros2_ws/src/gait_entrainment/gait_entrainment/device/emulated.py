@@ -41,7 +41,7 @@ from typing import Any
 import numpy as np
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.device.faults import LimitError
+from gait_entrainment.device.faults import DeviceError, LimitError
 from gait_entrainment.device.profile import TorqueProfile
 from gait_entrainment.device.pulse_train import PulseTrain
 from gait_entrainment.device.robot import AnkleRobot, Capabilities, RobotState
@@ -108,10 +108,12 @@ class EmulatedAnkleRobot(AnkleRobot):
         self._late: list[int] = []  # by which each pulse of the train comes late [ns]
         self._command = 0.0  # that the device holds [N m]
         self._torque = 0.0  # that it delivers [N m]
+        self._halted = False
         self.begin(0)
 
     def configure(self) -> None:
-        """Nothing to connect."""
+        """Nothing to connect; a stop is over."""
+        self._halted = False
 
     def activate(self) -> None:
         """Nothing to enable."""
@@ -129,6 +131,8 @@ class EmulatedAnkleRobot(AnkleRobot):
 
     def schedule(self, train: PulseTrain) -> None:
         """Take over a train; how late each of its pulses will come is drawn here."""
+        if self._halted:
+            raise DeviceError("stopped: close and configure first")
         self._train = train
         late = self._jitter.random(train.count) * self._options.jitter
         self._late = [round(seconds * 1e9) for seconds in late]
@@ -170,7 +174,8 @@ class EmulatedAnkleRobot(AnkleRobot):
         return states
 
     def stop(self) -> None:
-        """Drop the train; the torque is zero at once."""
+        """Drop the train, and take no other; the torque is zero at once."""
+        self._halted = True
         self._drop()
 
     def deactivate(self) -> None:

@@ -40,8 +40,11 @@ from gait_entrainment.device.profile import TorqueProfile
 from gait_entrainment.device.pulse_train import PulseTrain
 from gait_entrainment.device.robot import AnkleRobot, RobotState
 
-# Ticks of zero torque before the device is disabled, so that a lost frame does not matter.
+# Before the device is disabled it is asked for zero torque: so often, so that a lost frame does
+# not matter, and on until its torque has run down to this share of its peak, or for so long [s].
 _ZERO_TICKS = 5
+_RUN_DOWN_SHARE = 0.02
+_RUN_DOWN_TIME = 0.2
 # The loop has this long to end [s].
 _JOIN_TIMEOUT = 1.0
 
@@ -222,9 +225,7 @@ class HostTimedRobot(AnkleRobot):
             self._note(time.monotonic_ns(), 0.0, None)
         finally:
             # Zero before disabling, whatever happened; each step even if the one before fails.
-            for _ in range(_ZERO_TICKS):
-                with contextlib.suppress(Exception):
-                    self._exchange(0.0, self._period)
+            self._run_down()
             with contextlib.suppress(Exception):
                 self._disable()
 
@@ -250,6 +251,17 @@ class HostTimedRobot(AnkleRobot):
             self._note(sent, torque, reading)
             due = max(due + self._period, time.monotonic() - self._lateness)
             self._ending.wait(max(due - time.monotonic(), 0.0))
+
+    def _run_down(self) -> None:
+        gone = _RUN_DOWN_SHARE * self.capabilities.peak_torque
+        give_up = time.monotonic() + _RUN_DOWN_TIME
+        ticks, torque = 0, math.inf
+        while (ticks < _ZERO_TICKS or abs(torque) > gone) and time.monotonic() < give_up:
+            with contextlib.suppress(Exception):
+                reading = self._exchange(0.0, 0.8 * self._period)
+                torque = math.inf if reading is None else reading.torque
+            ticks += 1
+            time.sleep(self._period)
 
     def _fault(self, fault: Fault) -> None:
         self._halted = True

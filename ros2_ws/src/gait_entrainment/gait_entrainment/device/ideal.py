@@ -24,6 +24,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from gait_entrainment.conventions import Side
+from gait_entrainment.device.faults import DeviceError
 from gait_entrainment.device.profile import TorqueProfile
 from gait_entrainment.device.pulse_train import PulseTrain
 from gait_entrainment.device.robot import AnkleRobot, Capabilities, RobotState
@@ -55,9 +56,11 @@ class IdealAnkleRobot(AnkleRobot):
         self._train: PulseTrain | None = None
         self._promised = 0
         self._states: list[RobotState] = []
+        self._halted = False
 
     def configure(self) -> None:
-        """Nothing to connect."""
+        """Nothing to connect; a stop is over."""
+        self._halted = False
 
     def activate(self) -> None:
         """Nothing to enable."""
@@ -68,6 +71,8 @@ class IdealAnkleRobot(AnkleRobot):
 
     def schedule(self, train: PulseTrain) -> None:
         """Take over a train."""
+        if self._halted:
+            raise DeviceError("stopped: close and configure first")
         self._train = train
 
     def cancel(self) -> None:
@@ -100,7 +105,8 @@ class IdealAnkleRobot(AnkleRobot):
         return states
 
     def stop(self) -> None:
-        """Drop the train."""
+        """Drop the train, and take no other."""
+        self._halted = True
         self._train = None
 
     def deactivate(self) -> None:

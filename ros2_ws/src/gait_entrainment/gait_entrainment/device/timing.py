@@ -39,7 +39,12 @@ _LONGEST_GAP = 20_000_000
 
 
 def measured_onset(
-    stamps: Sequence[int], torques: Sequence[float], height: float, fraction: float = CROSSING
+    stamps: Sequence[int],
+    torques: Sequence[float],
+    height: float,
+    fraction: float = CROSSING,
+    *,
+    sampled: bool = True,
 ) -> int | None:
     """
     Return the instant [ns] at which a torque first rises through a fraction of a pulse's height.
@@ -54,6 +59,9 @@ def measured_onset(
         Of the pulse [N m]; a negative one is crossed downwards.
     fraction
         Of the height, in (0, 1).
+    sampled
+        Whether the torque was sampled; else it is known at each of its jumps, and the onset is
+        the instant of one.
 
     Returns
     -------
@@ -69,7 +77,7 @@ def measured_onset(
             continue
         if level >= fraction and before is not None and before[1] < fraction:
             earlier, lower = before
-            if stamp - earlier > _LONGEST_GAP:
+            if not sampled or stamp - earlier > _LONGEST_GAP:
                 return stamp
             return earlier + round((stamp - earlier) * (fraction - lower) / (level - lower))
         before = (stamp, level)
@@ -99,7 +107,8 @@ class _Pulse:
 class TimingAudit:
     """Follows pulses and states as they come; tells the timing of each pulse once it is known."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, sampled: bool = True) -> None:
+        self._sampled = sampled
         self._pulses: list[_Pulse] = []
         self._states: list[RobotState] = []
 
@@ -138,7 +147,10 @@ class TimingAudit:
         seen = [*before[-1:], *during]
         sent = next((s.stamp for s in during if s.commanded / pulse.height > 0), None)
         measured = measured_onset(
-            [s.stamp for s in seen], [s.measured for s in seen], pulse.height
+            [s.stamp for s in seen],
+            [s.measured for s in seen],
+            pulse.height,
+            sampled=self._sampled,
         )
         return PulseTiming(pulse.onset, sent, measured)
 

@@ -37,7 +37,9 @@ def emulator(*arguments, trace=None):
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
         assert "ready" in process.stdout.readline()
-        yield f"ak_mit_can:interface=udp_multicast,channel={channel},rate=250,silence=0.3,lateness=0.5"
+        # Patience for a machine that others share; the limits themselves are tested one by one.
+        patience = "rate=250,silence=0.3,lateness=0.5"
+        yield f"ak_mit_can:interface=udp_multicast,channel={channel},{patience}"
     finally:
         process.terminate()
         process.wait(10)

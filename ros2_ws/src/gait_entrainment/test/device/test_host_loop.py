@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The torque loop of host-timed robots: what was measured is told once, and lateness is a fault."""
+"""The torque loop of host-timed robots: what is measured is told once; lateness is a fault."""
 
 import math
 import threading

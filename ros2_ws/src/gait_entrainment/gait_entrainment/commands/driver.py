@@ -1,0 +1,141 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""entrain driver: which ankle robots there are, and whether one keeps its promises."""
+
+import argparse
+import json
+import sys
+from dataclasses import asdict, fields
+from typing import Any
+
+from gait_entrainment.conventions import Side
+from gait_entrainment.device import DeviceError, Driver, LimitError, driver_names, find_driver
+
+_EXAMPLES = """examples:
+  entrain driver list                       every driver, with its options
+  entrain driver check emulated:delay=0.01  does it keep every promise of the contract?
+  entrain driver check my_robot --arm --json
+"""
+
+
+def add_command(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser = commands.add_parser(
+        "driver",
+        help="ankle robot drivers: list them, check one",
+        description="Ankle robot drivers: NAME, or NAME:OPTION=VALUE,OPTION=VALUE.",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    actions = parser.add_subparsers(required=True, metavar="ACTION")
+    listing = actions.add_parser("list", help="every driver that is installed")
+    listing.add_argument("--json", action="store_true", help="print one JSON object")
+    listing.set_defaults(run=list_drivers)
+    check = actions.add_parser("check", help="the conformance kit")
+    check.add_argument("driver", metavar="NAME[:OPTION=VALUE,...]")
+    check.add_argument(
+        "--arm",
+        action="store_true",
+        help="let a real device deliver torque; nobody may wear it",
+    )
+    check.add_argument(
+        "--torque", type=float, default=8.0, help="height of the pulses [N m] (default 8)"
+    )
+    check.add_argument("--json", action="store_true", help="print one JSON object")
+    check.set_defaults(run=check_driver)
+
+
+def list_drivers(options: argparse.Namespace) -> int:
+    """Print every driver; one that cannot be loaded says why."""
+    found = {name: _description(name) for name in driver_names()}
+    if options.json:
+        print(json.dumps(found))
+        return 0
+    for name, description in found.items():
+        print(f"{name}: {description['summary']}")
+        for option in description["options"]:
+            unit = f" {option['unit']}" if option["unit"] not in ("", "1") else ""
+            print(f"    {option['name']}={option['default']}{unit}  {option['meaning']}")
+    return 0
+
+
+def check_driver(options: argparse.Namespace) -> int:
+    """Run the conformance kit; 1 where a promise is broken, 2 for a driver that is not there."""
+    from gait_entrainment.device.conformance import Tolerances, run_checks
+
+    try:
+        driver = find_driver(options.driver)
+        refuse_unarmed(driver, options.arm)
+        if not 0 < options.torque <= 30:
+            raise LimitError(f"--torque: {options.torque:g} N m; allowed: above 0 and at most 30")
+    except LimitError as error:
+        print(f"entrain driver: {error}", file=sys.stderr)
+        return 2
+    except DeviceError as error:
+        print(f"entrain driver: {error}", file=sys.stderr)
+        return 1
+    if not driver.simulated:
+        # Without this, a device that is not there would break every promise in the same words.
+        try:
+            with driver.make(Side.RIGHT) as robot:
+                robot.configure()
+        except DeviceError as error:
+            print(f"entrain driver: {error}", file=sys.stderr)
+            return 1
+    results = []
+    for result in run_checks(driver, Tolerances(torque=options.torque)):
+        results.append(result)
+        if not options.json:
+            figures = ", ".join(f"{k} {v:.3g}" for k, v in result.figures.items())
+            print(
+                f"{'kept  ' if result.kept else 'BROKEN'} {result.check}: {result.promise}"
+                + (f" [{figures}]" if figures else "")
+                + (f"\n       {result.broken}" if result.broken else ""),
+                flush=True,
+            )
+    broken = sum(not result.kept for result in results)
+    if options.json:
+        report = {"driver": options.driver, "broken": broken}
+        print(json.dumps(report | {"checks": [asdict(result) for result in results]}))
+    else:
+        print(f"{options.driver}: {len(results) - broken} promises kept, {broken} broken")
+    if broken:
+        print(f"entrain driver: {options.driver} breaks {broken} promises", file=sys.stderr)
+    return 1 if broken else 0
+
+
+def refuse_unarmed(driver: Driver, armed: bool) -> None:
+    """Raise LimitError where a device outside simulation has not been armed by the user."""
+    if not (driver.simulated or armed):
+        raise LimitError(
+            f"{driver.name} applies real torque: see that nobody wears it, then say --arm"
+        )
+
+
+def _description(name: str) -> dict[str, Any]:
+    try:
+        robot = find_driver(name).robot
+    except (LimitError, DeviceError) as error:
+        return {"summary": str(error), "options": []}
+    module = sys.modules[robot.__module__]
+    text = (robot.__doc__ or "").strip()
+    if text.startswith("See the module"):
+        text = (module.__doc__ or "").strip()
+    return {
+        "summary": text.splitlines()[0] if text else "",
+        "options": [
+            {"name": f.name, "default": f.default, **f.metadata} for f in fields(robot.Options)
+        ],
+    }
