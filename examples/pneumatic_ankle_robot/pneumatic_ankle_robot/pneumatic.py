@@ -1,0 +1,148 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A simulated pneumatic ankle robot: torque rises and falls evenly as its muscle fills and empties.
+
+Read it beside the contract in ``gait_entrainment.device.AnkleRobot``. A real one would open its
+valves in ``schedule`` and report its pressure sensor in ``promise`` and ``read``.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from gait_entrainment.conventions import Side
+from gait_entrainment.device import (
+    AnkleRobot,
+    Capabilities,
+    DeviceError,
+    PulseTrain,
+    RobotState,
+    TorqueProfile,
+)
+
+STEP = 1_000_000  # of the simulation [ns]
+
+
+@dataclass(frozen=True)
+class PneumaticOptions:
+    """What a user can choose: pneumatic:filling=0.02."""
+
+    filling: float = field(
+        default=0.01,
+        metadata={
+            "meaning": "time in which the muscle fills",
+            "unit": "s",
+            "range": (0.001, 0.1),
+        },
+    )
+
+
+class PneumaticAnkleRobot(AnkleRobot):
+    """See the module's docstring."""
+
+    Options = PneumaticOptions
+
+    def __init__(self, side: Side, options: PneumaticOptions, seed: int) -> None:  # noqa: ARG002
+        self._side = side
+        self._filling = round(options.filling * 1e9)
+        self.capabilities = Capabilities(
+            peak_torque=20.0,
+            torque_rate=20.0 / options.filling,
+            own_pulse_timer=True,
+            measures_torque=False,
+            simulated=True,
+            state_rate=1000.0,
+        )
+        self._train: PulseTrain | None = None
+        self._stopped = False
+        self._promised = self._next_step = 0
+        self._torque = 0.0
+        self._states: list[RobotState] = []
+
+    def configure(self) -> None:
+        """A real one would look for its valves here."""
+        self._stopped = False
+
+    def activate(self) -> None:
+        """A real one would switch on its supply here."""
+
+    def begin(self, start: int) -> None:
+        """Start a run."""
+        self._train = None
+        self._promised = self._next_step = start
+        self._torque = 0.0
+        self._states = []
+
+    def schedule(self, train: PulseTrain) -> None:
+        """Take over a train."""
+        if self._stopped:
+            raise DeviceError("stopped: close and configure first")
+        self._train = train
+
+    def cancel(self) -> None:
+        """Vent."""
+        self._train = None
+
+    def promise(self, until: int) -> TorqueProfile:
+        """Return the torque in steps of a millisecond."""
+        begin = self._promised
+        times, torques = [begin], [self._torque]
+        while self._next_step < until:
+            self._torque = self._torque_at(self._next_step)
+            asked = self._train.torque_at(self._next_step) if self._train else 0.0
+            self._states.append(RobotState(self._next_step, asked, self._torque, float("nan")))
+            if self._next_step == begin:
+                torques[0] = self._torque
+            elif self._torque != torques[-1]:
+                times.append(self._next_step)
+                torques.append(self._torque)
+            self._next_step += STEP
+        self._promised = until
+        train = self._train
+        onsets = [train.onset(n) for n in range(train.count)] if train else []
+        begun = tuple(onset for onset in onsets if begin <= onset < until)
+        return TorqueProfile(self._side, tuple(times), tuple(torques), begun, until)
+
+    def read(self) -> Sequence[RobotState]:
+        """Return a state for each step."""
+        states, self._states = self._states, []
+        return states
+
+    def stop(self) -> None:
+        """Vent, and stay so."""
+        self._stopped = True
+        self._train = None
+
+    def deactivate(self) -> None:
+        """Vent."""
+        self._train = None
+
+    def close(self) -> None:
+        """Vent."""
+        self._train = None
+
+    def _torque_at(self, instant: int) -> float:
+        """Return the mean of what was asked for while the muscle filled: an even rise and fall."""
+        train = self._train
+        if train is None:
+            return 0.0
+        torque = 0.0
+        latest = train.latest(instant)
+        for number in range(max(latest - 1, 0), latest + 1):
+            on = min(instant, train.end(number)) - max(
+                instant - self._filling, train.onset(number)
+            )
+            torque += train.torque * max(on, 0) / self._filling
+        return torque

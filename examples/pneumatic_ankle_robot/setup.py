@@ -1,0 +1,36 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+from setuptools import setup
+
+NAME = "pneumatic_ankle_robot"
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    description="Example of an ankle robot driver in a package of its own",
+    author="The gait_entrainment authors",
+    license="Apache-2.0",
+    packages=[NAME],
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/" + NAME]),
+        ("share/" + NAME, ["package.xml"]),
+    ],
+    install_requires=["setuptools"],
+    zip_safe=False,
+    # This line is all that gait_entrainment needs to find the driver.
+    entry_points={
+        "gait_entrainment.drivers": [f"pneumatic = {NAME}.pneumatic:PneumaticAnkleRobot"]
+    },
+)
