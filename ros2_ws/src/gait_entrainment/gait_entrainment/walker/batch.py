@@ -100,13 +100,19 @@ def walk(
 
 def _torque_changes(pulses: Pulses | None) -> tuple[Stamps, Floats]:
     """Changes of both sides as `trajectory` wants them, the left one first and never perturbed."""
-    count = 0 if pulses is None else pulses.onsets.size
-    changes, torques = np.full(2 + 2 * count, EVER), np.zeros(2 + 2 * count)
-    if pulses is not None:
-        changes[2::2] = pulses.onsets
-        changes[3::2] = pulses.onsets + pulses.width
-        torques[2::2] = pulses.torque
-    return changes, torques
+    left = np.array([EVER]), np.zeros(1)
+    if pulses is None:
+        return np.concatenate([left[0], left[0]]), np.zeros(2)
+    onsets = np.asarray(pulses.onsets, np.int64)
+    if pulses.width <= 0 or np.any(np.diff(onsets) < pulses.width):
+        raise ValueError(f"pulses of {pulses.width} ns must be wider than 0 and not overlap")
+    changes = np.append(EVER, np.stack([onsets, onsets + pulses.width], axis=1))
+    torques = np.append(0.0, np.tile([pulses.torque, 0.0], onsets.size))
+    # Of two changes of one stamp the later counts, and one that changes nothing is no switch.
+    last = np.append(np.diff(changes) != 0, True)
+    changes, torques = changes[last], torques[last]
+    real = np.append(True, np.diff(torques) != 0.0)
+    return np.append(left[0], changes[real]), np.append(left[1], torques[real])
 
 
 @compiled

@@ -113,13 +113,14 @@ Log = Any
 # Widest panel [rad]: keeps the Taylor series of `panel` to rounding.
 PANEL_WIDTH: Final = 1.6
 
-# A panel this narrow [rad, or sqrt(rad) up to a stall] is taken as it is.
+# A panel this narrow [rad, or its root up to a stall] is taken as it is.
 NARROWEST_PANEL: Final = 1e-12
 
-# Rows of the work space that the quadrature fills, one column for each node.
-OFFSET: Final = 0
-STRETCH: Final = 1
-TIME: Final = 2
+# Longest a segment may take [s]: where a stall is approached along a tangent, it takes forever.
+LONGEST: Final = 1e6
+
+# Rows of the work space, one column for each node: from TIME on, what quadratures fill.
+TIME: Final = 0
 WORK_SHAPE: Final = (3, max(PANEL_NODES, SINGLE_STANCE_NODES))
 
 
@@ -214,50 +215,74 @@ def sine_motion(model: Model, segment: Segment, position: float) -> tuple[float,
 
 @compiled
 def panel(
-    model: Model, work: Floats, segment: Segment, start: float, end: float, up_to_stall: bool
+    model: Model, work: Floats, segment: Segment, start: float, end: float
 ) -> tuple[float, bool]:
     """
     Time over one panel of double stance by Gauss-Legendre, and whether that has converged.
 
     The integrand is (d theta / d psi) / theta_dot. Its sines and cosines come from those of the
-    middle and a short Taylor series, in loops that run in vector registers. Up to a stall, where
-    it has an inverse square root, the variable is sqrt(stall - psi) and the integrand smooth.
+    middle and a short Taylor series, in a loop that runs in vector registers.
     """
-    offset, stretch, time = work[OFFSET], work[STRETCH], work[TIME]
-    nodes = model.rule[NODES]
+    nodes, time = model.rule[NODES], work[TIME]
     middle, half = 0.5 * (start + end), 0.5 * (end - start)
-    if up_to_stall:
-        centre = segment.end - 0.5 * (start * start + end * end)
-        for i in range(nodes.size):
-            root = middle + half * nodes[i]
-            offset[i] = segment.end - root * root - centre
-            stretch[i] = -2.0 * root
-    else:
-        centre = middle
-        for i in range(nodes.size):
-            offset[i] = half * nodes[i]
-            stretch[i] = 1.0
-    sin_centre, cos_centre = math.sin(centre), math.cos(centre)
-    rotation = centre - segment.position
+    sin_middle, cos_middle = math.sin(middle), math.cos(middle)
+    rotation = middle - segment.position
     for i in range(nodes.size):
-        x = offset[i]
+        x = half * nodes[i]
         s, c = short_sine(x), short_cosine(x)
-        sin_ankle = sin_centre * c + cos_centre * s
-        cos_ankle = cos_centre * c - sin_centre * s
+        sin_ankle = sin_middle * c + cos_middle * s
+        cos_ankle = cos_middle * c - sin_middle * s
         sine = leg_sine(cos_ankle, model.leg_length, model.foot_length, model.separation)
         cosine = math.sqrt(1.0 - sine * sine)
         gain = torque_work(rotation + x, segment.torque, segment.stiffness)
         square = segment.apex + model.per_energy * gain + model.per_drop * drop(sine, cosine)
         slope = leg_per_ankle(sin_ankle, cosine, model.foot_length, model.separation)
-        time[i] = stretch[i] * slope / math.sqrt(square)
+        time[i] = slope / math.sqrt(square)
+    return weighed(model, work, half)
+
+
+@compiled
+def stall_panel(
+    model: Model, work: Floats, segment: Segment, start: float, end: float
+) -> tuple[float, bool]:
+    """
+    The same for a segment that ends in a stall, over u = sqrt(stall - psi) from start to end.
+
+    In u the integrand is smooth. The squared rate is what it gains from the stall, where it is
+    zero, back to psi; from the energy its last digits would be lost.
+    """
+    time = work[TIME]
+    middle, half = 0.5 * (start + end), 0.5 * (end - start)
+    stall_torque = effective_torque(segment, segment.end)
+    stall_sine = leg_sine_at(model, DOUBLE_STANCE, segment.end)
+    stall_cosine = math.sqrt(1.0 - stall_sine * stall_sine)
+    for i in range(PANEL_NODES):
+        u = middle + half * model.rule[NODES, i]
+        back = u * u
+        position = segment.end - back
+        sine = leg_sine_at(model, DOUBLE_STANCE, position)
+        cosine = math.sqrt(1.0 - sine * sine)
+        rise = 2.0 * math.sin(segment.end - 0.5 * back) * math.sin(0.5 * back)
+        rise *= model.foot_length / model.separation * (sine + stall_sine)
+        gain = torque_work(-back, stall_torque, segment.stiffness)
+        square = model.per_energy * gain + model.per_drop * rise / (cosine + stall_cosine)
+        slope = leg_per_ankle(math.sin(position), cosine, model.foot_length, model.separation)
+        time[i] = -2.0 * u * slope / math.sqrt(square)
+    return weighed(model, work, half)
+
+
+@compiled
+def weighed(model: Model, work: Floats, half: float) -> tuple[float, bool]:
+    """Integral from the integrand at the nodes, and whether its last coefficients are small."""
     weights, tails = model.rule[WEIGHTS], model.rule[TAILS:]
-    for i in range(nodes.size):
-        offset[i] = tails[0, i] * time[i]
-        stretch[i] = tails[1, i] * time[i]
+    time, tail_1, tail_2 = work[TIME], work[TIME + 1], work[TIME + 2]
+    for i in range(weights.size):
+        tail_1[i] = tails[0, i] * time[i]
+        tail_2[i] = tails[1, i] * time[i]
         time[i] = weights[i] * time[i]
-    total = ordered_sum(time, nodes.size)
-    tail = abs(ordered_sum(offset, nodes.size)) + abs(ordered_sum(stretch, nodes.size))
-    return half * total, tail <= 0.5 * TAIL_TOLERANCE * abs(total)
+    total = ordered_sum(time, weights.size)
+    tail = abs(ordered_sum(tail_1, weights.size)) + abs(ordered_sum(tail_2, weights.size))
+    return half * total, tail < 0.5 * TAIL_TOLERANCE * abs(total)
 
 
 @compiled
@@ -308,24 +333,23 @@ def double_stance_time(
     model: Model, work: Floats, segment: Segment, start: float, end: float
 ) -> float:
     """Time [s] from one position of double stance to a later one, in panels that converge."""
-    up_to_stall = segment.ends == FALL
-    if up_to_stall:
-        # The variable sqrt(stall - psi) falls: from the end backwards it grows.
-        start, end = (
-            math.sqrt(max(0.0, segment.end - start)),
-            math.sqrt(max(0.0, segment.end - end)),
-        )
+    to_stall = segment.ends == FALL
+    widest = PANEL_WIDTH
+    if to_stall:
+        start = math.sqrt(max(0.0, segment.end - start))
+        end = math.sqrt(max(0.0, segment.end - end))
     total, here, width = 0.0, start, end - start
-    # psi changes by at most 2 sqrt(stall - start) times the change of its root.
-    limit = 0.5 * PANEL_WIDTH / start if up_to_stall else PANEL_WIDTH
     while here != end:
-        width = max(-limit, min(limit, width))
+        width = max(-widest, min(widest, width))
         there = end if abs(end - here) <= abs(width) else here + width
-        part, converged = panel(model, work, segment, here, there, up_to_stall)
+        if to_stall:
+            part, converged = stall_panel(model, work, segment, here, there)
+        else:
+            part, converged = panel(model, work, segment, here, there)
         if converged or abs(width) < NARROWEST_PANEL:
             total += part
             here = there
             width = 2.0 * width
         else:
             width = 0.5 * width
-    return total
+    return total if total < LONGEST else LONGEST

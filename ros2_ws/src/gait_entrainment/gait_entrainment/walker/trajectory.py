@@ -93,15 +93,18 @@ def proceed(
     """
     Go on to the next switch, writing the segment it begins over `segment`.
 
-    HELD if it comes after `until`, ENDED if the walker falls or flies off by then.
+    HELD if it comes after `until`, ENDED if the walker falls or flies off before. Such an end comes
+    after a torque change of its own stamp, which may avert it.
     """
     end, rest = clock(segment.stamp, segment.rest, segment.duration)
     end_stamp = rounded_stamp(seconds(end, rest))
+    terminal = segment.ends == FALL or segment.ends == FLY_OFF
+    due = end_stamp + 1 if terminal else end_stamp
     trailing = 1 - segment.leading
     if segment.phase == DOUBLE_STANCE:
         ahead = skip_changes(changes, right, cursors, trailing, segment.after)
         index = cursors[trailing]
-        if ahead and changes[index] < end_stamp:
+        if ahead and changes[index] < due:
             stamp = changes[index]
             if stamp >= until:
                 return HELD
@@ -110,9 +113,9 @@ def proceed(
             segment.stamp, segment.rest, segment.after = stamp, 0.0, stamp
             change_torque(model, segment, position, torques[index], work)
             return SWITCHED
-    if end_stamp > until:
+    if due > until:
         return HELD
-    if segment.ends == FALL or segment.ends == FLY_OFF:
+    if terminal:
         return ENDED
     segment.stamp, segment.rest = end, rest
     segment.after = max(segment.after, end_stamp - 1)

@@ -41,6 +41,7 @@ from gait_entrainment.walker.segment import (
     FLY_OFF,
     HEEL_STRIKE,
     SINGLE_STANCE,
+    TIME,
     TOE_OFF,
     TORQUE_CHANGE,
     UNLOADING,
@@ -188,7 +189,7 @@ def look_ahead_double_stance(model: Model, segment: Segment, work: Floats) -> No
 @compiled
 def whole_time(whole: Floats, work: Floats, apex: float) -> float:
     """Duration [s] of a whole phase: one quadrature whose geometry was made once."""
-    gain, weights, time = whole[0], whole[1], work[0]
+    gain, weights, time = whole[0], whole[1], work[TIME]
     for i in range(gain.size):
         time[i] = weights[i] / math.sqrt(apex + gain[i])
     return ordered_sum(time, gain.size)

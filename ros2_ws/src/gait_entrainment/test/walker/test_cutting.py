@@ -1,0 +1,146 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How a run is asked for must not change a bit of it."""
+
+from itertools import pairwise
+
+import numpy as np
+from driving import SECOND, TABLE_1, promise, pulse_trains
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gait_entrainment.conventions import Side, nanoseconds
+from gait_entrainment.walker import Pulses, Walker, walk
+
+RUN = 6 * SECOND
+SETTINGS = settings(derandomize=True, deadline=None, max_examples=40)
+CUTS = st.lists(st.integers(1, RUN - 1), max_size=30, unique=True)
+TORQUES = st.floats(-150, 60)
+
+
+def whole(pulses, grid):
+    walker = Walker(TABLE_1)
+    promise(walker, pulses, RUN)
+    events = walker.advance(RUN)
+    return walker, events, walker.sample(grid[grid <= walker.time_reached])
+
+
+def pieces(pulses, begin, end):
+    """The part of a train that lies in [begin, end), as pieces that begin at `begin`."""
+    borders = sorted({begin} | {t for a, b, _ in pulses for t in (a, b) if begin < t < end})
+    level = [sum(torque for a, b, torque in pulses if a <= t < b) for t in borders]
+    return borders, [float(torque) for torque in level]
+
+
+def same(one, other):
+    for name in vars(one):
+        a, b = getattr(one, name), getattr(other, name)
+        assert np.array_equal(a, b), name
+
+
+@SETTINGS
+@given(left=pulse_trains(TORQUES), right=pulse_trains(TORQUES), cuts=CUTS, data=st.data())
+def test_cutting_promises_and_advances_changes_nothing(left, right, cuts, data):
+    grid = np.arange(0, RUN, 37_000_017)
+    reference, events, samples = whole((left, right), grid)
+
+    walker, cut_events, cut_samples, begin = Walker(TABLE_1), [], [], 0
+    for end in [*sorted(cuts), RUN]:
+        for side, train in zip(Side, (left, right), strict=True):
+            # Promises run ahead of the walk by different stretches, cut at different places.
+            ahead = data.draw(st.sampled_from([0, 1, 10_000_000, 900_000_000]))
+            until = max(walker._promises[side].valid_until, min(RUN, end + ahead))
+            since = walker._promises[side].valid_until
+            if until > since:
+                walker.extend_torque(side, *pieces(train, since, until), until)
+        cut_events += walker.advance(end)
+        inside = grid[(grid >= begin) & (grid < end) & (grid <= walker.time_reached)]
+        cut_samples.append(walker.sample(inside))
+        begin = end
+    assert cut_events == events
+    assert walker.ending == reference.ending
+    for name in vars(samples):
+        joined = np.concatenate([getattr(part, name) for part in cut_samples])
+        assert np.array_equal(joined, getattr(samples, name)), name
+
+
+@SETTINGS
+@given(right=pulse_trains(TORQUES), order=st.randoms(use_true_random=False))
+def test_a_sample_does_not_depend_on_the_others(right, order):
+    grid = np.arange(0, RUN, 61_000_003)
+    walker, _, samples = whole(((), right), grid)
+    shuffled = list(range(samples.leading.size))
+    order.shuffle(shuffled)
+    same(
+        walker.sample(grid[shuffled]),
+        type(samples)(**{name: value[shuffled] for name, value in vars(samples).items()}),
+    )
+    if shuffled:
+        alone = walker.sample(grid[shuffled[:1]])
+        assert np.array_equal(alone.position[0], samples.position[shuffled[0]])
+
+
+@SETTINGS
+@given(right=pulse_trains(st.floats(-5, 25)))
+def test_equal_neighbours_are_merged(right):
+    """A profile that repeats its torque piece by piece is the profile without the repeats."""
+    _, events, _ = whole(((), right), np.empty(0, np.int64))
+    walker = Walker(TABLE_1)
+    borders, torques = pieces(right, 0, RUN)
+    fine = sorted({*borders, *range(0, RUN, 10_000_000)})
+    levels = [torques[np.searchsorted(borders, t, "right") - 1] for t in fine]
+    walker.extend_torque(Side.RIGHT, fine, levels, RUN)
+    assert walker.advance(RUN) == events
+
+
+@SETTINGS
+@given(period=st.floats(1.6, 2.2), torque=st.floats(-15, 30), onset=st.integers(0, 2 * SECOND))
+def test_the_batch_walk_gives_the_bits_of_the_walker(period, torque, onset):
+    onsets = onset + np.array([nanoseconds(n * period) for n in range(4)])
+    events = walk(TABLE_1, 6, Pulses(onsets, SECOND // 10, torque))
+    walker = Walker(TABLE_1)
+    train = [(int(t), int(t) + SECOND // 10, torque) for t in onsets]
+    promise(walker, ((), train), 10 * SECOND)
+    expected = walker.advance(10 * SECOND)
+    strikes = [event.time for event in expected if event.kind == 0][:7]
+    assert np.array_equal(events.heel_strikes, strikes[: events.heel_strikes.size])
+    offs = [event.time for event in expected if event.kind == 1][:6]
+    assert np.array_equal(events.toe_offs, offs[: events.toe_offs.size])
+
+
+def test_events_are_told_once_and_by_their_stamps():
+    walker = Walker(TABLE_1)
+    first = walker.advance(0)
+    assert [(e.kind, e.step, e.stamp, e.side) for e in first] == [(0, 0, 0, Side.RIGHT)]
+    toe_off = walk(TABLE_1, 1).toe_offs[0]
+    stamp = nanoseconds(toe_off)
+    assert walker.advance(stamp - 1) == []
+    (event,) = walker.advance(stamp)
+    assert (event.kind, event.side, event.step, event.stamp) == (1, Side.LEFT, 1, stamp)
+    assert walker.advance(stamp) == []
+
+
+def test_steps_and_sides_alternate():
+    walker = Walker(TABLE_1, Side.LEFT)
+    events = walker.advance(10 * SECOND)
+    strikes = [e for e in events if e.kind == 0]
+    assert [e.step for e in strikes] == list(range(len(strikes)))
+    assert [e.side for e in strikes] == [Side(n % 2) for n in range(len(strikes))]
+    for before, after in pairwise(events):
+        assert before.time < after.time
+        assert after.stamp == nanoseconds(after.time)
+        if after.kind == 1:
+            assert after.side == before.side.other
+            assert after.step == before.step + 1

@@ -1,0 +1,122 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Promises of torque: what is refused, late, provisional, cut."""
+
+import numpy as np
+import pytest
+from driving import SECOND, TABLE_1, walked
+
+from gait_entrainment.conventions import Side
+from gait_entrainment.walker import Walker
+
+ONSET, END = SECOND, SECOND + SECOND // 5
+
+
+def delivered(walker, *stamps):
+    return walker.sample(np.array(stamps)).delivered_torque[:, Side.RIGHT].tolist()
+
+
+def test_without_a_promise_the_torque_is_zero():
+    walker = Walker(TABLE_1)
+    assert walker.advance(3 * SECOND) == walked(seconds=3.0)[1]
+    assert walker.valid_until == 0
+
+
+def test_valid_until_is_what_is_promised_for_both_ankles():
+    walker = Walker(TABLE_1)
+    walker.extend_torque(Side.RIGHT, [0], [0.0], 5)
+    assert walker.valid_until == 0
+    walker.extend_torque(Side.LEFT, [], [], 3)
+    assert walker.valid_until == 3
+
+
+def test_a_gap_between_promises_is_zero_torque():
+    walker = Walker(TABLE_1)
+    walker.extend_torque(Side.RIGHT, [0], [5.0], 10)
+    walker.extend_torque(Side.RIGHT, [20], [5.0], 30)
+    walker.advance(40)
+    assert delivered(walker, 5, 10, 11, 20, 21, 30, 31) == [5, 5, 0, 0, 5, 5, 0]
+
+
+def test_a_promise_that_comes_late_acts_from_where_the_walker_is():
+    walker = Walker(TABLE_1)
+    walker.advance(ONSET + 100)
+    late = walker.extend_torque(Side.RIGHT, [ONSET - 50, ONSET + 150], [7.0, 8.0], END)
+    assert late == ONSET + 100
+    walker.advance(END + 1)
+    stamps = (ONSET + 100, ONSET + 101, ONSET + 150, ONSET + 151, END, END + 1)
+    assert delivered(walker, *stamps) == [0, 7, 7, 8, 8, 0]
+    assert walker.extend_torque(Side.RIGHT, [END + 1], [1.0], END + 2) == 1
+
+
+def test_a_promise_that_is_over_when_it_comes_changes_nothing():
+    walker = Walker(TABLE_1)
+    walker.advance(END)
+    assert walker.extend_torque(Side.RIGHT, [0], [50.0], ONSET) == ONSET
+    walker.advance(3 * SECOND)
+    assert delivered(walker, END, END + 1) == [0, 0]
+
+
+def test_stop_voids_what_was_promised_on_both_ankles():
+    walker = Walker(TABLE_1)
+    for side in Side:
+        walker.extend_torque(side, [0, ONSET, END], [1.0, 9.0, 2.0], 3 * SECOND)
+    walker.advance(ONSET)
+    walker.cut_torque(ONSET + 1000)
+    assert walker.valid_until == ONSET + 1000
+    walker.advance(2 * SECOND)
+    s = walker.sample(np.array([ONSET, ONSET + 1, ONSET + 1000, ONSET + 1001, END + 1]))
+    assert s.delivered_torque.tolist() == [[1, 1], [9, 9], [9, 9], [0, 0], [0, 0]]
+    # From the stop on torque can be promised anew.
+    assert walker.extend_torque(Side.LEFT, [2 * SECOND], [3.0], 3 * SECOND) == pytest.approx(
+        SECOND - 1000
+    )
+
+
+def test_stop_does_not_reach_into_what_has_been_walked():
+    walker = Walker(TABLE_1)
+    walker.extend_torque(Side.RIGHT, [0], [4.0], 3 * SECOND)
+    walker.advance(SECOND)
+    walker.cut_torque(10)
+    walker.advance(2 * SECOND)
+    assert delivered(walker, SECOND, SECOND + 1) == [4, 0]
+
+
+@pytest.mark.parametrize(
+    ("times", "torques", "until", "message"),
+    [
+        ([200, 300], [1.0], 400, "one each"),
+        ([300, 200], [1.0, 2.0], 400, "not increasing"),
+        ([200, 400], [1.0, 2.0], 400, "not increasing"),
+        ([50], [1.0], 400, "contradicts the promise up to 100 ns"),
+        ([200], [float("nan")], 400, "not all finite"),
+        ([], [], 50, "before the promise"),
+    ],
+)
+def test_promises_that_make_no_sense_are_refused(times, torques, until, message):
+    walker = Walker(TABLE_1)
+    walker.extend_torque(Side.RIGHT, [], [], 100)
+    with pytest.raises(ValueError, match=message):
+        walker.extend_torque(Side.RIGHT, times, torques, until)
+
+
+def test_a_long_run_keeps_only_what_it_needs():
+    walker = Walker(TABLE_1)
+    for n in range(400):
+        begin = n * SECOND // 4
+        walker.extend_torque(Side.RIGHT, [begin], [float(n % 3)], begin + SECOND // 4)
+        walker.advance(begin + SECOND // 4)
+    assert walker._log.size <= 64
+    assert len(walker._promises[Side.RIGHT].arrays()[0]) < 20

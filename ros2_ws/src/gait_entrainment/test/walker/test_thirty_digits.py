@@ -1,0 +1,64 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Event times to 1e-13 s, against 32-digit integration."""
+
+import numpy as np
+import pytest
+from driving import SECOND, TABLE_1
+from thirty_digits import Reference, mpf
+
+from gait_entrainment.walker import Pulses, walk
+
+TOLERANCE = 1e-13
+
+
+def edges_of(events, onsets, width, torque):
+    """Where in each step of the right leg's double stance the torque changes, exactly."""
+    edges = {}
+    for step in range(1, events.toe_offs.size, 2):
+        start, end = events.heel_strikes[step], events.toe_offs[step]
+        for onset in onsets:
+            for stamp, level in ((onset, torque), (onset + width, 0.0)):
+                # Exact instants, and the changes in single stance left out.
+                if start < stamp / SECOND < end:
+                    edges.setdefault(step, []).append((mpf(int(stamp)) / SECOND, level))
+            if onset / SECOND <= start < (onset + width) / SECOND:
+                edges.setdefault(step, []).insert(0, (None, torque))
+    return edges
+
+
+def worst(events, reference):
+    strikes, offs = reference
+    errors = [float(t - mpf(float(s))) for s, t in zip(events.heel_strikes, strikes, strict=True)]
+    errors += [float(t - mpf(float(s))) for s, t in zip(events.toe_offs, offs, strict=True)]
+    return np.abs(errors).max()
+
+
+def test_unperturbed_run_as_long_as_the_default_protocol():
+    events = walk(TABLE_1, 160)
+    assert worst(events, Reference().walk(160, {})) < TOLERANCE
+
+
+@pytest.mark.parametrize(
+    ("period", "torque"), [(1.8832, 0.1 * TABLE_1.peak_torque), (1.70, 13.0), (2.05, -9.0)]
+)
+def test_pulses_that_lock_and_pulses_that_drift_through_double_stance(period, torque):
+    """Drifting pulses also begin before heel strike and end after toe-off."""
+    onsets = np.array([int(1.15e9) + round(n * period * SECOND) for n in range(20)])
+    width = SECOND // 10
+    events = walk(TABLE_1, 24, Pulses(onsets, width, torque))
+    edges = edges_of(events, onsets, width, torque)
+    assert edges
+    assert worst(events, Reference().walk(24, edges)) < TOLERANCE
