@@ -88,13 +88,20 @@ def _edges(values: Any) -> list[float]:
 
 
 def _neighbours(rows: Sequence[StableInterval]) -> list[tuple[StableInterval, StableInterval]]:
-    """Pairs of intervals at neighbouring torques that continue each other: they overlap."""
-    torques = sorted({one.torque_fraction for one in rows})
-    following = dict(pairwise(torques))
-    return [
-        (one, other)
-        for one in rows
-        for other in rows
-        if following.get(one.torque_fraction) == other.torque_fraction
-        and max(one.shortest, other.shortest) < min(one.longest, other.longest)
-    ]
+    """Pairs of intervals at neighbouring torques that continue each other."""
+    by_torque: dict[float, list[StableInterval]] = {}
+    for one in rows:
+        by_torque.setdefault(one.torque_fraction, []).append(one)
+    pairs = []
+    for here, there in pairwise(by_torque[torque] for torque in sorted(by_torque)):
+        if len(here) == len(there):
+            pairs += list(zip(here, there, strict=True))
+        else:
+            # One has split or ended: those belong together that overlap.
+            pairs += [
+                (one, other)
+                for one in here
+                for other in there
+                if max(one.shortest, other.shortest) < min(one.longest, other.longest)
+            ]
+    return pairs
