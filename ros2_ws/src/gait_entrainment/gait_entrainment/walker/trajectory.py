@@ -93,8 +93,8 @@ def proceed(
     """
     Go on to the next switch, writing the segment it begins over `segment`.
 
-    HELD if it comes after `until`, ENDED if the walker falls or flies off before. Such an end comes
-    after a torque change of its own stamp, which may avert it.
+    HELD if it comes after `until`, ENDED if the walker falls or flies off before. Such an end
+    comes after a torque change of its own stamp, which may avert it.
     """
     end, rest = clock(segment.stamp, segment.rest, segment.duration)
     end_stamp = rounded_stamp(seconds(end, rest))

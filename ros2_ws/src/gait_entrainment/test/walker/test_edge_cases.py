@@ -222,10 +222,10 @@ def test_fly_off_in_between_by_a_pulse_that_is_just_too_large():
     long_feet = WalkerParameters(
         leg_angle=0.52, foot_length=0.405, max_plantarflexion=2.79, ankle_stiffness=110.0
     )
-    onset, end = ns(0.05), ns(0.4)
+    onset, end = ns(0.05), ns(1.0)
 
     def attempt(torque):
-        return walked((((onset, end, torque),), ()), 0.45, long_feet)
+        return walked((((onset, end, torque),), ()), 1.2, long_feet)
 
     low, high = 1.0, 60.0
     while high - low > 1e-9:
