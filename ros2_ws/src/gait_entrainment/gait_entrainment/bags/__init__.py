@@ -26,6 +26,7 @@ from gait_entrainment.bags.errors import (
 )
 from gait_entrainment.bags.mcap_file import BagMessage
 from gait_entrainment.bags.metadata import INFINITE, QosProfile, TopicInfo
+from gait_entrainment.bags.playback import FASTEST, Moment, Playback, choose_topics
 from gait_entrainment.bags.reader import BagInfo, BagReader, info
 from gait_entrainment.bags.recovery import Recovery, recover
 from gait_entrainment.bags.tables import export
@@ -43,6 +44,10 @@ __all__ = [
     "recover",
     "Recovery",
     "export",
+    "Playback",
+    "Moment",
+    "FASTEST",
+    "choose_topics",
     "TopicInfo",
     "QosProfile",
     "INFINITE",
