@@ -22,7 +22,14 @@ which a lock-step run drives them. So both give the same events to the nanosecon
 from dataclasses import dataclass
 
 from gait_entrainment.analysis import Analysis, VerdictSettings, analyze
-from gait_entrainment.device import DeviceLimits, LimitError, PulseTrain, find_driver
+from gait_entrainment.device import (
+    DeviceLimits,
+    LimitError,
+    PulseTiming,
+    PulseTrain,
+    TimingAudit,
+    find_driver,
+)
 from gait_entrainment.events import GaitEvent
 from gait_entrainment.experiment import Conductor
 from gait_entrainment.protocol import Protocol
@@ -35,7 +42,8 @@ class Simulation:
 
     protocol: Protocol
     events: tuple[GaitEvent, ...]
-    onsets: tuple[int, ...]  # of the pulses that were delivered
+    onsets: tuple[int, ...]  # of the pulses that were delivered, as the analysis takes them
+    timings: tuple[PulseTiming, ...]  # commanded, sent and measured onset of each pulse
     train: PulseTrain | None  # as planned; None where the walker did not come so far
     measured_period: float  # mean stride period over the baseline [s]; NaN without a plan
     ending: Ending | None  # fall or fly-off; None where every stride was walked
@@ -46,9 +54,14 @@ def simulate(
     protocol: Protocol,
     limits: DeviceLimits | None = None,
     settings: VerdictSettings | None = None,
+    *,
+    measured_onsets: bool = False,
 ) -> Simulation:
     """
     Conduct a protocol on the simulated walker.
+
+    With ``measured_onsets`` the analysis takes the onset of each pulse from the torque that the
+    robot measured, where it shows one, instead of from the command.
 
     Raises
     ------
@@ -72,10 +85,14 @@ def simulate(
     run = WalkerRun(protocol.walker, first_heel_strike=protocol.side, sample_rate=None)
     events: list[GaitEvent] = []
     onsets: list[int] = []
+    audit, timings = TimingAudit(), []
     while not run.ended:
         horizon = conductor.horizon(run.reached)
         profile = robot.promise(horizon.until)
         onsets += profile.onsets
+        for onset in profile.onsets:
+            audit.add_pulse(onset, protocol.pulse_torque, protocol.pulses.width)
+        timings += audit.add_states(robot.read())
         run.accept(profile)
         for transition in run.advance(horizon.until, last=horizon.last).transitions:
             event = GaitEvent(transition.stamp, transition.kind, transition.side, transition.step)
@@ -83,10 +100,14 @@ def simulate(
             train = conductor.add_event(event)
             if train is not None:
                 robot.schedule(train)
+    timings += audit.finish()
+    if measured_onsets:
+        onsets = [t.commanded if t.measured is None else t.measured for t in timings]
     return Simulation(
         protocol=protocol,
         events=tuple(events),
         onsets=tuple(onsets),
+        timings=tuple(timings),
         train=conductor.train,
         measured_period=conductor.measured_period,
         ending=run.ending,

@@ -119,3 +119,40 @@ def test_a_walk_that_ends_by_itself_is_reported():
     assert simulation.ending is not None
     assert simulation.ending.missing > 0
     assert len(simulation.analysis.strides) < protocol.strides
+
+
+def test_a_device_of_realistic_bandwidth_still_entrains(default):
+    """Its pulses come later, so the gait locks with them commanded earlier by as much."""
+    emulated = simulate(Protocol(driver="emulated"))
+    assert emulated.analysis.entrainments[-1].verdict is Verdict.ENTRAINED
+    late = [(t.measured - t.commanded) / 1e9 for t in emulated.timings]
+    assert len(late) == 50
+    assert 0.005 < min(late)
+    assert max(late) < 0.020
+    lag, ideal = (s.analysis.pulses[-1].phase_lag for s in (emulated, default))
+    assert lag < ideal - 0.005
+    # Seen from the torque that was measured, the lag is nearer to the ideal robot's.
+    seen = simulate(Protocol(driver="emulated"), measured_onsets=True)
+    assert seen.events == emulated.events
+    assert abs(seen.analysis.pulses[-1].phase_lag - ideal) < abs(lag - ideal) / 2
+
+
+def test_the_ideal_robot_is_on_time_to_the_nanosecond(default):
+    assert [(t.sent, t.measured) for t in default.timings] == [
+        (t.commanded, t.commanded) for t in default.timings
+    ]
+    assert tuple(t.commanded for t in default.timings) == default.onsets
+
+
+def test_the_same_seed_walks_the_same_and_another_does_not():
+    runs = [
+        simulate(Protocol(driver="emulated", seed=seed, pulses=PulsePlan(count=5)))
+        for seed in (7, 7, 8)
+    ]
+    assert runs[0].events == runs[1].events
+    assert runs[0].events != runs[2].events
+
+
+def test_a_device_of_the_real_world_cannot_be_simulated():
+    with pytest.raises(LimitError, match="real time only"):
+        simulate(Protocol(driver="ak_mit_can"))

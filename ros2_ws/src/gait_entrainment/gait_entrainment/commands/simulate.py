@@ -21,8 +21,9 @@ import sys
 from typing import Any
 
 from gait_entrainment.commands.protocol_options import add_protocol_options, chosen_protocol
-from gait_entrainment.device import LimitError
+from gait_entrainment.device import DeviceError, LimitError
 from gait_entrainment.protocol import ProtocolError
+from gait_entrainment.report.pulse_timing import timing_outcome, timing_summary
 from gait_entrainment.report.summary import outcome_of, summary
 
 _EXAMPLES = """examples:
@@ -42,6 +43,12 @@ def add_command(commands: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_protocol_options(parser)
+    parser.add_argument(
+        "--onset",
+        choices=("commanded", "measured"),
+        default="commanded",
+        help="take the onset of a pulse from the command (default) or from the measured torque",
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.set_defaults(run=run)
 
@@ -53,8 +60,8 @@ def run(options: argparse.Namespace) -> int:
 
     try:
         protocol = chosen_protocol(options)
-        simulation = simulate(protocol)
-    except (ProtocolError, LimitError) as error:
+        simulation = simulate(protocol, measured_onsets=options.onset == "measured")
+    except (ProtocolError, LimitError, DeviceError) as error:
         print(f"entrain simulate: {error}", file=sys.stderr)
         return 2
     outcome = outcome_of(
@@ -64,7 +71,9 @@ def run(options: argparse.Namespace) -> int:
         simulation.measured_period,
         simulation.train.period if simulation.train else math.nan,
     )
-    print(json.dumps(outcome) if options.json else summary(outcome))
+    outcome["pulse_timing"] = timing_outcome(simulation.timings, simulation.measured_period)
+    lines = [summary(outcome), *timing_summary(outcome["pulse_timing"])]
+    print(json.dumps(outcome) if options.json else "\n".join(lines))
     if simulation.ending is not None:
         print(f"entrain simulate: {simulation.ending.message}", file=sys.stderr)
         return 1

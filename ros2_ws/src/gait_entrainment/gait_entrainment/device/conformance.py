@@ -530,7 +530,7 @@ def timing(bench: Bench) -> None:
     train = bench.train(count=count, duration=0.12, period=0.3)
     bench.robot.schedule(train)
     bench.run(_LEAD + count * train.period + 0.3)
-    audit = TimingAudit(sampled=bench.robot.capabilities.state_rate > 0)
+    audit = TimingAudit()
     for number in range(count):
         audit.add_pulse(train.onset(number), train.torque, train.duration)
     timings: list[PulseTiming] = [*audit.add_states(bench.states), *audit.finish()]

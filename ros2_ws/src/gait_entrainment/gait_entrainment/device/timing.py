@@ -39,12 +39,7 @@ _LONGEST_GAP = 20_000_000
 
 
 def measured_onset(
-    stamps: Sequence[int],
-    torques: Sequence[float],
-    height: float,
-    fraction: float = CROSSING,
-    *,
-    sampled: bool = True,
+    stamps: Sequence[int], torques: Sequence[float], height: float, fraction: float = CROSSING
 ) -> int | None:
     """
     Return the instant [ns] at which a torque first rises through a fraction of a pulse's height.
@@ -59,9 +54,6 @@ def measured_onset(
         Of the pulse [N m]; a negative one is crossed downwards.
     fraction
         Of the height, in (0, 1).
-    sampled
-        Whether the torque was sampled; else it is known at each of its jumps, and the onset is
-        the instant of one.
 
     Returns
     -------
@@ -70,16 +62,25 @@ def measured_onset(
         torque that is over the threshold from the first state on has no onset in view.
 
     """
+    found = _crossing(stamps, torques, height, fraction)
+    return found[1] if found is not None else None
+
+
+def _crossing(
+    stamps: Sequence[int], torques: Sequence[float], height: float, fraction: float
+) -> tuple[int, int] | None:
+    """Return the index of the first state past the crossing, and the instant of the crossing."""
     before: tuple[int, float] | None = None
-    for stamp, torque in zip(stamps, torques, strict=True):
+    for index, (stamp, torque) in enumerate(zip(stamps, torques, strict=True)):
         level = torque / height
         if math.isnan(level):
             continue
         if level >= fraction and before is not None and before[1] < fraction:
             earlier, lower = before
-            if not sampled or stamp - earlier > _LONGEST_GAP:
-                return stamp
-            return earlier + round((stamp - earlier) * (fraction - lower) / (level - lower))
+            if stamp - earlier > _LONGEST_GAP:
+                return index, stamp
+            share = (fraction - lower) / (level - lower)
+            return index, earlier + round((stamp - earlier) * share)
         before = (stamp, level)
     return None
 
@@ -107,8 +108,7 @@ class _Pulse:
 class TimingAudit:
     """Follows pulses and states as they come; tells the timing of each pulse once it is known."""
 
-    def __init__(self, *, sampled: bool = True) -> None:
-        self._sampled = sampled
+    def __init__(self) -> None:
         self._pulses: list[_Pulse] = []
         self._states: list[RobotState] = []
 
@@ -146,12 +146,12 @@ class TimingAudit:
         self._states = [*before[-1:], *(s for s in self._states if s.stamp >= pulse.onset)]
         seen = [*before[-1:], *during]
         sent = next((s.stamp for s in during if s.commanded / pulse.height > 0), None)
-        measured = measured_onset(
-            [s.stamp for s in seen],
-            [s.measured for s in seen],
-            pulse.height,
-            sampled=self._sampled,
-        )
+        stamps, torques = [s.stamp for s in seen], [s.measured for s in seen]
+        found = _crossing(stamps, torques, pulse.height, CROSSING)
+        measured = None if found is None else found[1]
+        if found is not None and seen[found[0]].measured == seen[found[0]].commanded:
+            # Equal to the last bit: not measured but computed, and known at each of its jumps.
+            measured = seen[found[0]].stamp
         return PulseTiming(pulse.onset, sent, measured)
 
 
