@@ -146,7 +146,7 @@ def test_the_ideal_robot_is_on_time_to_the_nanosecond(default):
 
 def test_the_same_seed_walks_the_same_and_another_does_not():
     runs = [
-        simulate(Protocol(driver="emulated", seed=seed, pulses=PulsePlan(count=5)))
+        simulate(Protocol(driver="emulated", seed=seed, pulses=PulsePlan(count=30)))
         for seed in (7, 7, 8)
     ]
     assert runs[0].events == runs[1].events
