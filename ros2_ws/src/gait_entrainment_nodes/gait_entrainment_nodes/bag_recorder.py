@@ -97,7 +97,7 @@ class BagRecorder(Participant, Node):
             self.bag = BagWriter(
                 output,
                 ros_distro=os.environ.get("ROS_DISTRO", "jazzy"),
-                custom_data=json.loads(custom_data),
+                custom_data=_texts(custom_data),
             )
         except BagError as error:
             raise ValueError(f"output: {error}") from None
@@ -277,6 +277,17 @@ class BagRecorder(Participant, Node):
             self.bag.close()
         except BagError as error:
             self.failure = self.failure or str(error)
+
+
+def _texts(custom_data: str) -> dict[str, str]:
+    """Return a JSON object of texts; ValueError where it is none."""
+    try:
+        texts = json.loads(custom_data)
+    except ValueError:
+        texts = None
+    if not isinstance(texts, dict) or not all(isinstance(text, str) for text in texts.values()):
+        raise ValueError(f"custom_data: {custom_data!r}; allowed: a JSON object of texts")
+    return texts
 
 
 def _message_type(name: str) -> Any:

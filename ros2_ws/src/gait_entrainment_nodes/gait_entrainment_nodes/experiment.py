@@ -57,6 +57,8 @@ from gait_entrainment_nodes.topics import (
 TICK = 0.02
 # A tick that is so late [s] says that this process was held up: others are not blamed for it.
 HELD_UP = 1.0
+# After so long [s] a participant is asked anew whether it is ready.
+ASK_AGAIN = 0.5
 # How long each step of ending a failed run may take [s]: who fails may not answer any more.
 FAREWELL = 0.5
 
@@ -131,7 +133,8 @@ class Experiment(Participant, Node):
         self._change_state = self.create_client(ChangeState, "perturbator/change_state")
         self._get_state = self.create_client(GetState, "perturbator/get_state")
         self._deliver = ActionClient(self, DeliverPulseTrain, "perturbator/deliver_pulse_train")
-        # Ready services are looked up by name: a participant may be any node that offers one.
+        # Ready services are looked up by name: a participant may be any node that offers one. They
+        # come behind the other clients: see not_ready_yet.
         self._ready = {p: self.create_client(Trigger, f"{p}/ready") for p in self.participants}
         self._server = ActionServer(
             self,
@@ -211,8 +214,9 @@ class Experiment(Participant, Node):
         """End a failed run, torque first, as far as the others still answer."""
         self.publish_state(Phase.FAILED, reason)
         self.diagnose(self.known_until, DiagnosticStatus.ERROR, reason)
-        with contextlib.suppress(ExperimentError):
-            await self.transition(Transition.TRANSITION_DEACTIVATE, FAREWELL)
+        if self.activated:
+            with contextlib.suppress(ExperimentError):
+                await self.transition(Transition.TRANSITION_DEACTIVATE, FAREWELL)
         if self.promised_until and self.closed is None:
             with contextlib.suppress(ExperimentError):
                 await self.close_run(FAREWELL)
@@ -229,6 +233,7 @@ class Experiment(Participant, Node):
         self.horizons_sent = self.profiles_received = 0
         self.promised_until = 0  # by the latest horizon [ns since 1970]
         self.planning = False  # a train has been requested and not been accepted yet
+        self.activated = False  # the perturbator is, for this run
         self.closed: Future | None = None  # the horizon that closes the run has been answered
         self.shown: tuple[Phase, int] | None = None
 
@@ -260,9 +265,14 @@ class Experiment(Participant, Node):
                 if not hidden and self.count_publishers(name) and "bag_recorder" not in nodes:
                     return f"bag_recorder has not subscribed to {name}"
         for name, client in self._ready.items():
-            response = await self.within(
-                client.call_async(Trigger.Request()), f"{name} does not answer"
-            )
+            # An answer may be lost, as long as the participant does not know who asked. Who has
+            # answered here knows all clients of this node: discovery goes in their order.
+            try:
+                response = await self.within(
+                    client.call_async(Trigger.Request()), f"{name} does not answer", ASK_AGAIN
+                )
+            except ExperimentError as silence:
+                return str(silence)
             if not response.success:
                 return f"{name} waits for {response.message}"
             for topic in self.reaching_too_few(response.message):
@@ -291,6 +301,7 @@ class Experiment(Participant, Node):
             await self.transition(Transition.TRANSITION_CONFIGURE)
         if response.current_state.id != State.PRIMARY_STATE_ACTIVE:
             await self.transition(Transition.TRANSITION_ACTIVATE)
+        self.activated = True
 
     async def transition(self, number: int, timeout: float | None = None) -> None:
         """Take the perturbator through one lifecycle transition."""

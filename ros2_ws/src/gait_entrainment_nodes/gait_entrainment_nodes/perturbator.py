@@ -27,6 +27,7 @@ import sys
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.task import Future
@@ -86,6 +87,19 @@ class Perturbator(Participant, LifecycleNode):
         )
 
     # Lifecycle
+
+    def _LifecycleNodeMixin__on_change_state(self, request: Any, response: Any) -> Any:  # noqa: N802
+        """
+        Refuse a transition that there is not from the present state.
+
+        Jazzy's rclpy raises an exception there, which would end the node.
+        """
+        try:
+            return super()._LifecycleNodeMixin__on_change_state(request, response)
+        except RCLError as error:
+            self.get_logger().error(f"transition {request.transition.id} refused: {error}")
+            response.success = False
+            return response
 
     def on_configure(self, _: LifecycleState) -> TransitionCallbackReturn:
         """Load the driver; releases a latched stop."""

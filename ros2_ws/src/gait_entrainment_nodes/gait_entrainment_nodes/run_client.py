@@ -73,9 +73,11 @@ class RunClient:
             total=protocol.strides, unit="stride", disable=True if quiet else None, leave=False
         )
         self._stride_period = self._phase_lag = ""
+        # Made last: discovery goes in this order, so who answers here knows the action client too.
         self._asking = {n: self._node.create_client(Trigger, f"{n}/ready") for n in ASKED}
         self._asked_at = self._looked_at = time.monotonic()
         self._heard_at = dict.fromkeys(ASKED, self._looked_at)
+        self._answered: set[str] = set()
 
     def conduct(self, protocol_text: str) -> tuple[str, str]:
         """
@@ -90,7 +92,7 @@ class RunClient:
 
         """
         deadline = time.monotonic() + APPEARANCE_TIMEOUT
-        while not self._client.server_is_ready():
+        while not (self._client.server_is_ready() and "experiment" in self._answered):
             if time.monotonic() > deadline:
                 return f"experiment did not appear within {APPEARANCE_TIMEOUT:g} s", "experiment"
             ended = self._spin()
@@ -149,13 +151,14 @@ class RunClient:
                 if client.service_is_ready():
                     answer = client.call_async(Trigger.Request())
                     answer.add_done_callback(partial(self._on_answer, node))
-                else:  # it is still starting; should it have ended, the supervisor knows
-                    self._heard_at[node] = now
+        for node in set(ASKED) - self._answered:  # still starting
+            self._heard_at[node] = now
         silent = [node for node in ASKED if now - self._heard_at[node] > SILENCE_TIMEOUT]
         return silent[0] if silent else ""
 
     def _on_answer(self, node: str, _: Any) -> None:
         self._heard_at[node] = time.monotonic()
+        self._answered.add(node)
 
     def _on_feedback(self, message: Any) -> None:
         state: ExperimentState = message.feedback.state

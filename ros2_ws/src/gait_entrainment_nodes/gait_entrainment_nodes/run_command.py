@@ -113,8 +113,12 @@ def check_output(bag: Path) -> None:
     parent = next(folder for folder in bag.absolute().parents if folder.exists())
     if not parent.is_dir():
         raise ProtocolError(f"--out: {parent} is not a folder; allowed: a new folder in a folder")
-    if not os.access(parent, os.W_OK | os.X_OK) or os.statvfs(parent).f_flag & os.ST_RDONLY:
-        raise ProtocolError(f"--out: {parent} cannot be written to; choose another folder")
+    try:
+        tempfile.TemporaryDirectory(dir=parent).cleanup()
+    except OSError as error:
+        raise ProtocolError(
+            f"--out: {parent} cannot be written to: {error.strerror}; choose another folder"
+        ) from None
 
 
 def kept(bag: Path) -> str:

@@ -95,6 +95,8 @@ class Supervisor:
         for group in (running[:1], running[1:-1], running[-1:] if running[1:] else []):
             for node in group:
                 self._processes[node].terminate()
+                # Who was suspended can only obey once it goes on.
+                self._processes[node].send_signal(signal.SIGCONT)
             deadline = time.monotonic() + PATIENCE
             for node in group:
                 if self.wait(node, max(deadline - time.monotonic(), 0)) is None:

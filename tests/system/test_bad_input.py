@@ -1,0 +1,215 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Mistakes on the command line and in parameters: one clear line, and nothing is left behind."""
+
+import os
+import resource
+import shutil
+import subprocess
+
+import pytest
+from harness import LONG, PATIENCE, entrain_run
+
+from gait_entrainment.bags import BagReader
+from gait_entrainment_nodes.domain import claimed_domain
+
+# What is wrong; the options; what the line must name, field and allowed range.
+WRONG_USAGE = {
+    "negative width": (["--width=-0.1"], ["width", "-0.1", "above 0"]),
+    "overlapping pulses": (["--width=0.4", "--period=0.3"], ["width", "0.3", "below the period"]),
+    "torque above the limit": (["--torque=31"], ["torque", "31", "-30 to 30 N m"]),
+    "weak spring": (["--ankle-stiffness=60"], ["ankle_stiffness", "60", "allowed:"]),
+    "NaN": (["--mass=nan"], ["mass", "nan", "finite number"]),
+    "infinite": (["--period-offset=inf"], ["period_offset", "inf", "-100"]),
+    "no baseline": (["--baseline=1"], ["baseline", "1", "at least 2"]),
+    "sample rate": (["--sample-rate=1001"], ["--sample-rate", "1001", "0 to 1000"]),
+    "sample rate NaN": (["--sample-rate=nan"], ["--sample-rate", "nan", "0 to 1000"]),
+    "unknown driver": (["--driver=magic"], ["driver", "magic", "ideal"]),
+    "unreadable file": (["nowhere.yaml"], ["nowhere.yaml", "cannot be read"]),
+    "a folder as file": (["."], [".", "cannot be read"]),
+}
+
+
+def entrain(folder, *options, **environment):
+    """Run a command to its end; return exit code and standard error."""
+    done = subprocess.run(
+        ["entrain", "run", *options],
+        cwd=folder,
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=False,
+    )
+    assert done.stdout == ""
+    return done.returncode, done.stderr
+
+
+def assert_one_line(text, named):
+    assert len(text.splitlines()) == 1, text
+    assert "Traceback" not in text
+    for word in named:
+        assert word in text, text
+
+
+@pytest.mark.parametrize("case", WRONG_USAGE)
+def test_wrong_usage_is_one_line_and_leaves_nothing(case, tmp_path):
+    options, named = WRONG_USAGE[case]
+    code, text = entrain(tmp_path, *options)
+    assert code == 2
+    assert_one_line(text, named)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_unknown_key_is_named_with_its_line(tmp_path):
+    protocol = tmp_path / "mine.yaml"
+    protocol.write_text("baseline: 5\npulses:\n  widht: 0.1\n")
+    code, text = entrain(tmp_path, "mine.yaml")
+    assert code == 2
+    assert_one_line(text, ["mine.yaml:3", "widht", "width"])
+    assert list(tmp_path.iterdir()) == [protocol]
+
+
+def test_existing_output_is_not_touched(tmp_path):
+    out = tmp_path / "there"
+    out.mkdir()
+    (out / "thesis.tex").write_text("years of work")
+    code, text = entrain(tmp_path, "--out=there")
+    assert code == 2
+    assert_one_line(text, ["--out", "there", "never overwritten"])
+    assert [path.name for path in out.iterdir()] == ["thesis.tex"]
+
+
+def test_output_that_cannot_be_written_is_refused_before_anything_starts(tmp_path):
+    (tmp_path / "file").write_text("")
+    code, text = entrain(tmp_path, "--out=file/bag")
+    assert code == 2
+    assert_one_line(text, ["--out", "file", "not a folder"])
+    code, text = entrain(tmp_path, "--out=/proc/bag")
+    assert code == 2
+    assert_one_line(text, ["--out", "/proc", "cannot be written to"])
+
+
+def test_domain_in_use_is_refused(tmp_path):
+    with claimed_domain() as domain:
+        code, text = entrain(tmp_path, ROS_DOMAIN_ID=str(domain))
+    assert code == 1
+    assert_one_line(text, [f"ROS_DOMAIN_ID: {domain} is in use", "another"])
+    code, text = entrain(tmp_path, ROS_DOMAIN_ID="233")
+    assert code == 1
+    assert_one_line(text, ["ROS_DOMAIN_ID", "233", "0 to 232"])
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """Give a folder on a file system of 6 MB, or skip where none may be made."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=6m", "tmpfs", str(place)]
+    if not shutil.which("mount") or subprocess.run(mount, capture_output=True).returncode:
+        pytest.skip("no file system may be mounted here")
+    yield place
+    subprocess.run(["umount", str(place)], check=True)
+
+
+def assert_readable(bag):
+    with BagReader(bag) as reader:
+        assert sum(1 for _ in reader.messages()) == reader.message_count > 0
+
+
+def test_full_disk_ends_the_run_with_a_readable_bag(small_disk):
+    with entrain_run(small_disk / "bag", *LONG, "--sample-rate=1000") as run:
+        run.find_nodes()
+        assert run.wait() == 1
+        assert "disk full" in run.text
+        assert "Traceback" not in run.text
+        assert_readable(run.bag)
+        assert run.survivors() == []
+
+
+def test_file_that_may_not_grow_ends_the_run_with_a_readable_bag(tmp_path):
+    with entrain_run(tmp_path / "bag", *LONG, "--sample-rate=1000") as run:
+        run.wait_for_stride(1)
+        limits = (2 * 2**20, resource.RLIM_INFINITY)
+        resource.prlimit(run.nodes["bag_recorder"], resource.RLIMIT_FSIZE, limits)
+        assert run.wait() == 1
+        assert "File too large" in run.text
+        assert "Traceback" not in run.text
+        assert_readable(run.bag)
+        assert run.survivors() == []
+
+
+def test_fall_is_reported_with_its_bag(tmp_path):
+    # Dorsiflexion pulses take the push-off away that the walker needs to vault over.
+    with entrain_run(tmp_path / "bag", "--torque=-29", "--width=0.4", "--json") as run:
+        assert run.wait() == 1
+        first = run.text.splitlines()[0]
+        for word in ("fell", "stance", "rad", "J", str(run.bag)):
+            assert word in first, run.text
+        assert "Traceback" not in run.text
+        assert_readable(run.bag)
+
+
+# Node, arguments, what the one line must name.
+WRONG_PARAMETERS = [
+    ("walker_sim", ["-p", "mass:=-1.0"], ["mass", "-1.0", "positive"]),
+    ("walker_sim", ["-p", "mass:=80"], ["mass", "80", "80.0"]),
+    ("walker_sim", ["-p", "mass:=heavy"], ["mass", "heavy", "80.0"]),
+    ("walker_sim", ["-p", "mass:=.nan"], ["mass", "nan"]),
+    ("walker_sim", ["-p", "sample_rate:=1001.0"], ["sample_rate", "1001.0", "0 to 1000 Hz"]),
+    ("walker_sim", ["-p", "masss:=80.0"], ["masss", "unknown", "mass,"]),
+    ("walker_sim", ["-p", "first_heel_strike:=middle"], ["first_heel_strike", "left, right"]),
+    ("perturbator", ["-p", "side:=up"], ["side", "'up'", "left, right"]),
+    ("perturbator", ["-p", "limits.torque:=1000.0"], ["limits.torque", "1000.0", "0 to 200"]),
+    ("gait_analyzer", ["-p", "side:=3"], ["side", "3"]),
+    ("experiment", ["-p", "silence_timeout:=0.0"], ["silence_timeout", "0.1 to 60 s"]),
+    ("bag_recorder", [], ["output", "folder"]),
+    ("bag_recorder", ["-p", "output:=/proc/bag"], ["output", "/proc/bag"]),
+    ("bag_recorder", ["-p", "output:=there", "-p", "topic:=x"], ["topic", "unknown", "topics"]),
+    ("bag_recorder", ["-p", "output:=there", "-p", "custom_data:=x"], ["custom_data", "JSON"]),
+]
+
+
+@pytest.mark.parametrize(
+    ("node", "arguments", "named"),
+    WRONG_PARAMETERS,
+    ids=[f"{node} {' '.join(arguments)}" for node, arguments, _ in WRONG_PARAMETERS],
+)
+def test_node_refuses_a_wrong_parameter_in_one_line(node, arguments, named, tmp_path):
+    with claimed_domain() as domain:
+        done = subprocess.run(
+            [node, "--ros-args", *arguments],
+            cwd=tmp_path,
+            env={**os.environ, "ROS_DOMAIN_ID": str(domain)},
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+            check=False,
+        )
+    assert done.returncode == 2
+    assert_one_line(done.stderr, named)
+    assert done.stderr.startswith(f"{node}: ")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_arguments_that_ros_cannot_read_are_refused(tmp_path):
+    for arguments in (["--ros-args", "-p", "mass"], ["--ros-args", "--bogus"], ["--mass", "80"]):
+        done = subprocess.run(["walker_sim", *arguments], capture_output=True, text=True)
+        assert done.returncode == 2
+        assert done.stderr.splitlines()[-1].startswith("walker_sim: ")
+        assert arguments[-1] in done.stderr or arguments[-2] in done.stderr
+        assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []

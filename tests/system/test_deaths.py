@@ -1,0 +1,111 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Processes that die or stall in mid-run: the rest end, the bag stays readable."""
+
+import os
+import signal
+import time
+
+import pytest
+from harness import LONG, entrain_run
+
+from gait_entrainment.bags import BagReader
+from gait_entrainment_nodes.node_list import NODES
+
+# From a death to the end of everything, and from the end of the longest patience with a silent
+# process [s]. The issue demands it.
+END_WITHIN = 5.0
+SILENCE_TIMEOUT = 3.0
+
+
+def assert_readable(bag):
+    with BagReader(bag) as reader:
+        assert reader.custom_data["protocol"]
+        messages = sum(1 for _ in reader.messages())
+    assert messages == reader.message_count > 100
+
+
+def assert_ended_because_of(run, node, begin, limit):
+    """Check how a run ended whose process met with an accident."""
+    assert run.wait() == 1, run.text
+    assert run.ended_at - begin < limit, run.text
+    assert run.survivors() == []
+    first, *lines = run.text.splitlines()
+    assert first.startswith("entrain run: ")
+    assert node in first
+    assert all(line.startswith(f"  {node}| ") for line in lines), run.text
+    assert "Traceback" not in run.text
+    assert_readable(run.bag)
+
+
+@pytest.mark.parametrize("node", NODES)
+def test_death_ends_the_run(node, tmp_path):
+    with entrain_run(tmp_path / "bag", *LONG) as run:
+        run.wait_for_stride(200)
+        begin = time.monotonic()
+        os.kill(run.nodes[node], signal.SIGKILL)
+        assert_ended_because_of(run, node, begin, END_WITHIN)
+        assert "-9" in run.text
+
+
+@pytest.mark.parametrize(
+    ("mode", "stalled"),
+    [(("--real-time",), NODES), ((), ("bag_recorder",))],
+    ids=["real time", "lock-step"],
+)
+def test_stalled_process_ends_the_run(mode, stalled, tmp_path):
+    # All at once: most of the time is spent waiting.
+    runs = {}
+    try:
+        for node in stalled:
+            with_bag = entrain_run(tmp_path / node, *LONG, *mode)
+            runs[node] = (with_bag, with_bag.__enter__())
+        for node, (_, run) in runs.items():
+            run.wait_for_stride(2 if mode else 200)
+            begin = time.monotonic()
+            os.kill(run.nodes[node], signal.SIGSTOP)
+            runs[node] += (begin,)
+        for node, (_, run, begin) in runs.items():
+            assert_ended_because_of(run, node, begin, SILENCE_TIMEOUT + END_WITHIN)
+    finally:
+        for with_bag, *_ in runs.values():
+            with_bag.__exit__(None, None, None)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interruption_ends_the_run_in_order(number, tmp_path):
+    with entrain_run(tmp_path / "bag", "--real-time", *LONG) as run:
+        run.wait_for_stride(1)
+        begin = time.monotonic()
+        run.process.send_signal(number)
+        assert run.wait() == 1
+        assert run.ended_at - begin < END_WITHIN
+        assert run.survivors() == []
+        assert run.text.splitlines() == [
+            f"entrain run: interrupted; the bag of the run so far is {run.bag}"
+        ]
+        assert_readable(run.bag)
+
+
+def test_nothing_outlives_a_killed_command(tmp_path):
+    with entrain_run(tmp_path / "bag", "--real-time", *LONG) as run:
+        run.wait_for_stride(1)
+        run.process.kill()
+        run.wait()
+        begin = time.monotonic()
+        while run.survivors():
+            assert time.monotonic() - begin < END_WITHIN
+            time.sleep(0.02)  # there is no event of the end of another's child
+        assert_readable(run.bag)

@@ -1,0 +1,195 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Stops, cancellations and refusals in mid-run, and several runs of the same processes."""
+
+import pytest
+from harness import QUICK, session, stamp_of
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from std_srvs.srv import Trigger
+
+from gait_entrainment.bags import BagReader
+from gait_entrainment_msgs.action import DeliverPulseTrain, RunProtocol
+from gait_entrainment_msgs.msg import Horizon
+from gait_entrainment_nodes.topics import (
+    ANKLE_TORQUE,
+    HORIZON,
+    PULSES,
+    TORQUE_PROFILE,
+    WALKER_PROGRESS,
+)
+
+# Pulses that are on nearly all the time, and last longer than any test.
+BROAD = (*QUICK, "--pulses=1000", "--width=0.4", "--baseline=2", "--washout=0")
+
+
+class Conducted:
+    """A session whose runs are conducted, disturbed and looked at one after the other."""
+
+    def __init__(self, nodes):
+        self.nodes, self.probe = nodes, nodes.probe
+        self.pulses = self.probe.listen(PULSES)
+        self.profiles = self.probe.listen(TORQUE_PROFILE)
+        self.torques = self.probe.listen(ANKLE_TORQUE)
+        self.progress = self.probe.listen(WALKER_PROGRESS)
+
+    def start(self):
+        """Start a run and wait until its pulses are under way."""
+        handle = self.nodes.conduct()
+        assert handle.accepted
+        count = len(self.pulses)
+        self.probe.until(lambda: len(self.pulses) > count + 1, "pulses")
+        return handle
+
+    def transition(self, number):
+        request = ChangeState.Request(transition=Transition(id=number))
+        return self.probe.call(ChangeState, "perturbator/change_state", request).success
+
+    def assert_torque_ended(self, handle, run, reason):
+        """Check that a run failed for a reason, its torque at zero from a stop on."""
+        answer = self.probe.result(handle)
+        assert answer.result.run == run
+        assert reason in answer.result.message
+        # The end is told to the walker, which says its last word.
+        self.probe.until(
+            lambda: self.progress[-1].run == run and self.progress[-1].state != 0, "the end"
+        )
+        stops = [p for p in self.profiles if p.run == run and p.stop]
+        assert len(stops) == 1
+        end = stamp_of(self.progress[-1].header)
+        # The last samples may still be on their way.
+        self.probe.until(lambda: stamp_of(self.torques[-1].header) > end - 10**7, "samples")
+        assert self.torques[-1].delivered[self.nodes.protocol.side] == 0
+        return answer.result
+
+    def reset(self):
+        return self.probe.call(Trigger, "walker_sim/reset")
+
+
+@pytest.fixture(scope="module")
+def conducted(tmp_path_factory):
+    with session(tmp_path_factory.mktemp("runs"), *BROAD) as nodes:
+        yield Conducted(nodes)
+    # Runs 2 and 4 were refused. All are in one bag; torque was on only before its run's stop.
+    with BagReader(nodes.bag) as reader:
+        recorded = list(reader.decoded(["/walker_sim/progress", "/ankle_torque"]))
+        profiles = list(reader.decoded(["/perturbation/torque_profile"]))
+    finals = {m.run: raw for raw, m in recorded if raw.topic.endswith("progress") and m.state}
+    assert set(finals) == {1, 3, 5}
+    stops = {m.run: raw for raw, m in profiles if m.stop}
+    assert set(stops) == {1, 3, 5}
+    side = nodes.protocol.side
+    torques = [(r.publish_time, m.delivered[side]) for r, m in recorded if "torque" in r.topic]
+    assert max(torque for _, torque in torques) > 10
+    for run, stop in stops.items():
+        # By reception, with time for a message that was on its way.
+        after = [
+            torque
+            for received, torque in torques
+            if stop.publish_time + 5 * 10**7 < received <= finals[run].publish_time
+        ]
+        assert len(after) > 10
+        assert set(after) == {0.0}
+
+
+def test_second_protocol_second_train_and_reset_are_refused_in_mid_run(conducted):
+    handle = conducted.start()
+    assert not conducted.nodes.conduct().accepted
+    train = DeliverPulseTrain.Goal(run=1, side=1, period=1.0, count=1, torque=5.0, duration=0.1)
+    train.first_onset.sec = 2**31 - 1
+    refused = conducted.probe.send_goal(
+        DeliverPulseTrain, "perturbator/deliver_pulse_train", train
+    )
+    assert not refused.accepted
+    answer = conducted.reset()
+    assert not answer.success
+    assert "run 1 is in progress" in answer.message
+    # Cancelling the protocol brings the torque to zero.
+    future = handle.cancel_goal_async()
+    conducted.probe.until(future.done, "an answer to the cancellation")
+    result = conducted.assert_torque_ended(handle, 1, "cancelled by the client")
+    assert result.outcome == RunProtocol.Result.CANCELLED
+
+
+def test_walker_must_be_reset_between_runs(conducted):
+    handle = conducted.nodes.conduct()
+    answer = conducted.probe.result(handle)
+    assert answer.result.outcome == RunProtocol.Result.FAILED
+    assert "reset first" in answer.result.message
+    assert conducted.reset().success
+    assert conducted.progress[-1].run == 1
+
+
+def test_latched_stop_ends_the_run_and_lasts_until_clean_up(conducted):
+    handle = conducted.start()
+    run = conducted.progress[-1].run
+    answer = conducted.probe.call(Trigger, "perturbator/stop")
+    assert answer.success
+    result = conducted.assert_torque_ended(handle, run, "the stop service was called")
+    assert result.outcome == RunProtocol.Result.FAILED
+    assert not result.reproducible
+    assert conducted.reset().success
+    refused = conducted.probe.result(conducted.nodes.conduct())
+    assert "perturbator refused to be activated" in refused.result.message
+    assert not conducted.transition(Transition.TRANSITION_DEACTIVATE)  # it is not active
+    assert conducted.transition(Transition.TRANSITION_CLEANUP)
+
+
+def test_deactivation_ends_the_run(conducted):
+    conducted.reset()
+    handle = conducted.start()
+    run = conducted.progress[-1].run
+    assert conducted.transition(Transition.TRANSITION_DEACTIVATE)
+    conducted.assert_torque_ended(handle, run, "the perturbator was deactivated")
+
+
+def test_cancelling_the_train_alone_ends_the_torque_at_once(tmp_path):
+    with session(tmp_path, *BROAD, nodes=("perturbator",)) as nodes:
+        probe = nodes.probe
+        profiles = probe.listen(TORQUE_PROFILE)
+        horizons = probe.node.create_publisher(HORIZON.type, HORIZON.name, HORIZON.qos)
+        for number in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
+            request = ChangeState.Request(transition=Transition(id=number))
+            assert probe.call(ChangeState, "perturbator/change_state", request).success
+
+        def promise(known, until):
+            message = Horizon(run=7)
+            message.header.stamp.sec, message.until.sec = known, until
+            count = len(profiles)
+            horizons.publish(message)
+            probe.until(lambda: len(profiles) > count, "a profile")
+            return profiles[-1]
+
+        promise(0, 2)
+        train = DeliverPulseTrain.Goal(
+            run=7, side=1, period=1.0, count=100, torque=5.0, duration=0.5
+        )
+        train.first_onset.sec = 3
+        goal = probe.send_goal(DeliverPulseTrain, "perturbator/deliver_pulse_train", train)
+        assert goal.accepted
+        assert list(promise(1, 4).torques) == [0.0, 5.0, 0.0]
+        count = len(profiles)
+        future = goal.cancel_goal_async()
+        # No horizon comes any more: the stop does not wait for one.
+        probe.until(lambda: len(profiles) > count and profiles[-1].stop, "the stop")
+        probe.until(future.done, "an answer to the cancellation")
+        result = probe.result(goal).result
+        assert result.outcome == DeliverPulseTrain.Result.CANCELLED
+        assert result.delivered == 1
+        assert list(promise(4, 6).torques) == [0.0]
+        # Another train may follow.
+        train.first_onset.sec = 7
+        again = probe.send_goal(DeliverPulseTrain, "perturbator/deliver_pulse_train", train)
+        assert again.accepted

@@ -1,0 +1,97 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Real time: the same walk as in lock-step, every sample sent with its exact stamp."""
+
+import json
+
+import pytest
+from harness import QUICK, entrain_run, protocol_of, stamp_of
+
+from gait_entrainment.bags import BagReader
+from gait_entrainment.report.summary import outcome_of
+from gait_entrainment.simulation import simulate
+
+RATE = 1000
+# Near the locked phase, so that few pulses suffice; the verdict needs 25 of them.
+OPTIONS = (*QUICK, "--baseline=3", "--pulses=30", "--washout=1", "--initial-phase=0.65")
+
+
+@pytest.fixture(scope="module")
+def real_time_run(tmp_path_factory):
+    bag = tmp_path_factory.mktemp("real_time") / "bag"
+    with entrain_run(bag, "--real-time", "--json", f"--sample-rate={RATE}", *OPTIONS) as run:
+        return bag, run.outcome()
+
+
+def diagnostics_of(bag):
+    """Return the values of the walker's last diagnostics."""
+    with BagReader(bag) as reader:
+        last = [
+            status
+            for _, message in reader.decoded(["/diagnostics"])
+            for status in message.status
+            if status.name == "walker_sim: run"
+        ][-1]
+    return {value.key: float(value.value) for value in last.values}
+
+
+def test_verdict_and_locked_lag_agree_with_the_simulation(real_time_run):
+    bag, outcome = real_time_run
+    simulation = simulate(protocol_of(*OPTIONS))
+    expected = outcome_of(
+        simulation.protocol,
+        simulation.analysis,
+        simulation.events,
+        simulation.measured_period,
+        simulation.train.period,
+    )
+    assert expected["verdict"] == outcome["verdict"] == "entrained"
+    # What came late or not at all is the timing error that the run itself states.
+    values = diagnostics_of(bag)
+    error = (values["late_ms"] + values["starved_ms"]) * 1e-3
+    assert outcome["final_phase_lag"] == pytest.approx(
+        expected["final_phase_lag"], abs=1e-9 + error
+    )
+    if error == 0:
+        with BagReader(bag) as reader:
+            stamps = [stamp_of(m.header) for _, m in reader.decoded(["/gait_events"])]
+        walked = [stamp - stamps[0] for stamp in stamps]
+        both = min(len(walked), len(simulation.events))
+        assert both > 4 * 33
+        assert walked[:both] == [event.stamp for event in simulation.events][:both]
+
+
+def test_every_sample_is_there_with_its_exact_stamp(real_time_run):
+    bag, outcome = real_time_run
+    assert outcome["lost"] == 0
+    with BagReader(bag) as reader:
+        start = min(m.log_time for m in reader.messages(["/gait_events"]))
+        end = max(m.log_time for m in reader.messages(["/walker_sim/progress"]))
+        samples = (end - start) * RATE // 10**9
+        assert samples > 15 * RATE
+        due = [start + k * 10**9 // RATE for k in range(samples)]
+        for topic in ("/joint_states", "/ankle_torque", "/ground_reaction/left"):
+            stamps = [m.log_time for m in reader.messages([topic])]
+            assert stamps[:samples] == due
+            assert samples <= len(stamps) <= samples + 1
+
+
+def test_lateness_is_measured_and_reported(real_time_run):
+    bag, outcome = real_time_run
+    values, reported = diagnostics_of(bag), outcome["publish_lateness_ms"]
+    assert 0 < reported["p50"] <= reported["p99"] <= reported["worst"]
+    for name, value in reported.items():
+        assert values[f"publish_late_{name}_ms"] == value
+    assert json.dumps(outcome)

@@ -1,0 +1,91 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Nodes that are told to stop, and torque that ends with them."""
+
+import signal
+import time
+
+import pytest
+from harness import QUICK, cpu_seconds, session, stamp_of
+
+from gait_entrainment.bags import BagReader
+from gait_entrainment_msgs.action import RunProtocol
+from gait_entrainment_nodes.node_list import NODES
+from gait_entrainment_nodes.topics import ANKLE_TORQUE, PULSES, TORQUE_PROFILE
+
+# From the signal to the end of the process [s], on a machine that does other things too.
+PROMPTLY = 2.0
+# Pulses that are on nearly all the time.
+BROAD = (*QUICK, "--pulses=100000", "--width=0.4", "--baseline=2")
+
+
+def assert_idle(nodes):
+    """Check that waiting costs little processor time."""
+    before = {node: cpu_seconds(nodes.pid(node)) for node in NODES}
+    begin = time.monotonic()
+    nodes.probe.until(lambda: time.monotonic() - begin > 2.0, "the end of a long wait")
+    waited = time.monotonic() - begin
+    used = {n: (cpu_seconds(nodes.pid(n)) - before[n]) / waited for n in NODES}
+    print({node: f"{share:.1%}" for node, share in used.items()})
+    # A loop without a wait would use all of a core, or what the others leave of it.
+    assert max(used.values()) < 0.15, used
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_each_idle_node_hardly_works_and_stops_cleanly(number, tmp_path):
+    with session(tmp_path) as nodes:
+        if number == signal.SIGINT:
+            assert_idle(nodes)
+        for node in NODES:
+            told = time.monotonic()
+            nodes.signal(node, number)
+            assert nodes.supervisor.wait(node, 10) == 0, nodes.supervisor.last_lines(node)
+            assert time.monotonic() - told < PROMPTLY
+            assert nodes.supervisor.last_lines(node) == ""
+    with BagReader(nodes.bag) as reader:
+        assert "/gait_events" in reader.topics
+
+
+def test_torque_ends_with_the_perturbator(tmp_path):
+    with session(tmp_path, *BROAD) as nodes:
+        pulses, profiles = nodes.probe.listen(PULSES), nodes.probe.listen(TORQUE_PROFILE)
+        torques = nodes.probe.listen(ANKLE_TORQUE)
+        handle = nodes.conduct()
+        nodes.probe.until(lambda: len(pulses) > 2, "pulses")
+        nodes.signal("perturbator", signal.SIGTERM)
+        assert nodes.supervisor.wait("perturbator", 10) == 0
+        nodes.probe.until(lambda: profiles[-1].stop, "the stop")
+        # The walker goes on, without torque, until the experiment misses the perturbator.
+        count = len(torques)
+        nodes.probe.until(lambda: len(torques) > count + 200, "a walk without torque")
+        answer = nodes.probe.result(handle)
+        assert answer.result.outcome == RunProtocol.Result.FAILED
+        assert "perturbator" in answer.result.message
+    with BagReader(nodes.bag) as reader:
+        recorded = list(reader.decoded(["/perturbation/torque_profile", "/ankle_torque"]))
+    stops = [raw for raw, m in recorded if raw.topic.endswith("profile") and m.stop]
+    assert len(stops) == 1
+    side = nodes.protocol.side
+    torque = {
+        stamp_of(m.header): (raw.publish_time, m.delivered[side])
+        for raw, m in recorded
+        if raw.topic == "/ankle_torque"
+    }
+    assert any(value > 0 for _, value in torque.values())
+    # A sample that is received later than the stop by more than the way of a message is walked
+    # behind it.
+    after = [v for received, v in torque.values() if received > stops[0].publish_time + 10**8]
+    assert len(after) > 100
+    assert set(after) == {0.0}
