@@ -37,6 +37,7 @@ from gait_entrainment.bags.metadata import (
     METADATA_FILE,
     METADATA_VERSION,
     RECORD_NAME,
+    load_yaml,
     parse_qos_profiles,
 )
 from gait_entrainment.bags.reader import (
@@ -94,6 +95,7 @@ RULES: dict[str, tuple[Severity, str]] = {
         _WARNING,
         "players publish with default QoS, so that late or reliable subscribers may get nothing",
     ),
+    "qos-version": (_ERROR, "rosbag2 throws when it opens the file"),
     "type-hash": (_WARNING, "nobody can tell whether an installed definition is the recorded one"),
     "one-type": (_ERROR, "readers decode one part of the topic by the wrong definition"),
     "cdr-header": (_ERROR, "the message cannot be deserialized"),
@@ -307,6 +309,7 @@ def _check_summary(path: Path, summary: Contents, stock: Contents, report: _Repo
 
 def _check_channels(path: Path, stock: Contents, report: _Report) -> None:
     types: dict[str, str] = {}
+    version = recorded_description(stock).get("version", METADATA_VERSION)
     for schema in stock.schemas.values():
         where = f"{path}: {schema.name}"
         if not is_type_name(schema.name):
@@ -330,10 +333,33 @@ def _check_channels(path: Path, stock: Contents, report: _Report) -> None:
             if qos is None:
                 raise UnreadableBagError(f"{channel.topic}: no offered_qos_profiles")
             parse_qos_profiles(qos, f"{channel.topic}: offered_qos_profiles")
+            _check_qos_spelling(where, qos, version, report)
         except UnreadableBagError as error:
             report.add("offered-qos", f"{path}: {error}")
         if not _is_type_hash(channel.metadata.get("topic_type_hash")):
             report.add("type-hash", f"{where}: no topic_type_hash RIHS01_ and 64 hex digits")
+
+
+def _check_qos_spelling(where: str, qos: str, version: Any, report: _Report) -> None:
+    """Hold the spelling of a channel's policies against the version that the file names."""
+    if not isinstance(version, int):
+        return
+    spelled = {
+        isinstance(profile[policy], str)
+        for profile in load_yaml(qos, where) or []
+        for policy in ("reliability", "durability", "liveliness")
+    }
+    if version < METADATA_VERSION and True in spelled:
+        report.add(
+            "qos-version",
+            f"{where}: policies are words, but the record {RECORD_NAME!r} is of version "
+            f"{version}, which has numbers",
+        )
+    elif version >= METADATA_VERSION and False in spelled:
+        report.add(
+            "offered-qos",
+            f"{where}: policies are numbers, which rosbag2 takes for unknown in version {version}",
+        )
 
 
 def _is_type_hash(value: Any) -> bool:

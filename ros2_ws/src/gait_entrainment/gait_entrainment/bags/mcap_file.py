@@ -23,6 +23,7 @@ of every message in them (14 microseconds each).
 """
 
 import os
+import re
 import struct
 import zlib
 from collections.abc import Callable, Iterator, Mapping
@@ -50,6 +51,10 @@ _INDEX_OFFSET = struct.Struct("<HQ")  # channel, offset of its message index
 _INDEX_ENTRY = struct.Struct("<QQ")  # log time, offset in the chunk
 _MESSAGE_INDEX = struct.Struct("<BQHI")  # opcode, length, channel, length of the entries
 _FOOTER_SIZE = _RECORD.size + 20
+# What tells of a chunk in the midst of bytes: length and name of its compression.
+_CHUNK_NAMES = (b"\x04\0\0\0zstd", b"\x03\0\0\0lz4")
+_ANY_CHUNK_NAME = re.compile(b"|".join(_CHUNK_NAMES))
+_CHUNK_NAME_OFFSET = _RECORD.size + _CHUNK.size - 4
 # Messages that lie outside of chunks are read in stretches of about this size.
 _STRETCH = 2**20
 _WRONG_INDEX = "the chunk does not match its message index"
@@ -530,9 +535,26 @@ class McapFile:
                 yield Chunk(begin, position - begin, 0, 0, is_record=False)
                 begin = None
             listed = [chunk.offset for chunk in summary.chunks if chunk.offset > position]
-            if not listed:
+            found = min(listed) if listed else self._find_chunk(position + 1)
+            if found is None:
                 return
-            position = min(listed)
+            position = found
+
+    def _find_chunk(self, offset: int) -> int | None:
+        """Search for the next chunk where no index tells of it: by the name of its compression."""
+        overlap = _CHUNK_NAME_OFFSET + len(_CHUNK_NAMES[0])
+        while offset < self.size:
+            piece = self.read(offset, min(_STRETCH + overlap, self.size - offset))
+            places = (
+                match.start() - _CHUNK_NAME_OFFSET
+                for match in _ANY_CHUNK_NAME.finditer(piece, _CHUNK_NAME_OFFSET)
+            )
+            for place in places:
+                opcode, length = _RECORD.unpack_from(piece, place)
+                if opcode == Opcode.CHUNK and offset + place + _RECORD.size + length <= self.size:
+                    return offset + place
+            offset += _STRETCH
+        return None
 
     def _take_or_note(self, contents: Contents, opcode: int, offset: int, length: int) -> None:
         try:

@@ -37,6 +37,14 @@ from gait_entrainment.bags.checks import RULES
 from gait_entrainment.bags.metadata import offered_qos_text
 
 HASH = "RIHS01_" + "0" * 64
+# The same profile as versions before 9 spell it.
+NUMBERS = (
+    offered_qos_text([QosProfile()])
+    .replace("keep_last", "1")
+    .replace("reliable", "1")
+    .replace("volatile", "2")
+    .replace("automatic", "1")
+)
 STAMP = (
     "builtin_interfaces/Time stamp\n\n"
     + "=" * 80
@@ -77,7 +85,8 @@ def write_file(path: Path, options: dict[str, Any]) -> None:
         for number in range(3):
             writer.add_message(channel, number, options.get("data", DATA), number)
         if options.get("record", True):
-            writer.add_metadata("rosbag2", {"serialized_metadata": "version: 9\n"})
+            version = options.get("version", 9)
+            writer.add_metadata("rosbag2", {"serialized_metadata": f"version: {version}\n"})
         writer.finish()
 
 
@@ -99,6 +108,9 @@ WRITER_OPTIONS = ("index_types", "use_statistics", "use_chunking", "repeat_chann
         (["message-encoding"], {"message_encoding": "json"}),
         (["offered-qos"], {"without": ["offered_qos_profiles"]}),
         (["offered-qos"], {"qos": "history: keep_last"}),
+        (["qos-version"], {"version": 8}),
+        ([], {"version": 8, "qos": NUMBERS}),
+        (["offered-qos"], {"version": 9, "qos": NUMBERS}),
         (["type-hash"], {"without": ["topic_type_hash"]}),
         (["type-hash"], {"hash": "RIHS01_12"}),
         (["one-type"], {"second_type": True}),

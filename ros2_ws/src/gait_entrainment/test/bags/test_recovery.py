@@ -154,6 +154,31 @@ def test_damage_costs_no_more_than_its_chunk(small_bag: Path, tmp_path: Path) ->
             assert [message.log_time for message in reader.messages()] == left
 
 
+@pytest.mark.parametrize("compression", ["zstd", "lz4"])
+def test_a_broken_length_in_an_unfinished_file_costs_one_chunk(
+    tmp_path: Path, compression: str
+) -> None:
+    folder = tmp_path / "walk"
+    with BagWriter(folder, ros_distro="jazzy", chunk_size=300, compression=compression) as writer:
+        writer.add_topic(NOISE)
+        for number in range(40):
+            writer.write("/noise", bytes(40), number, number)
+    path = folder / "walk_0.mcap"
+    file = McapFile(path)
+    chunks = file.scan().chunks
+    counts = [len(file.messages(chunk, 0, {1: "/noise"})) for chunk in chunks]
+    file.close()
+    whole = path.read_bytes()[: chunks[-1].offset + chunks[-1].length]  # as after a crash
+    for place in (3, 8):  # of the length, which then leads far beyond the end of the file
+        data = bytearray(whole)
+        data[chunks[2].offset + place] ^= 0x41
+        path.write_bytes(data)
+        out = tmp_path / f"rescued{place}"
+        found = recover(path, out)
+        assert any(f"at byte {chunks[2].offset}" in loss for loss in found.losses)
+        assert sum(found.counts.values()) == sum(counts) - counts[2]
+
+
 def chunk_middle(chunk: object) -> int:
     return int(chunk.offset + chunk.length - 10)  # type: ignore[attr-defined]
 
