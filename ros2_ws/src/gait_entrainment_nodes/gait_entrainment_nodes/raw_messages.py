@@ -59,8 +59,8 @@ _Clear = Callable[[bytearray, int, Any], int]
 def serialize(message: Any) -> bytes:
     """Serialize a ROS message into CDR with zeros in the gaps of alignment."""
     data = bytearray(serialize_message(message))
-    _clear_message(data, _ENCODING, message)
-    return bytes(data)
+    # What lies behind the last field was only reserved: ROS counts a gap for an empty sequence.
+    return bytes(data[: _clear_message(data, _ENCODING, message)])
 
 
 def _clear_message(data: bytearray, place: int, message: Any) -> int:

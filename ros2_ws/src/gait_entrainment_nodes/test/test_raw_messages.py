@@ -1,0 +1,166 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Bytes of messages against what ROS itself and an independent library make of them."""
+
+import math
+import struct
+from functools import cache
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+from rclpy.serialization import deserialize_message, serialize_message
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from sensor_msgs.msg import JointState
+
+from gait_entrainment.bags import find_definition
+from gait_entrainment_msgs.msg import AnkleRobotState, TorqueProfile
+from gait_entrainment_nodes.raw_messages import MessageTemplate, mark, serialize
+from gait_entrainment_nodes.stamps import header, to_time
+
+derandomized = settings(derandomize=True, deadline=None, max_examples=60)
+stamps = st.integers(0, (2**31 - 1) * 10**9)
+# ROS strings hold no NUL.
+texts = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=12)
+doubles = st.floats(allow_nan=False)
+
+
+@cache
+def types_of_rosbags(name):
+    """Return the types that the rosbags library knows, with one of ours."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    types = get_types_from_msg(find_definition(name).schema_text, name)
+    store.register({key: t for key, t in types.items() if key not in store.fielddefs})
+    return store
+
+
+def by_rosbags(message):
+    """Serialize by the rosbags library, which writes zeros where nothing belongs."""
+    name = "gait_entrainment_msgs/msg/" + type(message).__name__
+    store = types_of_rosbags(name)
+    stamp = store.types["builtin_interfaces/msg/Time"]
+    head = store.types["std_msgs/msg/Header"](
+        stamp=stamp(sec=message.header.stamp.sec, nanosec=message.header.stamp.nanosec),
+        frame_id=message.header.frame_id,
+    )
+    values = {}
+    for field in message.get_fields_and_field_types():
+        value = getattr(message, field)
+        if field == "header":
+            value = head
+        elif field in ("times", "onsets"):
+            value = [stamp(sec=t.sec, nanosec=t.nanosec) for t in value]
+        elif field == "valid_until":
+            value = stamp(sec=value.sec, nanosec=value.nanosec)
+        elif field == "torques":
+            value = np.array(value, float)
+        values[field] = value
+    return bytes(store.serialize_cdr(store.types[name](**values), name))
+
+
+@derandomized
+@given(stamps, st.lists(st.tuples(stamps, doubles), max_size=5), st.lists(stamps, max_size=4))
+def test_profile_is_what_an_independent_library_writes(instant, pieces, onsets):
+    message = TorqueProfile(
+        header=header(instant),
+        run=3,
+        revision=7,
+        side=1,
+        times=[to_time(t) for t, _ in pieces],
+        torques=[torque for _, torque in pieces],
+        onsets=[to_time(t) for t in onsets],
+        valid_until=to_time(instant),
+        last=True,
+    )
+    assert serialize(message) == by_rosbags(message)
+
+
+@derandomized
+@given(stamps, doubles, texts, st.lists(texts, max_size=3))
+def test_state_with_texts_is_what_an_independent_library_writes(instant, torque, frame, faults):
+    message = AnkleRobotState(
+        header=header(instant), side=1, commanded_torque=torque, angle=torque, faults=faults
+    )
+    message.header.frame_id = frame
+    assert serialize(message) == by_rosbags(message)
+
+
+@derandomized
+@given(texts, st.lists(st.tuples(texts, texts), max_size=4))
+def test_nested_sequences_read_back_as_the_same_message(name, values):
+    status = DiagnosticStatus(
+        level=b"\1", name=name, values=[KeyValue(key=k, value=v) for k, v in values]
+    )
+    message = DiagnosticArray(header=header(5), status=[status, DiagnosticStatus()])
+    data = serialize(message)
+    assert data == serialize(deserialize_message(serialize_message(message), DiagnosticArray))
+    assert deserialize_message(data, DiagnosticArray) == message
+
+
+@derandomized
+@given(
+    st.integers(1, 5).flatmap(
+        lambda n: st.tuples(
+            arrays.arrays(np.int64, n, elements=stamps),
+            arrays.arrays(float, (n, 4), elements=doubles),
+            arrays.arrays(float, (n, 4), elements=doubles),
+        )
+    )
+)
+def test_filled_template_is_what_ros_serializes(table):
+    instants, position, effort = table
+    names = ["l_hip", "r_hip", "l_ankle", "r_ankle"]
+    template = MessageTemplate(
+        JointState(
+            name=names,
+            position=[mark(0), 0.0, 0.0, 0.0],
+            velocity=[2.5] * 4,
+            effort=[mark(1), 0.0, 0.0, 0.0],
+        ),
+        {"position": 4, "effort": 4},
+    )
+    messages = list(template.fill(instants, position=position, effort=effort))
+    assert len(messages) == len(instants)
+    for k, data in enumerate(messages):
+        expected = JointState(
+            header=header(int(instants[k])),
+            name=names,
+            position=position[k].tolist(),
+            velocity=[2.5] * 4,
+            effort=effort[k].tolist(),
+        )
+        assert data == serialize(expected)
+        assert deserialize_message(data, JointState) == expected
+
+
+def test_numbers_that_are_not_numbers_pass_through():
+    template = MessageTemplate(JointState(position=[mark(0)]), {"position": 1})
+    (data,) = template.fill(np.array([7]), position=np.array([[math.nan]]))
+    assert math.isnan(deserialize_message(data, JointState).position[0])
+
+
+def test_mark_that_is_missing_or_doubled_is_refused():
+    with pytest.raises(ValueError, match="position is not marked exactly once"):
+        MessageTemplate(JointState(position=[1.0]), {"position": 1})
+    with pytest.raises(ValueError, match="position is not marked exactly once"):
+        MessageTemplate(JointState(position=[mark(0)], effort=[mark(0)]), {"position": 1})
+
+
+def test_stamp_lies_where_the_recorder_looks_for_it():
+    data = serialize(JointState(header=header(12_000_000_034)))
+    assert struct.unpack_from("<iI", data, 4) == (12, 34)
