@@ -22,6 +22,7 @@ from importlib.metadata import entry_points
 from gait_entrainment.commands import (
     analyze,
     bag,
+    cohort,
     driver,
     existence,
     lock,
@@ -43,6 +44,7 @@ COMMANDS = {
     "existence": existence.add_command,
     "phase-response": phase_response.add_command,
     "sweep": sweep.add_command,
+    "cohort": cohort.add_command,
 }
 
 

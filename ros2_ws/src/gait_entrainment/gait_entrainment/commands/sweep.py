@@ -137,13 +137,14 @@ def _report(plan: Any, store: Any, options: argparse.Namespace) -> None:
     import numpy as np
 
     from gait_entrainment.sweep import exact_borders, read_sweep
-    from gait_entrainment.sweep.figures import draw_tongue
+    from gait_entrainment.sweep.figures import draw_locked_lags, draw_tongue
 
     table, _ = read_sweep(store.finish())
     torques = plan.torque_fractions
     fractions = np.linspace(torques.least, torques.most, max(torques.count, _BORDER_TORQUES))
     borders = exact_borders(plan.walker, fractions, plan.width)
     paths = [store.table_path, *draw_tongue(plan, table, borders, options.out)]
+    paths += draw_locked_lags(plan, table, options.out)
     columns = {name: np.asarray(table[name]) for name in table.column_names}
     # Where walks were long enough to tell, both maps must agree.
     told = (columns["share_censored"] == 0) & (columns["problem"] == "")

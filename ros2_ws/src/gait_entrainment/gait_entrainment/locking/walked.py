@@ -48,7 +48,8 @@ class Outcome(str, Enum):
     LOCKED = "locked"
     ALTERNATING = "locked 2:2: every other stride alike"
     SLIPPING = "slipping"
-    CENSORED = "censored: too short to tell"
+    CENSORED = "censored: neither locked nor slipped through a cycle"
+    """Too short to tell; or, past a flip, bound to the pulses without ever repeating."""
     FELL = "fell"
     FLEW_OFF = "flew off"
 
@@ -125,7 +126,8 @@ def walk_under_pulses(
     Instants of the pulses are whole nanoseconds, as everywhere in the project.
     """
     model, stride = _prepared(parameters)
-    count = int((strides + 1) * stride / period) + 1
+    # Enough for strides a third longer than the pulse period or the walker's own.
+    count = int(4 / 3 * (strides + 1) * max(stride / period, 1.0)) + 1
     onsets = np.rint(np.arange(count) * (period * 1e9)).astype(np.int64)
     onsets += nanoseconds(initial_phase * stride)
     pulses = Pulses(onsets, nanoseconds(width), torque)

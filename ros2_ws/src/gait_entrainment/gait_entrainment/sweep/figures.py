@@ -77,7 +77,9 @@ def draw_tongue(
     left.set_title("a stable 1:1 lock exists (solved)", fontsize=10)
     right.set_title(f"locked by stride {plan.strides} (walked)", fontsize=10)
     if left.get_legend_handles_labels()[0]:
-        left.legend(fontsize=7, loc="lower left")
+        left.legend(
+            frameon=False, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=1
+        )
     return save_figure(figure, folder, "tongue")
 
 
@@ -105,3 +107,21 @@ def _neighbours(rows: Sequence[StableInterval]) -> list[tuple[StableInterval, St
                 if max(one.shortest, other.shortest) < min(one.longest, other.longest)
             ]
     return pairs
+
+
+def draw_locked_lags(plan: SweepPlan, table: Any, folder: Path) -> list[Path]:
+    """Draw where in the gait cycle the walks lock, over period and torque."""
+    figure, axes = new_figure(size=(7.2, 4.6))
+    shape = plan.torque_fractions.count, plan.period_offsets.count
+    offsets, fractions = plan.period_offsets.values * 1e3, plan.torque_fractions.values
+    lags = np.asarray(table["median_lag"]).reshape(shape) * 1e3
+    extent = [*_edges(offsets), *_edges(fractions)]
+    image = axes.imshow(lags, origin="lower", extent=extent, aspect="auto", cmap="viridis")
+    figure.colorbar(image, ax=axes, label="locked pulse onset after toe-off [ms]")
+    axes.axvline(0, color=GREY, lw=0.6, ls=":")
+    axes.set(
+        xlabel=r"pulse period $\tau_p - 2\tau_0$ [ms]",
+        ylabel="torque of the pulse / peak ankle torque",
+    )
+    axes.set_title("Where the pulses lock (blank: no walk locked)", fontsize=11)
+    return save_figure(figure, folder, "locked_lags")

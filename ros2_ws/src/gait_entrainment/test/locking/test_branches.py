@@ -17,11 +17,14 @@ import pytest
 
 from gait_entrainment.locking import (
     Border,
+    Outcome,
     Place,
     PulsedGait,
     locked_gaits,
     pieces_of,
+    shares_of,
     stable_intervals,
+    walk_under_pulses,
 )
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.protocol import Protocol, PulsePlan
@@ -102,3 +105,33 @@ def test_simulation_confirms_the_border(beyond, locks):
 def test_a_pulse_longer_than_double_stance_has_no_branch_inside_it():
     places = {piece.place for piece in pieces_of(PulsedGait(TABLE_1, 13.3, 0.5))}
     assert places == {Place.EARLY, Place.LATE}
+
+
+def test_dorsiflexion_pulses_lock_to_longer_periods_where_they_are_solved_to():
+    gait = PulsedGait(TABLE_1, -0.1 * TABLE_1.peak_torque, 0.1)
+    period = gait.unperturbed_period + 0.05
+    stable = [lock for lock in locked_gaits(gait, period) if lock.stable]
+    assert [lock.place for lock in stable] == [Place.EARLY]
+    shares = shares_of(gait, period, stable, 8)
+    assert shares.drawn == (1.0,)
+    walk = walk_under_pulses(TABLE_1, gait.torque, 0.1, period, 0.3, 200)
+    # To the end of the walk, though its strides are longer than the unperturbed ones.
+    assert walk.lags[-1] == pytest.approx(stable[0].lag, abs=5e-9)
+    assert walk.last_lag == pytest.approx(walk.lags[-1], abs=1e-12)
+
+
+def test_a_walk_too_short_to_slip_through_is_censored_not_failed():
+    period = GAIT.unperturbed_period + 0.01
+    outcomes = [
+        walk_under_pulses(TABLE_1, GAIT.torque, 0.1, period, 0.3, strides).outcome()
+        for strides in (50, 300)
+    ]
+    assert outcomes == [Outcome.CENSORED, Outcome.SLIPPING]
+
+
+def test_beyond_the_flip_every_other_stride_is_alike():
+    torque = 0.25 * TABLE_1.peak_torque
+    period = GAIT.unperturbed_period - 0.03
+    walk = walk_under_pulses(TABLE_1, torque, 0.1, period, 0.3, 1000)
+    assert walk.outcome() is Outcome.ALTERNATING
+    assert abs(walk.lags[-1] - walk.lags[-2]) > 1e-3

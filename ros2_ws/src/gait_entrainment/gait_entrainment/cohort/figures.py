@@ -1,0 +1,73 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The cohort as a picture: verdicts by pulse period, and the basins."""
+
+from pathlib import Path
+
+import numpy as np
+
+from gait_entrainment.cohort.study import Study, basin_percent, verdicts
+from gait_entrainment.report.drawing import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PINK,
+    SKY,
+    YELLOW,
+    new_figure,
+    save_figure,
+)
+
+_COLOURS = {
+    "entrained": GREEN,
+    "undecided": GREY,
+    "untestable": SKY,
+    "drifting": ORANGE,
+    "lost": YELLOW,
+    "fell": BLUE,
+    "flew off": PINK,
+}
+
+
+def draw_cohort(study: Study, folder: Path) -> list[Path]:
+    """Draw the share of each verdict, and each subject's basin without noise."""
+    figure, (left, right) = new_figure(1, 2, size=(9.6, 4.0))
+    offsets = sorted({trial.period_offset for trial in study.trials})
+    place, base = np.arange(len(offsets)), np.zeros(len(offsets))
+    for name, colour in _COLOURS.items():
+        counts = np.array([verdicts(study, offset).get(name, 0) for offset in offsets])
+        if counts.any():
+            left.bar(place, counts, bottom=base, color=colour, label=name, width=0.8)
+            base = base + counts
+    left.set_xticks(place, [f"{offset * 1e3:+.0f}" for offset in offsets], fontsize=8)
+    left.set(xlabel="pulse period off the measured stride period [ms]", ylabel="subjects")
+    left.set_title("verdicts, with variability", fontsize=10)
+    left.legend(
+        frameon=False, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=4
+    )
+    percent = np.sort(basin_percent(study))
+    right.plot(percent, np.arange(1, percent.size + 1), "o", color=BLUE, ms=4)
+    right.axvline(percent.mean(), color=BLUE, ls="--", lw=1, label=f"mean {percent.mean():.2f} %")
+    right.axvspan(6.7 - 3.6, 6.7 + 3.6, color=ORANGE, alpha=0.15, lw=0, label="human 6.7 ± 3.6 %")
+    right.axvline(6.7, color=ORANGE, lw=1)
+    right.set(xlabel="basin of entrainment [% of the stride]", ylabel="subjects, sorted", xlim=0)
+    right.set_title("basins without noise, solved", fontsize=10)
+    right.legend(
+        frameon=False, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2
+    )
+    for axes in (left, right):
+        axes.locator_params(axis="y", integer=True)
+    return save_figure(figure, folder, "cohort")

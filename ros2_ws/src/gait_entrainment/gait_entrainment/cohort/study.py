@@ -1,0 +1,215 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The human study's experiment on each simulated subject.
+
+Fed in: the distributions of the subjects, their variability, and 10 N m for 0.1 s. Predicted: who
+entrains, where in the gait cycle, and how the basin depends on the subject. The spread of the
+basin is mostly fed in, for the basin follows from torque over body size and peak torque.
+"""
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from gait_entrainment.analysis import Verdict, analyze
+from gait_entrainment.cohort.subjects import Subjects
+from gait_entrainment.conventions import EventKind, Side, nanoseconds
+from gait_entrainment.events import GaitEvent
+from gait_entrainment.locking import PulsedGait, locked_gaits, pieces_of, stable_intervals
+from gait_entrainment.locking.pulsed_gait import Floats
+from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment.variability import (
+    Population,
+    PopulationWalk,
+    PopulationWalker,
+    PulseTrains,
+    locked_runs,
+    noise_for,
+)
+
+# A pulse within this fraction of the stride of the noise-free lock counts as locked.
+_LOCKED_WITHIN = 0.05
+
+
+@dataclass(frozen=True)
+class StudyPlan:
+    """The experiment, the same for every subject."""
+
+    torque: float = 10.0
+    width: float = 0.1
+    period_offsets: tuple[float, ...] = (-0.05,)
+    """Pulse periods off each subject's measured stride period [s]."""
+    baseline: int = 15
+    pulses: int = 50
+    washout: int = 15
+    initial_phase: float = 0.0
+    seed: int = 0
+    hurst: float = 0.75
+    slope: float = 0.0
+    asymmetry: float = 0.0
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One subject at one pulse period."""
+
+    subject: int
+    period_offset: float
+    measured_period: float
+    verdict: str
+    """That of definitions.md, or that the walker fell or flew off."""
+    fraction_locked: float
+    """Of the strides under pulses; NaN where the walker has no lock at that period."""
+    mean_run: float
+    """Mean length [strides] of the runs of locked strides."""
+    median_lag: float
+
+
+@dataclass(frozen=True)
+class Study:
+    """All trials, and each subject's basin without noise, solved [s]: (shortest, longest)."""
+
+    trials: tuple[Trial, ...]
+    basins: tuple[tuple[float, float], ...]
+    """Pulse periods with a stable lock, off the unperturbed stride period."""
+    stride_periods: tuple[float, ...]
+    """Unperturbed, without noise [s]."""
+
+
+def run_study(subjects: Subjects, plan: StudyPlan) -> Study:
+    """Run the experiment on each subject at each pulse period, with noise of its own."""
+    count = len(subjects.walkers)
+    population = Population(subjects.walkers, plan.slope)
+    noise = noise_for(population, subjects.variation, plan.seed, plan.hurst)
+    gaits = [PulsedGait(walker, plan.torque, plan.width) for walker in subjects.walkers]
+    pieces = [pieces_of(gait) for gait in gaits]
+    trials: list[Trial] = []
+    for number, offset in enumerate(plan.period_offsets):
+        walker = PopulationWalker(
+            population,
+            2 * (plan.baseline + plan.pulses + plan.washout) + 2,
+            plan.seed + 1 + number,
+            np.nan_to_num(noise),
+            plan.hurst,
+            plan.asymmetry,
+        )
+        walk, trains = _conduct(walker, plan, offset, count)
+        for subject in range(count):
+            # Slope and asymmetry shift the lock, and only the plain walker's is solved.
+            plain = plan.slope == 0 and plan.asymmetry == 0
+            lock = float("nan")
+            if plain:
+                period = gaits[subject].unperturbed_period + offset
+                locks = locked_gaits(gaits[subject], period, pieces[subject])
+                lock = next((one.lag for one in reversed(locks) if one.stable), lock)
+            trials.append(_trial(walk, trains, subject, offset, lock))
+    basins = []
+    for gait, branches in zip(gaits, pieces, strict=True):
+        stable = stable_intervals(branches)
+        ends = [(p.least_period.period, p.greatest_period.period) for p in stable]
+        base = gait.unperturbed_period
+        low = min((end[0] for end in ends), default=base) - base
+        high = max((end[1] for end in ends), default=base) - base
+        basins.append((low, high))
+    return Study(tuple(trials), tuple(basins), tuple(g.unperturbed_period for g in gaits))
+
+
+def _conduct(
+    walker: PopulationWalker, plan: StudyPlan, offset: float, count: int
+) -> tuple[PopulationWalk, PulseTrains]:
+    """Walk the baseline, plan the pulses from it as `definitions.md` says, walk the rest."""
+    baseline = walker.walk(2 * (plan.baseline - 1))
+    measured = baseline.stride_periods.mean(axis=0)
+    trains = PulseTrains(
+        first_onset=baseline.heel_strikes[-1] + (1 + plan.initial_phase) * measured,
+        period=measured + offset,
+        count=plan.pulses,
+        torque=np.full(count, plan.torque),
+        width=plan.width,
+    )
+    steps = 2 * (plan.baseline + plan.pulses + plan.washout)
+    return walker.walk(steps, trains), trains
+
+
+def _trial(
+    walk: PopulationWalk, trains: PulseTrains, subject: int, offset: float, lock: float
+) -> Trial:
+    period = float(trains.period[subject])
+    measured = period - offset
+    if walk.fell[subject] or walk.flew_off[subject]:
+        verdict = "fell" if walk.fell[subject] else "flew off"
+        nan = float("nan")
+        return Trial(subject, offset, measured, verdict, nan, nan, nan)
+    strikes = walk.heel_strikes[:, subject]
+    onsets = trains.first_onset[subject] + np.arange(trains.count) * period
+    events = _events(strikes, walk.toe_offs[:, subject])
+    analysis = analyze(events, [nanoseconds(float(t)) for t in onsets], Side.RIGHT)
+    last = analysis.entrainments[-1].verdict if analysis.entrainments else Verdict.UNDECIDED
+    lags = np.array([pulse.phase_lag for pulse in analysis.pulses])
+    fraction, runs = float("nan"), list[int]()
+    if np.isfinite(lock):
+        fraction, runs = locked_runs(lags, lock, _LOCKED_WITHIN * measured)
+    mean_run = float(np.mean(runs)) if runs else float("nan")
+    return Trial(
+        subject,
+        offset,
+        measured,
+        last.name.lower(),
+        fraction,
+        mean_run,
+        float(np.median(lags[-20:])) if lags.size else float("nan"),
+    )
+
+
+def _events(strikes: Floats, toe_offs: Floats) -> list[GaitEvent]:
+    """Events of a walk whose heel strike 0 is the right, perturbed leg's."""
+    sides = (Side.RIGHT, Side.LEFT)
+    events = [GaitEvent(0, EventKind.HEEL_STRIKE, Side.RIGHT, 0)]
+    for step in range(toe_offs.size):
+        side = sides[(step + 1) % 2]
+        off, strike = nanoseconds(float(toe_offs[step])), nanoseconds(float(strikes[step + 1]))
+        events.append(GaitEvent(off, EventKind.TOE_OFF, side, step + 1))
+        events.append(GaitEvent(strike, EventKind.HEEL_STRIKE, side, step + 1))
+    return events
+
+
+def verdicts(study: Study, offset: float) -> dict[str, int]:
+    """Count the verdicts at one pulse period; they add up to the number of subjects."""
+    return dict(Counter(t.verdict for t in study.trials if t.period_offset == offset))
+
+
+def basin_percent(study: Study) -> Floats:
+    """Each subject's basin without noise, both sides together, in percent of its stride."""
+    widths = np.array([high - low for low, high in study.basins])
+    percent: Floats = 100 * widths / np.array(study.stride_periods)
+    return percent
+
+
+def measured_basin_percent(study: Study) -> Floats:
+    """Each subject's longest way off its own period at which it was found entrained [%]."""
+    widest: dict[int, float] = {}
+    for trial in study.trials:
+        reached = abs(trial.period_offset) / trial.measured_period
+        entrained = trial.verdict == "entrained"
+        widest[trial.subject] = max(widest.get(trial.subject, 0.0), reached if entrained else 0.0)
+    percent: Floats = 100 * np.array([widest[subject] for subject in sorted(widest)])
+    return percent
+
+
+def table_1_subjects(count: int, variation: float) -> Subjects:
+    """Return subjects that are all the walker of Table 1: what noise alone does."""
+    return Subjects((WalkerParameters(),) * count, np.full(count, variation), 0)

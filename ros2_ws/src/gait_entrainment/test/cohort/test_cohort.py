@@ -1,0 +1,107 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from gait_entrainment.cohort import (
+    StudyPlan,
+    SubjectDistributions,
+    draw_subjects,
+    run_study,
+    table_1_subjects,
+    verdicts,
+)
+from gait_entrainment.commands import main
+from gait_entrainment.locking import PulsedGait, locked_gaits
+from gait_entrainment.protocol import Protocol, PulsePlan
+from gait_entrainment.simulation import simulate
+
+
+def test_without_variability_the_trial_is_the_experiment_of_entrain_simulate():
+    study = run_study(table_1_subjects(2, 1e-9), StudyPlan(torque=13.3))
+    trial = study.trials[0]
+    simulation = simulate(Protocol(pulses=PulsePlan(torque=13.3, torque_fraction=None)))
+    assert trial.verdict == simulation.analysis.entrainments[-1].verdict.name.lower()
+    assert trial.measured_period == pytest.approx(simulation.measured_period, abs=1e-6)
+    last = [pulse.phase_lag for pulse in simulation.analysis.pulses[-20:]]
+    assert trial.median_lag == pytest.approx(np.median(last), abs=1e-5)
+
+
+def test_a_trial_without_noise_ends_in_the_solved_lock():
+    subjects = draw_subjects(SubjectDistributions(variation=(1e-9, 0.0)), 4, 5)
+    plan = StudyPlan(period_offsets=(-0.03,), pulses=90)
+    for trial in run_study(subjects, plan).trials:
+        gait = PulsedGait(subjects.walkers[trial.subject], 10.0, 0.1)
+        locks = locked_gaits(gait, gait.unperturbed_period - 0.03)
+        stable = [lock.lag for lock in locks if lock.stable]
+        assert trial.verdict == "entrained"
+        assert min(abs(trial.median_lag - lag) for lag in stable) < 1e-5
+
+
+def test_variability_keeps_subjects_from_being_shown_entrained():
+    calm, lively = (
+        verdicts(run_study(table_1_subjects(12, variation), StudyPlan(torque=13.3)), -0.05)
+        for variation in (0.002, 0.03)
+    )
+    assert calm == {"entrained": 12}
+    assert lively.get("entrained", 0) < 12
+    assert sum(lively.values()) == 12
+
+
+def test_subjects_are_drawn_from_what_is_stated_and_by_seed():
+    distributions = SubjectDistributions(mass=(70.0, 5.0))
+    subjects = draw_subjects(distributions, 400, 1)
+    masses = np.array([walker.mass for walker in subjects.walkers])
+    assert masses.mean() == pytest.approx(70.0, abs=0.8)
+    assert np.abs(masses - 70.0).max() <= 10.0
+    assert draw_subjects(distributions, 400, 1).walkers == subjects.walkers
+    assert draw_subjects(distributions, 400, 2).walkers != subjects.walkers
+
+
+def test_command_counts_every_subject_in_its_denominators(tmp_path, capsys):
+    arguments = [
+        "cohort",
+        "--subjects",
+        "5",
+        "--period-offset",
+        "-0.05",
+        "--period-offset",
+        "0.02",
+    ]
+    assert main([*arguments, "--out", str(tmp_path), "--json"]) == 0
+    outcome = json.loads(capsys.readouterr().out)
+    assert [sum(row["verdicts"].values()) for row in outcome["periods"]] == [5, 5]
+    with open(tmp_path / "trials.csv", newline="") as file:
+        assert len(list(csv.DictReader(file))) == 10
+    assert (tmp_path / "cohort.svg").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--mass", "10", "6"], "mass: mean 10, deviation 6 kg"),
+        (["--slope", "0.7"], "slope 0.7 rad is out of range"),
+        (["--subjects", "1"], "subjects 1"),
+        (["--peak-torque", "0.9", "0.001"], "hardly a subject drawn has a gait"),
+    ],
+)
+def test_wrong_usage_is_one_line(arguments, message, capsys):
+    assert main(["cohort", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
