@@ -1,0 +1,78 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How punctual real time is: joint states at 1 kHz for a minute, beside a bare loop of sleeps."""
+
+import json
+import subprocess
+import time
+
+import pytest
+
+from gait_entrainment.bags import BagReader
+
+pytestmark = pytest.mark.benchmark
+
+RATE = 1000
+SECONDS = 60
+
+
+def lateness_of_sleeping():
+    """Return how late a loop wakes that only sleeps from deadline to deadline [ms]."""
+    begin = time.monotonic()
+    late = []
+    for k in range(1, 10 * RATE):
+        due = begin + k / RATE
+        time.sleep(max(due - time.monotonic(), 0))
+        late.append(time.monotonic() - due)
+    late.sort()
+    return {
+        "p50": 1e3 * late[len(late) // 2],
+        "p99": 1e3 * late[len(late) * 99 // 100],
+        "worst": 1e3 * late[-1],
+    }
+
+
+def test_joint_states_at_1_khz_for_a_minute(tmp_path):
+    strides = round(SECONDS / 1.92)
+    done = subprocess.run(
+        [
+            *("entrain", "run", "--real-time", "--json", "--no-figures"),
+            *("--out", str(tmp_path / "bag"), f"--sample-rate={RATE}"),
+            *("--baseline=5", f"--pulses={strides - 6}", "--washout=1"),
+        ],
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
+    )
+    outcome = json.loads(done.stdout)
+    with BagReader(tmp_path / "bag") as reader:
+        recorded = reader.counts["/joint_states"]
+        stamps = [m.log_time for m in reader.messages(["/joint_states"])]
+    due = [stamps[0] + k * 10**9 // RATE for k in range(len(stamps))]
+    print(
+        f"\nreal time, {len(stamps) / RATE:.0f} s at {RATE} Hz: {recorded} joint states recorded,"
+        f" {'each' if stamps == due else 'NOT each'} with its exact stamp,"
+        f" {outcome['lost']} of {outcome['messages']} messages lost"
+    )
+    for name, late in (
+        ("stamp to publish", outcome["publish_lateness_ms"]),
+        ("baseline, a loop of sleeps alone", lateness_of_sleeping()),
+    ):
+        print(
+            f"{name}: p50 {late['p50']:.2f} ms, p99 {late['p99']:.2f} ms,"
+            f" worst {late['worst']:.2f} ms"
+        )
+    assert outcome["lost"] == 0
+    assert stamps == due

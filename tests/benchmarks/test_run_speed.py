@@ -1,0 +1,186 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How fast whole commands are. Prints, asserts nothing about speed; each beside its baseline."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from std_srvs.srv import Trigger
+
+from gait_entrainment_nodes.domain import claimed_domain
+from gait_entrainment_nodes.topics import JOINT_STATES
+
+pytestmark = pytest.mark.benchmark
+
+MESSAGES = 100_000
+_PUBLISHER = """
+import sys
+import rclpy
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from gait_entrainment_nodes.node import Participant
+from gait_entrainment_nodes.raw_messages import serialize
+from gait_entrainment_nodes.topics import JOINT_STATES
+
+
+class Source(Participant, Node):
+    def __init__(self):
+        super().__init__("source")
+        self.begin_participation()
+
+
+rclpy.init()
+node = Source()
+publisher = node.publisher(JOINT_STATES)
+names = ["l_hip", "r_hip", "l_ankle", "r_ankle"]
+data = serialize(JointState(name=names, position=[0.0] * 4, velocity=[0.0] * 4, effort=[0.0] * 4))
+while not publisher.matched:
+    rclpy.spin_once(node, timeout_sec=0.01)
+for _ in range(int(sys.argv[1])):
+    publisher.publish(data)
+publisher.wait_until_received(30.0)
+"""
+
+
+def run(*command, **environment):
+    """Run a command; return its wall time [s] and its standard output."""
+    begin = time.perf_counter()
+    done = subprocess.run(
+        command,
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
+        env={**os.environ, **environment},
+    )
+    return time.perf_counter() - begin, done.stdout
+
+
+def entrain(tmp_path, name, *options):
+    seconds, text = run(
+        "entrain", "run", "--json", "--no-figures", "--out", str(tmp_path / name), *options
+    )
+    return seconds, json.loads(text)
+
+
+def test_whole_command_entrain_simulate():
+    run("entrain", "simulate", "--json")  # loads what the operating system has not cached
+    simulate, _ = run("entrain", "simulate", "--json")
+    start, _ = run(sys.executable, "-c", "import numpy")
+    print(
+        f"\nentrain simulate, default protocol, whole command: {simulate:.2f} s"
+        f" (target: under 1 s; a Python that imports numpy alone: {start:.2f} s)"
+    )
+
+
+def test_lock_step_with_everything_recorded(tmp_path):
+    seconds, outcome = entrain(tmp_path, "everything")
+    walked = sum(outcome["stride_period"])
+    print(
+        f"\nentrain run, default protocol, 200 Hz, everything recorded:"
+        f" {outcome['real_time_factor']:.0f} times real time from first to last /clock"
+        f" (target: 30), {outcome['messages']} messages, {outcome['lost']} lost;"
+        f" whole command {seconds:.1f} s, {walked / seconds:.0f} times real time"
+    )
+    print(f"baseline, a raw subscriber alone: {raw_subscriber_rate():.0f} messages/s")
+    rate = outcome["messages"] / (walked / outcome["real_time_factor"])
+    print(f"the recorder of that run: {rate:.0f} messages/s, written to disk")
+    assert outcome["lost"] == 0
+
+
+def test_lock_step_at_event_rate(tmp_path):
+    _, outcome = entrain(
+        tmp_path, "events", "--sample-rate=0", "--no-ground-reaction", "--pulses=970"
+    )
+    factor = outcome["real_time_factor"]
+    print(
+        f"\nentrain run, 1000 strides, states at event rate only: {factor:.0f} times real time"
+        f" (target: 300), {outcome['lost']} lost; {round_trips(outcome, factor):.1f} ms a stride"
+    )
+    print(f"baseline, a service call between two processes: {service_call_ms():.2f} ms (median)")
+    assert outcome["lost"] == 0
+
+
+class Listener:
+    """A node of this process in a domain of its own, beside one other process."""
+
+    def __init__(self, domain):
+        self.context = Context()
+        rclpy.init(context=self.context, domain_id=domain)
+        self.node = Node("listener", context=self.context)
+        self.executor = EventsExecutor(context=self.context)
+        self.executor.add_node(self.node)
+
+    def spin_until(self, condition):
+        while not condition():
+            self.executor.spin_once(timeout_sec=0.1)
+
+    def close(self):
+        self.executor.shutdown()
+        self.node.destroy_node()
+        rclpy.try_shutdown(context=self.context)
+
+
+def raw_subscriber_rate():
+    """Return how many serialized messages a subscriber takes that does nothing with them [1/s]."""
+    arrivals = []
+    with claimed_domain() as domain:
+        listener = Listener(domain)
+        listener.node.create_subscription(
+            JOINT_STATES.type,
+            JOINT_STATES.name,
+            lambda _: arrivals.append(time.perf_counter()),
+            JOINT_STATES.qos,
+            raw=True,
+        )
+        with subprocess.Popen(
+            [sys.executable, "-c", _PUBLISHER, str(MESSAGES)],
+            env={**os.environ, "ROS_DOMAIN_ID": str(domain)},
+        ):
+            listener.spin_until(lambda: len(arrivals) == MESSAGES)
+        listener.close()
+    return MESSAGES / (arrivals[-1] - arrivals[0])
+
+
+def service_call_ms():
+    """Return the median time of a service call to a node in another process [ms]."""
+    times = []
+    with claimed_domain() as domain:
+        listener = Listener(domain)
+        client = listener.node.create_client(Trigger, "gait_analyzer/ready")
+        with subprocess.Popen(
+            ["gait_analyzer"], env={**os.environ, "ROS_DOMAIN_ID": str(domain)}
+        ) as other:
+            listener.spin_until(client.service_is_ready)
+            time.sleep(1.0)  # until the other has discovered who asks
+            for _ in range(500):
+                begin = time.perf_counter()
+                listener.spin_until(client.call_async(Trigger.Request()).done)
+                times.append(time.perf_counter() - begin)
+            other.terminate()
+        listener.close()
+    return 1e3 * sorted(times)[len(times) // 2]
+
+
+def round_trips(outcome, factor):
+    """Return wall time a stride [ms]."""
+    return 1e3 * sum(outcome["stride_period"]) / factor / len(outcome["stride_period"])
