@@ -50,6 +50,14 @@ class AkMitCanOptions:
         default="socketcan", metadata={"meaning": "python-can interface", "unit": ""}
     )
     channel: str = field(default="can0", metadata={"meaning": "channel of the bus", "unit": ""})
+    port: int = field(
+        default=0,
+        metadata={
+            "meaning": "UDP port of udp_multicast; 0 is python-can's own",
+            "unit": "",
+            "range": (0, 65535),
+        },
+    )
     bitrate: int = field(
         default=1_000_000,
         metadata={"meaning": "of the bus", "unit": "bit/s", "range": (10_000, 1_000_000)},
@@ -115,7 +123,7 @@ class AkMitCanRobot(HostTimedRobot):
 
     def _open(self) -> None:
         options = self._options
-        self._bus = open_bus(options.interface, options.channel, options.bitrate)
+        self._bus = open_bus(options.interface, options.channel, options.bitrate, options.port)
         # Leaving motor mode is harmless whatever the motor is doing, and is answered.
         reply = self._ask(EXIT)
         if reply.error:

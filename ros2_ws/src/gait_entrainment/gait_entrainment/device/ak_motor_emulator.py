@@ -111,7 +111,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _end)
     try:
-        bus = open_bus(options.interface, options.channel, 1_000_000)
+        bus = open_bus(options.interface, options.channel, 1_000_000, options.port)
     except DeviceError as error:
         print(f"ak_motor_emulator: {error}", file=sys.stderr)
         return 1
@@ -168,6 +168,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--interface", default="udp_multicast", help="python-can interface")
     parser.add_argument("--channel", default="239.74.163.2", help="channel of the bus")
+    parser.add_argument(
+        "--port", type=int, default=0, help="of udp_multicast; 0: python-can's own"
+    )
     parser.add_argument("--motor", choices=MOTORS, default="AK80-9", help="type of the motor")
     parser.add_argument("--motor-id", type=int, default=1, help="1 to 127")
     parser.add_argument("--bandwidth", type=float, default=30.0, help="of the torque [Hz]")

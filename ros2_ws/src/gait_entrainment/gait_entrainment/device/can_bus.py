@@ -19,9 +19,13 @@ from typing import Any
 from gait_entrainment.device.faults import DeviceError
 
 
-def open_bus(interface: str, channel: str, bitrate: int) -> Any:
+def open_bus(interface: str, channel: str, bitrate: int, port: int) -> Any:
     """
     Open a bus; python-can is loaded here, so that nobody else waits for it.
+
+    The port is that of udp_multicast, 0 for python-can's own. It keeps two buses on one machine
+    apart; two groups on one port hear each other, since Linux hands a datagram to every socket
+    of the port.
 
     Raises
     ------
@@ -35,8 +39,10 @@ def open_bus(interface: str, channel: str, bitrate: int) -> Any:
         raise DeviceError("python-can is missing: pip install python-can msgpack") from None
     try:
         # udp_multicast has no bit rate; the others take it, or ignore it where the system sets it.
-        rate: dict[str, Any] = {} if interface == "udp_multicast" else {"bitrate": bitrate}
-        return can.Bus(interface=interface, channel=channel, ignore_config=True, **rate)
+        settings: dict[str, Any] = {"bitrate": bitrate}
+        if interface == "udp_multicast":
+            settings = {"port": port} if port else {}
+        return can.Bus(interface=interface, channel=channel, ignore_config=True, **settings)
     except (
         can.CanError,
         OSError,

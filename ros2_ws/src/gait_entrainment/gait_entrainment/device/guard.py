@@ -52,6 +52,7 @@ from gait_entrainment.device.robot import AnkleRobot, Capabilities, RobotState
 
 # How often the watchdog looks whether the experiment has fallen silent [s].
 _WATCH_PERIOD = 0.01
+_INACTIVE = "the device is not active; configure and activate it first"
 
 _T = TypeVar("_T")
 
@@ -97,6 +98,11 @@ class GuardedRobot:
     def capabilities(self) -> Capabilities:
         """What the device can do."""
         return self._robot.capabilities
+
+    @property
+    def enabled(self) -> bool:
+        """Whether the device has been activated, be it latched or not."""
+        return self._active
 
     @property
     def active(self) -> bool:
@@ -180,8 +186,18 @@ class GuardedRobot:
         self._armed = True
 
     def begin(self, start: int) -> None:
-        """Start the account of a run at an instant [ns]; a train of the run before is dropped."""
-        self._refuse_inactive()
+        """
+        Start the account of a run at an instant [ns]; a train of the run before is dropped.
+
+        Raises
+        ------
+        DeviceError
+            where the device is not active, or the driver fails. A latched one may begin: there
+            will be no torque.
+
+        """
+        if not self._active:
+            raise DeviceError(_INACTIVE)
         self._call(lambda: self._robot.begin(start))
         self.train, self.delivered, self.promised_until = None, 0, start
         self._delivered_torque = _DeliveredTorque(self.limits)
@@ -189,17 +205,21 @@ class GuardedRobot:
         self.heard()
 
     def deactivate(self) -> None:
-        """Bring the torque to zero, then disable the device; what fails becomes a fault."""
+        """
+        Bring the torque to zero, then disable the device; what fails becomes a fault.
+
+        Promises may still be asked for, until the run is over.
+        """
         self.train = None
         self._watching.clear()
         if self._active:
-            self._active = self._armed = self._begun = False
+            self._active = self._armed = False
             self._quietly(self._robot.deactivate)
 
     def close(self) -> None:
         """Bring the torque to zero, disable and release, from any state; never raises."""
         self.deactivate()
-        self._configured = False
+        self._configured = self._begun = False
         self._quietly(self._robot.close)
         atexit.unregister(self.close)
 
@@ -322,7 +342,7 @@ class GuardedRobot:
     def _refuse_inactive(self) -> None:
         self._refuse_latched()
         if not self._active:
-            raise DeviceError("the device is not active; configure and activate it first")
+            raise DeviceError(_INACTIVE)
 
     def _call(self, function: Callable[[], _T]) -> _T:
         """Call the driver; whatever it raises, the torque goes to zero first."""

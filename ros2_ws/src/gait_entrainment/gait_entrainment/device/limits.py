@@ -51,7 +51,7 @@ class DeviceLimits:
     stride: float = _limit(
         1.0, "time that counts as a stride: no longer than the wearer's shortest", "s", 0.1, 10.0
     )
-    duty: float = _limit(0.5, "largest share of the time with torque", "1", 0.0, 1.0)
+    duty: float = _limit(0.9, "largest share of the time with torque", "1", 0.0, 1.0)
     overshoot: float = _limit(
         0.2, "share by which delivered torque and impulse may exceed their limits", "1", 0.0, 1.0
     )

@@ -12,26 +12,26 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The motor emulator as a process of its own, on a multicast group of its own."""
+"""The motor emulator as a process of its own, on a bus of its own."""
 
 import contextlib
-import os
+import socket
 import subprocess
 import sys
 import time
-from itertools import count
 
-_groups = count()
+CHANNEL = "239.74.163.2"
 
 
 @contextlib.contextmanager
 def emulator(*arguments, trace=None):
     """Run the emulator; yields the text that names the driver for it."""
-    # A group for each process and test: concurrent test runs do not hear each other.
-    process_id, number = os.getpid(), next(_groups)
-    channel = f"239.74.{process_id % 254 + 1}.{(process_id // 254 + 17 * number) % 254 + 1}"
+    # A port of its own keeps a test apart from others that run at the same time.
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("", 0))
+        port = free.getsockname()[1]
     command = [sys.executable, "-m", "gait_entrainment.device.ak_motor_emulator"]
-    command += ["--channel", channel, *arguments]
+    command += ["--channel", CHANNEL, "--port", str(port), *arguments]
     if trace is not None:
         command += ["--trace", str(trace)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
@@ -39,7 +39,7 @@ def emulator(*arguments, trace=None):
         assert "ready" in process.stdout.readline()
         # Patience for a machine that others share; the limits themselves are tested one by one.
         patience = "rate=250,silence=0.3,lateness=0.5"
-        yield f"ak_mit_can:interface=udp_multicast,channel={channel},{patience}"
+        yield f"ak_mit_can:interface=udp_multicast,channel={CHANNEL},port={port},{patience}"
     finally:
         process.terminate()
         process.wait(10)
