@@ -20,18 +20,16 @@ tells the time at the guess, and the rest of the way is a second-order Taylor st
 error is the cube of the time left.
 """
 
-import math
 from typing import Final
 
 from gait_entrainment.walker.compiled import compiled
-from gait_entrainment.walker.linkage import ankle_cosine
 from gait_entrainment.walker.model import Floats, Model
 from gait_entrainment.walker.segment import (
     SINGLE_STANCE,
     Segment,
     double_stance_time,
     motion,
-    sine_motion,
+    position_of,
 )
 from gait_entrainment.walker.single_stance import pendulum_time
 
@@ -80,25 +78,6 @@ def quintic(
 
 
 @compiled
-def guess(model: Model, segment: Segment, elapsed: float) -> float:
-    """
-    Position after `elapsed` seconds, by Hermite interpolation between the segment's ends.
-
-    In double stance of sin(theta), which is far smoother in time than psi.
-    """
-    low, high = segment.position, segment.end
-    if segment.phase == SINGLE_STANCE:
-        velocity_0, acceleration_0 = motion(model, segment, low)
-        velocity_1, acceleration_1 = motion(model, segment, high)
-        start, end = (low, velocity_0, acceleration_0), (high, velocity_1, acceleration_1)
-        return quintic(segment.duration, elapsed, start, end)
-    start, end = sine_motion(model, segment, low), sine_motion(model, segment, high)
-    sine = quintic(segment.duration, elapsed, start, end)
-    cosine = ankle_cosine(sine, model.leg_length, model.foot_length, model.separation)
-    return math.acos(max(-1.0, min(1.0, cosine)))
-
-
-@compiled
 def position_at(model: Model, work: Floats, segment: Segment, elapsed: float) -> float:
     """Position after `elapsed` seconds of the segment, held within its ends."""
     low, high = segment.position, segment.end
@@ -106,7 +85,10 @@ def position_at(model: Model, work: Floats, segment: Segment, elapsed: float) ->
         return low
     if elapsed >= segment.duration:
         return high
-    position = guess(model, segment, elapsed)
+    guess = quintic(
+        segment.duration, elapsed, motion(model, segment, low), motion(model, segment, high)
+    )
+    position = position_of(model, segment.phase, guess)
     if not low < position < high:
         position = 0.5 * (low + high)
     left = elapsed - travel_time(model, work, segment, low, position)
@@ -115,13 +97,13 @@ def position_at(model: Model, work: Floats, segment: Segment, elapsed: float) ->
             low = position
         else:
             high = position
-        velocity, acceleration = motion(model, segment, position)
-        step = left * (velocity + 0.5 * acceleration * left)
-        target = position + step
+        value, velocity, acceleration = motion(model, segment, position)
+        value += left * (velocity + 0.5 * acceleration * left)
+        target = position_of(model, segment.phase, value)
         inside = low <= target <= high
         if abs(left) < LAST_STEP and inside:
             return target
-        if not inside or velocity * left * step <= 0.0:
+        if not inside or (target - position) * left <= 0.0:
             target = 0.5 * (low + high)
             if target in (low, high):
                 return target

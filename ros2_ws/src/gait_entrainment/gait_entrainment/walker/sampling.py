@@ -49,7 +49,7 @@ from gait_entrainment.walker.segment import (
     effective_torque,
     leading_force,
     leg_sine_at,
-    motion,
+    squared_rate,
 )
 from gait_entrainment.walker.trajectory import Stamps
 from gait_entrainment.walker.transitions import NANO
@@ -181,8 +181,9 @@ def fill_double_stance(model: Model, segment: Segment, position: float, row: Flo
     sin_ankle = math.sin(position)
     slope = leg_per_ankle(sin_ankle, cosine, model.foot_length, model.separation)
     reach = trailing_reach(math.cos(position), model.leg_length, model.foot_length)
-    velocity, _ = motion(model, segment, position)
-    fill_leading_leg(model, segment, position, sine, -slope * velocity, row)
+    rate = math.sqrt(max(0.0, squared_rate(model, segment, position)))
+    velocity = rate / slope
+    fill_leading_leg(model, segment, position, sine, -rate, row)
 
     row[HIP + trailing] = trailing_leg_angle(
         position, sine, model.leg_length, model.foot_length, model.separation
@@ -211,12 +212,12 @@ def fill_double_stance(model: Model, segment: Segment, position: float, row: Flo
 def fill_single_stance(model: Model, segment: Segment, position: float, row: Floats) -> None:
     """Stance leg as an inverted pendulum, swing leg on its path for display."""
     swing = 1 - segment.leading
-    velocity, _ = motion(model, segment, position)
-    fill_leading_leg(model, segment, position, math.sin(-position), -velocity, row)
+    rate = math.sqrt(max(0.0, squared_rate(model, segment, position)))
+    fill_leading_leg(model, segment, position, math.sin(-position), -rate, row)
 
     span = model.strike_position - model.toe_off_position
     progress = (position - model.toe_off_position) / span
-    pace = velocity / span
+    pace = rate / span
     angle, slope = swing_path(
         progress, model.swing_hip, model.swing_hip_slope, model.strike_position
     )

@@ -32,6 +32,7 @@ import numpy as np
 
 from gait_entrainment.walker.compiled import compiled
 from gait_entrainment.walker.linkage import (
+    ankle_cosine,
     drop,
     leg_per_ankle,
     leg_sine,
@@ -174,43 +175,35 @@ def leading_force(model: Model, segment: Segment, position: float) -> float:
 
 
 @compiled
-def motion(model: Model, segment: Segment, position: float) -> tuple[float, float]:
+def motion(model: Model, segment: Segment, position: float) -> tuple[float, float, float]:
     """
-    Velocity and acceleration of the position.
+    Value, velocity and acceleration of a coordinate that is smooth in time.
 
-    In double stance psi_dot = u theta_dot with u = d cos(theta) / (l sin(psi)), and the
-    acceleration is half the derivative of psi_dot^2 by psi.
-    """
-    square = max(0.0, squared_rate(model, segment, position))
-    if segment.phase == SINGLE_STANCE:
-        return math.sqrt(square), 0.5 * model.per_drop * math.sin(position)
-    sin_ankle, cos_ankle = math.sin(position), math.cos(position)
-    sine = leg_sine_at(model, DOUBLE_STANCE, position)
-    slope = leg_per_ankle(
-        sin_ankle, math.sqrt(1.0 - sine * sine), model.foot_length, model.separation
-    )
-    u = 1.0 / slope
-    u_slope = model.separation / model.foot_length * sine * slope / sin_ankle
-    u_slope -= u * cos_ankle / sin_ankle
-    square_slope = model.per_energy * effective_torque(segment, position)
-    square_slope -= model.per_drop * sine * slope
-    return u * math.sqrt(square), u * (0.5 * u * square_slope + u_slope * square)
-
-
-@compiled
-def sine_motion(model: Model, segment: Segment, position: float) -> tuple[float, float, float]:
-    """
-    sin(theta), its velocity and its acceleration at a position of double stance.
-
+    In single stance the position, in double stance sin(theta): psi itself speeds up twentyfold.
     theta_ddot is half the derivative of theta_dot^2 by theta.
     """
-    sine = leg_sine_at(model, DOUBLE_STANCE, position)
+    if segment.phase == SINGLE_STANCE:
+        rate = math.sqrt(max(0.0, squared_rate(model, segment, position)))
+        return position, rate, 0.5 * model.per_drop * math.sin(position)
+    cos_ankle = math.cos(position)
+    sine = leg_sine(cos_ankle, model.leg_length, model.foot_length, model.separation)
     cosine = math.sqrt(1.0 - sine * sine)
-    slope = leg_per_ankle(math.sin(position), cosine, model.foot_length, model.separation)
-    square = max(0.0, squared_rate(model, segment, position))
+    sin_ankle = math.sqrt(1.0 - cos_ankle * cos_ankle)
+    slope = leg_per_ankle(sin_ankle, cosine, model.foot_length, model.separation)
+    square = gained_apex(model, segment, position) + model.per_drop * drop(sine, cosine)
+    square = max(0.0, square)
     push = model.per_energy * effective_torque(segment, position) / slope
     acceleration = 0.5 * (model.per_drop * sine - push)
     return sine, -cosine * math.sqrt(square), cosine * acceleration - sine * square
+
+
+@compiled
+def position_of(model: Model, phase: int, coordinate: float) -> float:
+    """Position where the coordinate of `motion` has this value."""
+    if phase == SINGLE_STANCE:
+        return coordinate
+    cosine = ankle_cosine(coordinate, model.leg_length, model.foot_length, model.separation)
+    return math.acos(max(-1.0, min(1.0, cosine)))
 
 
 @compiled
@@ -227,7 +220,7 @@ def panel(
     middle, half = 0.5 * (start + end), 0.5 * (end - start)
     sin_middle, cos_middle = math.sin(middle), math.cos(middle)
     rotation = middle - segment.position
-    for i in range(nodes.size):
+    for i in range(PANEL_NODES):
         x = half * nodes[i]
         s, c = short_sine(x), short_cosine(x)
         sin_ankle = sin_middle * c + cos_middle * s
@@ -274,15 +267,22 @@ def stall_panel(
 @compiled
 def weighed(model: Model, work: Floats, half: float) -> tuple[float, bool]:
     """Integral from the integrand at the nodes, and whether its last coefficients are small."""
-    weights, tails = model.rule[WEIGHTS], model.rule[TAILS:]
-    time, tail_1, tail_2 = work[TIME], work[TIME + 1], work[TIME + 2]
-    for i in range(weights.size):
-        tail_1[i] = tails[0, i] * time[i]
-        tail_2[i] = tails[1, i] * time[i]
-        time[i] = weights[i] * time[i]
-    total = ordered_sum(time, weights.size)
-    tail = abs(ordered_sum(tail_1, weights.size)) + abs(ordered_sum(tail_2, weights.size))
+    rule, time = model.rule, work[TIME]
+    total = dot(rule[WEIGHTS], time)
+    tail = abs(dot(rule[TAILS], time)) + abs(dot(rule[TAILS + 1], time))
     return half * total, tail < 0.5 * TAIL_TOLERANCE * abs(total)
+
+
+@compiled
+def dot(weights: Floats, values: Floats) -> float:
+    """Weighted sum over a panel's nodes, as four sums side by side."""
+    s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
+    for i in range(0, PANEL_NODES, 4):
+        s0 += weights[i] * values[i]
+        s1 += weights[i + 1] * values[i + 1]
+        s2 += weights[i + 2] * values[i + 2]
+        s3 += weights[i + 3] * values[i + 3]
+    return (s0 + s1) + (s2 + s3)
 
 
 @compiled
@@ -299,33 +299,26 @@ def ordered_sum(values: Floats, count: int) -> float:
 
 @compiled
 def short_sine(x: float) -> float:
-    """sin(x) for |x| <= 0.8 to rounding: Taylor to x^17."""
+    """sin(x) for |x| <= 0.8 to rounding: Taylor to x^17, odd and even terms side by side."""
     y = x * x
-    p = 1.0 / 355687428096000.0
-    p = p * y - 1.0 / 1307674368000.0
-    p = p * y + 1.0 / 6227020800.0
-    p = p * y - 1.0 / 39916800.0
-    p = p * y + 1.0 / 362880.0
-    p = p * y - 1.0 / 5040.0
-    p = p * y + 1.0 / 120.0
-    p = p * y - 1.0 / 6.0
-    return x + x * y * p
+    z = y * y
+    p = (1.0 / 6227020800.0 + 1.0 / 355687428096000.0 * z) * z + 1.0 / 362880.0
+    p = (p * z + 1.0 / 120.0) * y
+    q = (1.0 / -1307674368000.0 * z - 1.0 / 39916800.0) * z - 1.0 / 5040.0
+    q = q * z - 1.0 / 6.0
+    return x + x * y * (p + q)
 
 
 @compiled
 def short_cosine(x: float) -> float:
-    """cos(x) for |x| <= 0.8 to rounding: Taylor to x^18."""
+    """cos(x) for |x| <= 0.8 to rounding: Taylor to x^18, odd and even terms side by side."""
     y = x * x
-    p = -1.0 / 6402373705728000.0
-    p = p * y + 1.0 / 20922789888000.0
-    p = p * y - 1.0 / 87178291200.0
-    p = p * y + 1.0 / 479001600.0
-    p = p * y - 1.0 / 3628800.0
-    p = p * y + 1.0 / 40320.0
-    p = p * y - 1.0 / 720.0
-    p = p * y + 1.0 / 24.0
-    p = p * y - 0.5
-    return 1.0 + y * p
+    z = y * y
+    p = (1.0 / 20922789888000.0 * z + 1.0 / 479001600.0) * z + 1.0 / 40320.0
+    p = (p * z + 1.0 / 24.0) * y
+    q = (-1.0 / 6402373705728000.0 * z - 1.0 / 87178291200.0) * z - 1.0 / 3628800.0
+    q = (q * z - 1.0 / 720.0) * z - 0.5
+    return 1.0 + y * (p + q)
 
 
 @compiled

@@ -48,8 +48,6 @@ from gait_entrainment.walker.transitions import (
     collide,
     enter_double_stance,
     leave_double_stance,
-    rounded_stamp,
-    seconds,
     unload,
 )
 
@@ -97,9 +95,8 @@ def proceed(
     comes after a torque change of its own stamp, which may avert it.
     """
     end, rest = clock(segment.stamp, segment.rest, segment.duration)
-    end_stamp = rounded_stamp(seconds(end, rest))
     terminal = segment.ends == FALL or segment.ends == FLY_OFF
-    due = end_stamp + 1 if terminal else end_stamp
+    due = end + 1 if terminal else end
     trailing = 1 - segment.leading
     if segment.phase == DOUBLE_STANCE:
         ahead = skip_changes(changes, right, cursors, trailing, segment.after)
@@ -118,7 +115,7 @@ def proceed(
     if terminal:
         return ENDED
     segment.stamp, segment.rest = end, rest
-    segment.after = max(segment.after, end_stamp - 1)
+    segment.after = max(segment.after, end - 1)
     if segment.ends == HEEL_STRIKE:
         # The stance leg now trails: its torque is what held before this stamp.
         skip_changes(changes, right, cursors, segment.leading, segment.after)

@@ -317,9 +317,3 @@ def clock(stamp: int, rest: float, elapsed: float) -> tuple[int, float]:
 def seconds(stamp: int, rest: float) -> float:
     """Instant as seconds since the start of the run."""
     return stamp / NANO + rest
-
-
-@compiled
-def rounded_stamp(time: float) -> int:
-    """Nanoseconds of an instant [s], to the nearest, ties to even: `conventions.nanoseconds`."""
-    return int(np.rint(time * NANO))

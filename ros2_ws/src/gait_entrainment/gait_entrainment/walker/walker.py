@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 
-from gait_entrainment.conventions import EventKind, Side, nanoseconds
+from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.walker.model import Floats, make_model, start_apex
 from gait_entrainment.walker.promise import PromisedTorque
@@ -47,7 +47,11 @@ from gait_entrainment.walker.transitions import clock, seconds
 
 @dataclass(frozen=True)
 class Transition:
-    """A gait event of the model: its instant [s] and stamp [ns] since the start of the run."""
+    """
+    A gait event of the model: its instant [s] and stamp [ns] since the start of the run.
+
+    The stamp is rounded from the walker's own clock, which resolves more than `time`, a double.
+    """
 
     time: float
     stamp: int
@@ -225,15 +229,14 @@ class Walker:
 
     def _describe_ending(self, last: Any) -> Ending:
         stamp, rest = clock(last["stamp"], last["rest"], last["duration"])
-        time = seconds(stamp, rest)
         sine = leg_sine_at(self._model, last["phase"], last["end"])
         return Ending(
             kind=EndingKind.FALL if last["ends"] == FALL else EndingKind.FLY_OFF,
             phase=Phase(last["phase"]),
             side=Side(last["leading"]),
             step=int(last["step"]),
-            time=time,
-            stamp=nanoseconds(time),
+            time=seconds(stamp, rest),
+            stamp=stamp,
             angle=float(np.arcsin(sine)),
             missing=float(last["shortfall"]),
         )
@@ -241,12 +244,11 @@ class Walker:
 
 def _transition(segment: Any) -> Transition:
     """Event that began a segment. A heel strike closes the step before the one in progress."""
-    time = float(seconds(segment["stamp"], segment["rest"]))
     struck = segment["began"] == HEEL_STRIKE
     leading, step = Side(segment["leading"]), int(segment["step"])
     return Transition(
-        time=time,
-        stamp=nanoseconds(time),
+        time=seconds(segment["stamp"], segment["rest"]),
+        stamp=int(segment["stamp"]),
         kind=EventKind.HEEL_STRIKE if struck else EventKind.TOE_OFF,
         side=leading if struck else leading.other,
         step=step - 1 if struck else step,
