@@ -17,7 +17,8 @@ bag_recorder: records topics into an MCAP bag that rosbag2 opens, and says what 
 
 Messages are taken and written as bytes, never decoded. In lock-step it sends the walker's
 progress back once everything that it covers is written. At the end of a run it holds its counts
-against those of the publishers.
+against those of the publishers. Where the disk is full the recording ends, closed and readable;
+the run goes on unless the record is required.
 """
 
 import importlib
@@ -30,6 +31,7 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 from rclpy.qos import (
     DurabilityPolicy,
@@ -65,6 +67,9 @@ from gait_entrainment_nodes.topics import (
 CARE_PERIOD = 0.2
 # How long to wait, after the end of a run, for messages and counts still on their way [s].
 CLOSING_TIMEOUT = 5.0
+# A message that comes behind one with a later stamp is logged with it, so that a player keeps the
+# order; one that is earlier by more [ns] has a clock of its own, and is believed.
+LONGEST_OVERTAKING = 60 * NANOSECONDS_PER_SECOND
 # A message whose first field is a header or a stamp has it behind four bytes of CDR header.
 _STAMP = struct.Struct("<iI")
 _STAMPED = ("std_msgs/Header ", "builtin_interfaces/Time ")
@@ -92,12 +97,27 @@ class BagRecorder(Participant, Node):
         custom_data = declare(
             self, "custom_data", "{}", "what else belongs to the record: a JSON object of texts"
         )
+        max_bytes = declare(
+            self, "max_bytes", 0, "begin a new file once one is so large; 0: never", unit="byte"
+        )
+        max_duration = declare(
+            self,
+            "max_duration",
+            0.0,
+            "begin a new file once one spans so much ROS time; 0: never",
+            unit="s",
+        )
+        self.required = declare(
+            self, "required", False, "end, and with it the run, where nothing more can be written"
+        )
         self.begin_participation()
         try:
             self.bag = BagWriter(
                 output,
                 ros_distro=os.environ.get("ROS_DISTRO", "jazzy"),
                 custom_data=_texts(custom_data),
+                max_bytes=max_bytes,
+                max_duration=max_duration,
             )
         except BagError as error:
             raise ValueError(f"output: {error}") from None
@@ -116,6 +136,14 @@ class BagRecorder(Participant, Node):
                 RECORDER_PROGRESS,
             )
         }
+        if self.chosen and self.expected:
+            # What tells of the end is heard in any case.
+            self.chosen |= {self.resolved[t.name] for t in (PUBLISHED_COUNTS, WALKER_PROGRESS)}
+        self.broken_off = False  # the recording has ended before its time
+        # Messages that came before ROS time began: topic, bytes, time of reception [ns].
+        self.early: list[tuple[str, bytes, int]] = []
+        self.latest: dict[str, int] = {}  # log time of the latest message, by topic
+        self.offers: dict[str, tuple[OfferedQos, ...]] = {}
         self.seen: set[str] = set()  # topics that are recorded, or cannot be
         self.progress: Progress | None = None  # not acknowledged yet
         self.published: dict[str, dict[str, int]] = {}  # by node: final count by topic
@@ -129,7 +157,10 @@ class BagRecorder(Participant, Node):
         for name, types in self.get_topic_names_and_types():
             hidden = "/_" in name or name == self.resolved[RECORDER_PROGRESS.name]
             chosen = not self.chosen or name in self.chosen
-            if name in self.seen or hidden or not chosen or not self.count_publishers(name):
+            if hidden or not chosen or not self.count_publishers(name):
+                continue
+            if name in self.seen:
+                self.note_offers(name)
                 continue
             self.seen.add(name)
             try:
@@ -143,13 +174,14 @@ class BagRecorder(Participant, Node):
     def record(self, name: str, message_type: Any, definition: Definition) -> None:
         """Subscribe to one topic, in the quality that its publishers offer."""
         offers = [info.qos_profile for info in self.get_publishers_info_by_topic(name)]
+        self.offers[name] = tuple(_offered(offer) for offer in offers)
         self.bag.add_topic(
             TopicInfo(
                 name=name,
                 type=definition.type,
                 schema_text=definition.schema_text,
                 type_hash=definition.type_hash,
-                qos_profiles=tuple(_offered(offer) for offer in offers),
+                qos_profiles=self.offers[name],
             )
         )
         reliable = all(o.reliability == ReliabilityPolicy.RELIABLE for o in offers)
@@ -170,10 +202,30 @@ class BagRecorder(Participant, Node):
             raw=True,
         )
 
+    def note_offers(self, name: str) -> None:
+        """Keep what a publisher that came later offers."""
+        known = self.offers.get(name)
+        # Asked for by their number first: asking for their quality costs ten times as much.
+        if known is None or self.count_publishers(name) <= len(known):
+            return
+        infos = self.get_publishers_info_by_topic(name)
+        self.offers[name] = tuple(_offered(info.qos_profile) for info in infos)
+        self.bag.set_qos_profiles(name, self.offers[name])
+        lossy = {o.reliability for o in self.offers[name]} - {o.reliability for o in known}
+        if "best_effort" in lossy and all(o.reliability == "reliable" for o in known):
+            self.get_logger().error(
+                f"{name}: a publisher that came later is best effort; it is not recorded, since "
+                "the recording of this topic began as reliable"
+            )
+
     def writer_for(self, name: str, definition: Definition) -> Callable[[bytes], None]:
         """Return the callback that writes the messages of one topic."""
-        stamped = _first_field(definition.schema_text).startswith(_STAMPED)
+        # The stamp of a log entry is of the wall clock, also where time is simulated.
+        stamped = definition.type != "rcl_interfaces/msg/Log" and _first_field(
+            definition.schema_text
+        ).startswith(_STAMPED)
         write, wall_clock, unpack = self.bag.write, time.time_ns, _STAMP.unpack_from
+        latest = self.latest
         then = {
             self.resolved[WALKER_PROGRESS.name]: self.on_progress,
             self.resolved[PUBLISHED_COUNTS.name]: self.on_counts,
@@ -187,17 +239,48 @@ class BagRecorder(Participant, Node):
                 logged = sec * NANOSECONDS_PER_SECOND + nanosec
             if logged <= 0:
                 logged = self.get_clock().now().nanoseconds
-            try:
-                write(name, data, logged, received)
-            except BagError as error:
-                self.failure = str(error)
-                return
+            if logged <= 0 or self.early:
+                self.record_early(logged, name, data, received)
+            if logged > 0 and not self.broken_off:
+                before = latest.get(name, 0)
+                if 0 < before - logged < LONGEST_OVERTAKING:
+                    logged = before
+                latest[name] = logged
+                try:
+                    write(name, data, logged, received)
+                except BagError as error:
+                    self.break_off(error)
             if then is not None:
                 then(data)
             if self.progress is not None:
                 self.acknowledge_progress()
 
         return record
+
+    def record_early(self, logged: int, name: str, data: bytes, received: int) -> None:
+        """Keep a message from before ROS time began, or record those once it has begun."""
+        if logged <= 0:
+            self.early.append((name, data, received))
+            return
+        early, self.early = self.early, []
+        try:
+            for topic, content, came in early:
+                self.bag.write(topic, content, logged, came)
+                self.latest[topic] = logged
+        except BagError as error:
+            self.break_off(error)
+
+    def break_off(self, error: BagError) -> None:
+        """End the recording where nothing more can be written; the run goes on unless told to."""
+        if self.broken_off:
+            return
+        self.broken_off = True
+        if self.required:
+            self.failure = str(error)
+            return
+        self.get_logger().error(f"{error}; the run goes on without a record")
+        stamp = self.get_clock().now().nanoseconds
+        self.diagnose(stamp, DiagnosticStatus.ERROR, f"the recording has ended: {error}")
 
     # Lock-step
 
@@ -209,7 +292,7 @@ class BagRecorder(Participant, Node):
 
     def acknowledge_progress(self) -> None:
         """Send the progress back once everything that it covers is written."""
-        progress, counts = self.progress, self.bag.counts
+        progress, counts = self.progress, {} if self.broken_off else self.bag.counts
         assert progress is not None
         if counts.get(self.resolved[GAIT_EVENTS.name], progress.events) < progress.events:
             return
@@ -226,6 +309,8 @@ class BagRecorder(Participant, Node):
         message = deserialize_message(data, PublishedCounts)
         node = message.node.rpartition("/")[2]
         self.published[node] = dict(zip(message.topics, message.counts, strict=True))
+        if self.final_at is None and self.expected <= self.published.keys():
+            self.final_at = time.monotonic()
 
     def lost(self) -> dict[str, int]:
         """Return how many messages each topic lacks against its publisher's count."""
@@ -247,15 +332,15 @@ class BagRecorder(Participant, Node):
         """Look for new topics, bring data to the file, end where everything is there."""
         closing = self.final_at is not None and bool(self.expected)
         self._care_at = time.monotonic() + (0.01 if closing else CARE_PERIOD)
-        try:
-            self.subscribe_to_new_topics()
-            self.bag.flush()
-        except BagError as error:
-            self.failure = str(error)
-            return
+        if not self.broken_off:
+            try:
+                self.subscribe_to_new_topics()
+                self.bag.flush()
+            except BagError as error:
+                self.break_off(error)
         if self.final_at is None or not self.expected:
             return
-        if self.expected <= self.published.keys() and not self.lost():
+        if self.expected <= self.published.keys() and (self.broken_off or not self.lost()):
             self.finished = True
         elif time.monotonic() - self.final_at > CLOSING_TIMEOUT:
             silent = sorted(self.expected - self.published.keys())
@@ -265,11 +350,19 @@ class BagRecorder(Participant, Node):
 
     def not_ready(self) -> str:
         """Return what is still waited for: nothing, once new topics have been looked for."""
-        self.subscribe_to_new_topics()
+        try:
+            self.subscribe_to_new_topics()
+        except BagError as error:
+            self.break_off(error)
         return super().not_ready()
 
     def on_stop(self) -> None:
-        """Close the bag, with what was lost written into it."""
+        """Close the bag, with what was lost written into it, and say how much was written."""
+        if self.early and not self.broken_off:
+            # ROS time never began: the wall clock is the only one there is.
+            self.record_early(max(self.latest.values(), default=self.early[0][2]), "", b"", 0)
+        for topic, count in sorted(self.bag.counts.items()):
+            self.get_logger().info(f"{count} messages of {topic}")
         uncounted = sorted(self.expected - self.published.keys())
         self.bag.custom_data["messages_lost"] = json.dumps(self.lost())
         self.bag.custom_data["publishers_without_final_count"] = json.dumps(uncounted)

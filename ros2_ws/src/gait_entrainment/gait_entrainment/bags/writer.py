@@ -26,6 +26,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from io import FileIO
 from pathlib import Path
 from types import TracebackType
@@ -39,6 +40,7 @@ from gait_entrainment.bags.metadata import (
     RECORD_NAME,
     BagDescription,
     FileInformation,
+    QosProfile,
     TopicInfo,
     first_line,
     offered_qos_text,
@@ -50,6 +52,8 @@ COMPRESSIONS = {
     "lz4": CompressionType.LZ4,
     "zstd": CompressionType.ZSTD,
 }
+ENDED_EARLY = "ended_early"
+"""Entry of the custom data of a bag whose recording ended before its time; says why."""
 MEBIBYTE = 2**20
 TIME_END = 2**64
 DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
@@ -178,6 +182,15 @@ class BagWriter:
         except OSError as error:
             raise self._failure(error) from None
 
+    def set_qos_profiles(self, topic: str, profiles: tuple[QosProfile, ...]) -> None:
+        """
+        Change what publishers of a topic offer, where more of them have come.
+
+        It stands in the description, and in the channels of the files that follow; a channel of
+        the present file cannot be changed any more.
+        """
+        self._topics[topic] = replace(self._topics[topic], qos_profiles=profiles)
+
     def write(self, topic: str, data: bytes, log_time: int, publish_time: int) -> None:
         """
         Record one message.
@@ -246,6 +259,7 @@ class BagWriter:
         elif now >= self._flush_at:
             self.flush()
         if self._file.full:
+            self.custom_data[ENDED_EARLY] = f"disk full after {sum(self.counts.values())} messages"
             self.close()
             raise DiskFullError(
                 f"{self.folder}: disk full after {sum(self.counts.values())} messages; "

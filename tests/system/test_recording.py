@@ -1,0 +1,296 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The recorder as a process: what it keeps when it is killed, when the disk is full, and how."""
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from harness import PATIENCE, Probe, probe
+from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Empty
+
+from gait_entrainment.bags import BagReader, BagWriter, UnreadableBagError, check, recover
+from gait_entrainment_msgs.msg import Progress, PublishedCounts
+from gait_entrainment_nodes.domain import claimed_domain
+from gait_entrainment_nodes.stamps import header, to_time
+from gait_entrainment_nodes.topics import (
+    CLOCK,
+    EVERY_MESSAGE,
+    PUBLISHED_COUNTS,
+    RECORDER_PROGRESS,
+    WALKER_PROGRESS,
+)
+
+SECOND = 10**9
+RECORDER = "import sys; from gait_entrainment_nodes.bag_recorder import main; sys.exit(main())"
+# A disk that is full once so many bytes are written; what was put aside is there all the same.
+FULL_DISK = """
+import errno
+from gait_entrainment.bags import writer
+
+class File:
+    def __init__(self, path):
+        self.file, self.told = path.open("xb", buffering=0), False
+    def write(self, data):
+        if self.file.tell() > 20_000 and not self.told:
+            self.told = True
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return self.file.write(data)
+    def fileno(self):
+        return self.file.fileno()
+    def close(self):
+        self.file.close()
+
+writer._open_new = File
+"""
+
+
+class Recorder:
+    """A recorder process in the domain of a probe."""
+
+    def __init__(self, bag: Path, domain: int, parameters: Sequence[str], before: str) -> None:
+        self.bag = bag
+        self.log = bag.with_suffix(".log")
+        arguments = ["--ros-args"]
+        for parameter in (f"output:={bag}", "publishers:=[walker_sim]", *parameters):
+            arguments += ["-p", parameter]
+        with self.log.open("wb") as log:
+            self.process = subprocess.Popen(
+                [sys.executable, "-c", before + RECORDER, *arguments],
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                env={**os.environ, "ROS_DOMAIN_ID": str(domain)},
+            )
+
+    def wait(self) -> int:
+        return self.process.wait(PATIENCE)
+
+    def finish(self, listener: Probe, **counts: int) -> int:
+        """Tell the recorder what was published; it ends once it has written all of that."""
+        made = listener.node.create_publisher(
+            PUBLISHED_COUNTS.type, PUBLISHED_COUNTS.name, PUBLISHED_COUNTS.qos
+        )
+        listener.until(made.get_subscription_count, "the recorder")
+        topics = [f"/{topic}" for topic in counts]
+        made.publish(
+            PublishedCounts(node="/walker_sim", topics=topics, counts=list(counts.values()))
+        )
+        return self.wait()
+
+    @property
+    def text(self) -> str:
+        return self.log.read_text()
+
+
+@contextmanager
+def recorder(folder: Path, *parameters: str, before: str = "") -> Iterator[tuple[Recorder, Probe]]:
+    with claimed_domain() as domain, probe(domain) as listener:
+        process = Recorder(folder / "bag", domain, parameters, before)
+        try:
+            yield process, listener
+        finally:
+            process.process.kill()
+            process.process.wait()
+
+
+def joints(number: int, stamp: int) -> JointState:
+    return JointState(header=header(stamp), name=["l_hip"], position=[float(number)])
+
+
+def publisher(listener: Probe, topic: str, qos: QoSProfile = EVERY_MESSAGE) -> Any:
+    """Return a publisher that the recorder has found."""
+    made = listener.node.create_publisher(JointState, topic, qos)
+    listener.until(made.get_subscription_count, f"the recorder on {topic}")
+    return made
+
+
+def numbers(bag: Path, topic: str) -> list[int]:
+    with BagReader(bag) as reader:
+        return [int(message.position[0]) for _, message in reader.decoded([topic])]
+
+
+def test_a_killed_recorder_loses_less_than_a_second(tmp_path: Path) -> None:
+    draw = random.Random(4)
+    for trial in range(5):
+        folder = tmp_path / str(trial)
+        folder.mkdir()
+        with recorder(folder) as (process, listener):
+            publishers = [publisher(listener, topic) for topic in ("left", "right")]
+            begin = time.monotonic_ns()
+            end = begin + round(draw.uniform(0.2, 2.2) * SECOND)
+            sent: list[int] = []  # steady time of each message
+            while (now := time.monotonic_ns()) < end:
+                # A thousand a second, by absolute deadlines.
+                while len(sent) < (now - begin) // 1_000_000:
+                    for each in publishers:
+                        each.publish(joints(len(sent), SECOND + len(sent)))
+                    sent.append(now)
+                listener.node.executor.spin_once(timeout_sec=0.001)
+            process.process.send_signal(signal.SIGKILL)
+            process.wait()
+        with pytest.raises(UnreadableBagError, match="entrain bag recover"):
+            BagReader(process.bag)
+        rescued = recover(process.bag, folder / "rescued")
+        assert check(rescued.folder) == []
+        assert any("never closed" in loss for loss in rescued.losses)
+        due = sum(at < end - SECOND for at in sent)
+        for topic in ("/left", "/right"):
+            if topic in rescued.counts:
+                found = numbers(rescued.folder, topic)
+                assert found == list(range(len(found)))
+            assert rescued.counts.get(topic, 0) >= due
+
+
+@pytest.mark.parametrize("required", [False, True])
+def test_a_full_disk_ends_the_recording_and_the_run_only_if_told_to(
+    tmp_path: Path, required: bool
+) -> None:
+    with recorder(tmp_path, f"required:={required}".lower(), before=FULL_DISK) as (
+        process,
+        listener,
+    ):
+        acknowledged = listener.listen(RECORDER_PROGRESS)
+        progress = listener.node.create_publisher(
+            WALKER_PROGRESS.type, WALKER_PROGRESS.name, WALKER_PROGRESS.qos
+        )
+        listener.until(progress.get_subscription_count, "the recorder")
+        samples = publisher(listener, "joint_states")
+        sent = 0
+
+        def full() -> bool:
+            nonlocal sent
+            noise = random.Random(sent).randbytes(2000).hex()
+            state = joints(sent, SECOND + sent)
+            state.header.frame_id = noise
+            samples.publish(state)
+            sent += 1
+            return "disk full" in process.text
+
+        listener.until(full, "the disk to be full")
+        if required:
+            assert process.wait() == 1
+        else:
+            # Whoever waits for the recorder goes on, and the end of the run is its end.
+            progress.publish(Progress(header=header(SECOND), grant=7, samples=10**6))
+            listener.until(lambda: acknowledged, "an acknowledgement")
+            assert acknowledged[0].grant == 7
+            progress.publish(Progress(header=header(SECOND), state=Progress.FINISHED))
+            assert process.finish(listener, joint_states=sent) == 0
+    assert process.text.count("disk full") == 1
+    assert "closed and readable" in process.text
+    assert [f.rule for f in check(process.bag)] == []
+    with BagReader(process.bag) as bag:
+        assert bag.custom_data["ended_early"].startswith("disk full after")
+        assert 0 < bag.counts["/joint_states"] < sent
+    assert numbers(process.bag, "/joint_states") == list(range(bag.counts["/joint_states"]))
+
+
+def test_topics_are_chosen_found_late_and_described_as_offered(tmp_path: Path) -> None:
+    best_effort = QoSProfile(
+        history=HistoryPolicy.KEEP_LAST, depth=5, reliability=ReliabilityPolicy.BEST_EFFORT
+    )
+    with recorder(tmp_path, "topics:=[/left, /late, /nothing]") as (process, listener):
+        left = publisher(listener, "left")
+        unwanted = listener.node.create_publisher(JointState, "unwanted", EVERY_MESSAGE)
+        for number in range(3):
+            left.publish(joints(number, (number + 1) * SECOND))
+            unwanted.publish(joints(number, SECOND))
+        late = publisher(listener, "late", best_effort)
+        late.publish(joints(0, 5 * SECOND))
+        # Overtaken by less than a minute, it stays behind the one that came before it.
+        left.publish(joints(3, 2 * SECOND))
+        assert process.finish(listener, left=4, late=1) == 0
+        assert "4 messages of /left" in process.text
+    assert check(process.bag) == []
+    assert numbers(process.bag, "/left") == [0, 1, 2, 3]
+    with BagReader(process.bag) as bag:
+        # The counts that end a recording are always heard, and what is heard is recorded.
+        assert set(bag.topics) == {"/left", "/late", "/published_counts"}
+        times = [message.log_time // SECOND for message in bag.messages(["/left"])]
+        assert times == [1, 2, 3, 3]
+        (offered,) = bag.topics["/late"].qos_profiles
+        assert (offered.reliability, offered.durability) == ("best_effort", "volatile")
+        (offered,) = bag.topics["/left"].qos_profiles
+        assert offered.reliability == "reliable"
+
+
+def size_of(bag: Path) -> int:
+    return sum(file.stat().st_size for file in bag.glob("*.mcap"))
+
+
+@pytest.mark.parametrize("split", ["max_duration:=1.5", "max_bytes:=4000"])
+def test_a_recording_is_split(tmp_path: Path, split: str) -> None:
+    with recorder(tmp_path, split) as (process, listener):
+        left = publisher(listener, "left")
+        for number in range(40):
+            left.publish(joints(number, SECOND + number * SECOND // 10))
+            if number % 10 == 9:
+                size = size_of(process.bag)
+                listener.until(lambda size=size: size_of(process.bag) > size, "data in the file")
+        assert process.finish(listener, left=40) == 0
+    assert check(process.bag) == []
+    assert len(list(process.bag.glob("*.mcap"))) > 1
+    assert numbers(process.bag, "/left") == list(range(40))
+
+
+def test_what_comes_before_ros_time_begins_is_logged_at_its_beginning(tmp_path: Path) -> None:
+    with recorder(tmp_path, "use_sim_time:=true") as (process, listener):
+        empty = listener.node.create_publisher(Empty, "empty", EVERY_MESSAGE)
+        clock = listener.node.create_publisher(CLOCK.type, CLOCK.name, CLOCK.qos)
+        left = publisher(listener, "left")
+        for made in (empty, clock):
+            listener.until(made.get_subscription_count, "the recorder")
+        empty.publish(Empty())
+        left.publish(joints(0, 0))  # a stamp of zero is none
+        left.publish(joints(1, 77 * SECOND))
+        clock.publish(CLOCK.type(clock=to_time(78 * SECOND)))
+        empty.publish(Empty())
+        assert process.finish(listener, left=2, clock=1, empty=2) == 0
+    assert check(process.bag) == []
+    with BagReader(process.bag) as bag:
+        assert bag.start == 77 * SECOND
+        assert bag.end <= 78 * SECOND
+        assert bag.counts["/empty"] == 2
+    assert numbers(process.bag, "/left") == [0, 1]
+
+
+def test_a_folder_that_is_there_is_not_touched(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / "bag", ros_distro="jazzy"):
+        pass
+    before = {file: file.read_bytes() for file in (tmp_path / "bag").iterdir()}
+    with recorder(tmp_path) as (process, _):
+        assert process.wait() == 2
+    assert "already there" in process.text
+    assert {file: file.read_bytes() for file in (tmp_path / "bag").iterdir()} == before
+
+
+def test_what_was_lost_is_counted_and_written_down(tmp_path: Path) -> None:
+    with recorder(tmp_path) as (process, listener):
+        publisher(listener, "left").publish(joints(0, SECOND))
+        assert process.finish(listener, left=3) == 1
+    assert "the record is incomplete: 2 of /left lost" in process.text
+    with BagReader(process.bag) as bag:
+        assert json.loads(bag.custom_data["messages_lost"]) == {"/left": 2}
