@@ -28,6 +28,7 @@ from gait_entrainment.commands import (
     lock,
     paper,
     phase_response,
+    results,
     simulate,
     sweep,
 )
@@ -45,6 +46,7 @@ COMMANDS = {
     "phase-response": phase_response.add_command,
     "sweep": sweep.add_command,
     "cohort": cohort.add_command,
+    "results": results.add_command,
 }
 
 

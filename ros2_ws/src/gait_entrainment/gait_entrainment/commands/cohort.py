@@ -161,15 +161,19 @@ def _outcome(
         )
     anywhere = {trial.subject for trial in study.trials if trial.verdict == "entrained"}
     solved, measured = basin_percent(study), measured_basin_percent(study)
+    # Solved for level ground and equal legs only.
+    plain = plan.slope == 0 and plan.asymmetry == 0
     return {
         "subjects": len(subjects.walkers),
         "redrawn_for_want_of_a_gait": subjects.redrawn,
         "distributions": distributions,
         "plan": asdict(plan),
-        "mean_stride_period": float(np.mean(study.stride_periods)),
+        "mean_stride_period": mean([trial.measured_period for trial in study.trials]),
         "periods": periods,
         "entrained_at_some_period": len(anywhere),
-        "basin_solved_percent": [float(solved.mean()), float(solved.std(ddof=1))],
+        "basin_solved_percent": (
+            [float(solved.mean()), float(solved.std(ddof=1))] if plain else None
+        ),
         "basin_measured_percent": [float(measured.mean()), float(measured.std(ddof=1))],
     }
 
@@ -177,8 +181,8 @@ def _outcome(
 def _summary(outcome: dict[str, Any]) -> str:
     count = outcome["subjects"]
     lines = [
-        f"subjects         {count}, stride period {outcome['mean_stride_period']:.4f} s on"
-        f" average; {outcome['redrawn_for_want_of_a_gait']} drawn again for want of a gait",
+        f"subjects         {count}, measured stride period {outcome['mean_stride_period']:.4f} s"
+        f" on average; {outcome['redrawn_for_want_of_a_gait']} drawn again for want of a gait",
         "",
         "| offset [ms] | verdicts | strides locked* | mean run* | lag of the entrained [ms] |",
         "| --- | --- | --- | --- | --- |",
@@ -203,11 +207,16 @@ def _summary(outcome: dict[str, Any]) -> str:
         if row["period_offset"] == _HEADLINE:
             entrained = row["verdicts"].get("entrained", 0)
             lines += ["", f"entrained at {_HEADLINE * 1e3:+.0f} ms: {entrained} of {count}"]
-    lines += [
+    lines.append(
         f"entrained at some period: {outcome['entrained_at_some_period']} of {count}"
-        " (human: 18 of 19)",
-        f"basin without noise, solved: {solved[0]:.2f} +/- {solved[1]:.2f} % of the stride,"
-        " to shorter periods only (human: 6.7 +/- 3.6 %, to both sides)",
+        " (human: 18 of 19)"
+    )
+    if solved is not None:
+        lines.append(
+            f"basin without noise, solved: {solved[0]:.2f} +/- {solved[1]:.2f} % of the stride,"
+            " to shorter periods only (human: 6.7 +/- 3.6 %, to both sides)"
+        )
+    lines += [
         f"furthest period found entrained: {measured[0]:.2f} +/- {measured[1]:.2f} %",
         "Fed in: body sizes, peak torque, variability and its correlation, the pulse. Predicted:"
         " who entrains, the locked phase, the mean basin. The spread of the basin is mostly fed"

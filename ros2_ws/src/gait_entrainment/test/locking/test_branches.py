@@ -29,6 +29,7 @@ from gait_entrainment.locking import (
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.protocol import Protocol, PulsePlan
 from gait_entrainment.simulation import simulate
+from gait_entrainment.walker import step_to_step
 
 TABLE_1 = WalkerParameters()
 GAIT = PulsedGait(TABLE_1, 0.1 * TABLE_1.peak_torque, 0.1)
@@ -135,3 +136,18 @@ def test_beyond_the_flip_every_other_stride_is_alike():
     walk = walk_under_pulses(TABLE_1, torque, 0.1, period, 0.3, 1000)
     assert walk.outcome() is Outcome.ALTERNATING
     assert abs(walk.lags[-1] - walk.lags[-2]) > 1e-3
+
+
+@pytest.mark.parametrize("fraction", [0.1, 0.2, -0.1])
+def test_every_border_is_where_the_walkers_poincare_map_has_it(fraction):
+    torque = fraction * TABLE_1.peak_torque
+    gait = PulsedGait(TABLE_1, torque, 0.1)
+    along = {Place.EARLY: gait.early, Place.INSIDE: gait.inside, Place.LATE: gait.late}
+    for piece in pieces_of(gait):
+        for end in (piece.first, piece.last):
+            solved = along[piece.place](np.array([end.angle])).at(0)
+            speed = gait.speed(solved.apex)
+            first = step_to_step(TABLE_1, speed, end.onset, 0.1, torque)
+            second = step_to_step(TABLE_1, first.speed)
+            assert first.duration + second.duration == pytest.approx(end.period, abs=1e-11)
+            assert second.speed == pytest.approx(speed, abs=1e-11)
