@@ -91,12 +91,25 @@ class Study:
 
 
 def run_study(subjects: Subjects, plan: StudyPlan) -> Study:
-    """Run the experiment on each subject at each pulse period, with noise of its own."""
+    """
+    Run the experiment on each subject at each pulse period, with noise of its own.
+
+    Raises ValueError where the plan cannot be conducted.
+    """
+    if not np.isfinite(plan.torque):
+        raise ValueError(f"torque {plan.torque} N m is not a finite number")
     count = len(subjects.walkers)
     population = Population(subjects.walkers, plan.slope)
     noise = noise_for(population, subjects.variation, plan.seed, plan.hurst)
     gaits = [PulsedGait(walker, plan.torque, plan.width) for walker in subjects.walkers]
     pieces = [pieces_of(gait) for gait in gaits]
+    # Half the stride is room enough for any stride that noise makes.
+    shortest = min(gait.unperturbed_period for gait in gaits) / 2
+    for offset in plan.period_offsets:
+        if not abs(offset) < shortest:
+            raise ValueError(
+                f"period_offset {offset:g} s is out of range; allowed: within {shortest:.3g} s"
+            )
     trials: list[Trial] = []
     for number, offset in enumerate(plan.period_offsets):
         walker = PopulationWalker(

@@ -68,3 +68,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
     except BrokenPipeError:
         return 1
+    except OSError as error:  # such as a folder that cannot be written
+        print(f"entrain: {error}", file=sys.stderr)
+        return 1

@@ -16,6 +16,7 @@
 
 import argparse
 import json
+import math
 import sys
 from dataclasses import asdict
 from pathlib import Path
@@ -75,7 +76,7 @@ def run(options: argparse.Namespace) -> int:
         print(f"entrain lock: {error}", file=sys.stderr)
         return 2
     period = gait.unperturbed_period + options.period_offset
-    if period <= options.width or options.phases < 1:
+    if not (options.width < period < math.inf and options.phases >= 1):
         print(
             f"entrain lock: period_offset {options.period_offset:g} s, phases {options.phases};"
             f" allowed: above {options.width - gait.unperturbed_period:.4g} s, at least 1",

@@ -15,6 +15,7 @@
 """Options that name a walker and a kind of pulse, for the commands that ask about locking."""
 
 import argparse
+import math
 from dataclasses import fields
 
 from gait_entrainment.parameters import WalkerParameters
@@ -58,7 +59,10 @@ def chosen_walker(options: argparse.Namespace) -> WalkerParameters:
 
 
 def chosen_torque(options: argparse.Namespace, walker: WalkerParameters) -> float:
-    """Return the height of the pulse [N m]."""
-    if options.torque is not None:
-        return float(options.torque)
-    return float(options.torque_fraction * walker.peak_torque)
+    """Return the height of the pulse [N m]; raises ValueError where it is not a number."""
+    torque = options.torque
+    if torque is None:
+        torque = options.torque_fraction * walker.peak_torque
+    if not math.isfinite(torque):
+        raise ValueError(f"torque {torque} N m is not a finite number")
+    return float(torque)

@@ -78,6 +78,8 @@ def run(options: argparse.Namespace) -> int:
     from gait_entrainment.sweep import Axis, SweepError, SweepPlan, SweepStore
 
     try:
+        if options.jobs is not None and options.jobs < 1:
+            raise SweepError(f"jobs: {options.jobs}; allowed: at least 1")
         plan = SweepPlan(
             walker=chosen_walker(options),
             period_offsets=Axis(*_range(options.period_offsets)),

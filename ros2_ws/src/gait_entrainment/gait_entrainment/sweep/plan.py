@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from gait_entrainment.locking import PulsedGait
 from gait_entrainment.locking.pulsed_gait import Floats
 from gait_entrainment.parameters import WalkerParameters
 
@@ -81,8 +82,10 @@ class SweepPlan:
         for name, least in (("phases", 1), ("strides", 10)):
             if getattr(self, name) < least:
                 raise SweepError(f"{name}: {getattr(self, name)}; allowed: at least {least}")
-        if not 0 < self.width < np.inf:
-            raise SweepError(f"width: {self.width:g} s; allowed: above 0")
+        try:
+            PulsedGait(self.walker, 0.0, self.width)
+        except ValueError as error:
+            raise SweepError(str(error)) from None
 
     @property
     def walks(self) -> int:

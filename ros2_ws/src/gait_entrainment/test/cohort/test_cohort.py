@@ -96,6 +96,7 @@ def test_command_counts_every_subject_in_its_denominators(tmp_path, capsys):
     [
         (["--mass", "10", "6"], "mass: mean 10, deviation 6 kg"),
         (["--slope", "0.7"], "slope 0.7 rad is out of range"),
+        (["--period-offset", "-1.5"], "period_offset -1.5 s is out of range"),
         (["--subjects", "1"], "subjects 1"),
         (["--peak-torque", "0.9", "0.001"], "hardly a subject drawn has a gait"),
     ],

@@ -68,6 +68,8 @@ def test_existence_gives_the_range_and_the_map(capsys, tmp_path):
         (["lock", "--leg-angle", "0.9"], "leg_angle 0.9 rad is out of range"),
         (["lock", "--width", "1.2"], "width 1.2 s is out of range"),
         (["lock", "--period-offset", "-1.9"], "period_offset -1.9 s"),
+        (["lock", "--period-offset", "nan"], "period_offset nan s"),
+        (["lock", "--torque", "nan"], "torque nan N m is not a finite number"),
         (["phase-response", "--ankle-stiffness", "10"], "the walker falls"),
         (["existence", "--foot-length", "-1"], "foot_length -1.0 is not a positive"),
     ],
@@ -77,3 +79,10 @@ def test_a_users_mistake_is_one_line_and_exit_code_2(arguments, message, capsys)
     error = capsys.readouterr().err
     assert message in error
     assert error.count("\n") == 1
+
+
+def test_a_folder_that_cannot_be_written_is_named(tmp_path, capsys):
+    file = tmp_path / "file"
+    file.write_text("in the way")
+    assert main(["existence", "--points", "5", "--out", str(file / "figures")]) == 1
+    assert str(file) in capsys.readouterr().err

@@ -191,6 +191,8 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path, capsys):
     [
         (["--torque-fractions", "0.2", "0.1", "3"], "torque_fractions: 0.2 to 0.1"),
         (["--period-offsets", "-0.1", "0", "0"], "period_offsets: 0 values"),
+        (["--width", "1.2"], "width 1.2 s is out of range"),
+        (["--jobs", "-1"], "jobs: -1; allowed: at least 1"),
         (["--phases", "0"], "phases: 0; allowed: at least 1"),
         (["--ankle-stiffness", "200"], "the walker flies off"),
     ],
