@@ -127,6 +127,7 @@ def _fill(plan: Any, store: Any, options: argparse.Namespace) -> None:
         rows = rows_by_dask(plan, missing, options.scheduler)
     else:
         rows = rows_by_processes(plan, missing, options.jobs or available_cores())
+    tqdm.monitor_interval = 0  # no thread: see rows_by_processes
     walks = plan.walks // plan.torque_fractions.count
     total = plan.torque_fractions.count * walks
     with tqdm(total=total, initial=total - len(missing) * walks, unit="walk", disable=None) as bar:

@@ -22,6 +22,7 @@ import importlib
 import multiprocessing
 import os
 import signal
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from typing import Any
@@ -49,9 +50,10 @@ def rows_by_processes(plan: SweepPlan, indices: Sequence[int], jobs: int) -> Row
         for index in indices:
             yield index, sweep_row(plan, index)
         return
-    # Not forked: a copy of a process with threads, such as a progress bar's, may hang.
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["gait_entrainment.sweep.row"])
+    # A copy of this process has everything loaded and starts at once; but a copy of one with
+    # threads may hang, so that one has its workers made by a server.
+    alone = threading.active_count() == 1
+    context = multiprocessing.get_context("fork" if alone else "forkserver")
     # Ctrl-C reaches every process of the terminal; only this one answers it.
     pool = ProcessPoolExecutor(
         jobs, context, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)
