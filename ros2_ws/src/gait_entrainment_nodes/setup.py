@@ -17,7 +17,14 @@ from glob import glob
 from setuptools import find_packages, setup
 
 NAME = "gait_entrainment_nodes"
-NODES = ["walker_sim", "perturbator", "gait_analyzer", "experiment", "bag_recorder"]
+NODES = [
+    "walker_sim",
+    "perturbator",
+    "gait_analyzer",
+    "experiment",
+    "bag_recorder",
+    "bag_player",
+]
 
 setup(
     name=NAME,
@@ -37,6 +44,11 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": [f"{node} = {NAME}.{node}:main" for node in NODES],
-        "gait_entrainment.commands": [f"run = {NAME}.run_command:add_command"],
+        "gait_entrainment.commands": [
+            f"run = {NAME}.run_command:add_command",
+            f"replay = {NAME}.replay_command:add_command",
+            f"stop = {NAME}.stop_command:add_command",
+        ],
+        "gait_entrainment.node_check": [f"node = {NAME}.node_check:check_node"],
     },
 )

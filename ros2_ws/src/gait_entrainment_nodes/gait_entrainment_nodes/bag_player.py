@@ -53,6 +53,8 @@ from gait_entrainment_nodes.topics import CLOCK, Topic
 MATCHING_PERIOD = 0.02
 # So many messages at most are published before services and signals are looked after again.
 BURST_LENGTH = 200
+# At the end slow readers have so long to receive the last messages [s].
+FAREWELL = 30.0
 # What a writer keeps for late-comers where the bag does not say it.
 KEPT = 1000
 _CDR_LITTLE_ENDIAN = b"\0\1\0\0"
@@ -236,8 +238,14 @@ class BagPlayer(Participant, Node):
             player.wait_until_received(1.0)
 
     def end_if_played(self) -> None:
-        """End the node once everything was played, unless it is to stay."""
-        self.finished = self.playback.ended and not self.stay
+        """End the node once everything was played and received, unless it is to stay."""
+        if not self.playback.ended or self.stay or self.finished:
+            return
+        self.publish_counts(0, self.bag.end)
+        deadline = time.monotonic() + FAREWELL
+        for player in self.players.values():
+            player.wait_until_received(max(deadline - time.monotonic(), 0.0))
+        self.finished = True
 
     def on_stop(self) -> None:
         """Say how much was played, and how late."""

@@ -23,6 +23,7 @@ import sys
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
+from std_srvs.srv import Trigger
 
 from gait_entrainment.analysis import Entrainment, GaitAnalyzer, PulsePhase, VerdictSettings
 from gait_entrainment.analysis.analyzer import Result
@@ -59,6 +60,7 @@ class GaitAnalyzerNode(Participant, Node):
         self.subscription(GAIT_EVENTS, self.on_event)
         self.subscription(TORQUE_PROFILE, self.on_profile)
         self.subscription(WALKER_PROGRESS, self.on_progress)
+        self.create_service(Trigger, "~/finish", self.on_finish)
 
     def begin_run(self, run: int) -> None:
         """Forget the run before: every message carries the number of its run."""
@@ -67,6 +69,7 @@ class GaitAnalyzerNode(Participant, Node):
         self.events = 0
         self.promised_until = 0  # all pulses up to this instant are known [ns since 1970]
         self.final: msg.Progress | None = None
+        self.finished_run = False
         self.doubts: dict[str, int] = {}  # counts of suspicious events, as reported last
 
     def of_this_run(self, run: int) -> bool:
@@ -114,9 +117,21 @@ class GaitAnalyzerNode(Participant, Node):
         end = to_nanoseconds(final.header.stamp)
         if self.promised_until < end:
             return
+        self.finish(end)
+
+    def finish(self, end: int) -> None:
+        """Publish what was waiting: nothing more of this run will come."""
         self.final = None
+        self.finished_run = True
         self.publish(self.analyzer.finish())
         self.publish_counts(self.run_number, end)
+
+    def on_finish(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Finish a run whose end was not recorded, or of which events are missing."""
+        if not self.finished_run:
+            self.finish(self.promised_until)
+        response.success = True
+        return response
 
     def report_doubts(self, stamp: int) -> None:
         """Say on /diagnostics when events are missing, doubled, late or contradictory."""

@@ -1,0 +1,229 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""entrain replay: a bag played to the gait analyzer, its results held against those recorded."""
+
+import argparse
+import json
+import signal
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from gait_entrainment.bags import BagError, BagReader
+from gait_entrainment.report.recorded_run import RecordedRun, read_run
+from gait_entrainment.report.summary import outcome_of, summary
+from gait_entrainment_nodes.domain import DomainError, claimed_domain
+from gait_entrainment_nodes.environment import set_environment
+from gait_entrainment_nodes.supervisor import Supervisor
+
+_EXAMPLES = """examples:
+  entrain replay bags/paper_example              as fast as the analyzer takes it
+  entrain replay bags/paper_example --rate 1     at the pace of the record, to watch it in RViz
+  entrain replay bags/mine --out bags/again      records the replay, with the new results
+  ROS_DOMAIN_ID=42 entrain replay bags/mine --rate 2
+
+Exit code 1 where the results differ from those that were recorded, or the replay failed.
+"""
+# Made anew in a replay, or of the processes that were recorded.
+NOT_REPLAYED = (
+    "*/gait/strides",
+    "*/gait/pulse_phases",
+    "*/gait/entrainment",
+    "*/published_counts",
+    "*/bag_recorder/progress",
+    "/clock",
+    "/rosout",
+    "/parameter_events",
+)
+ANALYZED = ("gait_events", "perturbation/torque_profile", "walker_sim/progress")
+# After the replay has ended, the recorder has this long to close the bag [s].
+CLOSING_TIMEOUT = 15.0
+STOP_ORDER = ("bag_player", "gait_analyzer", "bag_recorder")
+
+
+def add_command(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser = commands.add_parser(
+        "replay",
+        help="a bag played to the gait analyzer over ROS 2",
+        description="Play a bag to the gait analyzer, and compare with what was recorded live.",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("bag", type=Path, metavar="BAG", help="folder or .mcap file")
+    parser.add_argument(
+        "--rate", type=float, help="seconds of the bag per second; default: as fast as it goes"
+    )
+    parser.add_argument("--out", type=Path, help="record the replay into this folder")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Replay and print; 1 where it failed or the results differ, 2 for a wrong option."""
+    wrong = ""
+    if not options.bag.exists():
+        wrong = f"{options.bag}: no such file or folder"
+    elif options.rate is not None and not 0 < options.rate < float("inf"):
+        wrong = f"--rate: {options.rate:g}; allowed: above 0; without it, as fast as it goes"
+    elif options.out is not None and options.out.exists():
+        wrong = f"--out: {options.out} is already there; a bag is never overwritten"
+    if wrong:
+        print(f"entrain replay: {wrong}", file=sys.stderr)
+        return 2
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    # Imported here, so that a mistake is answered without waiting for rclpy.
+    from gait_entrainment_nodes.replay_client import ReplayError
+
+    try:
+        recorded = read_run(options.bag, torques=False)
+        with claimed_domain() as domain:
+            results = replay(options, recorded, domain)
+        return report(options, recorded, results)
+    except KeyboardInterrupt:
+        print("entrain replay: interrupted", file=sys.stderr)
+    except (ReplayError, DomainError, BagError) as error:
+        print(f"entrain replay: {error}", file=sys.stderr)
+    return 1
+
+
+def replay(
+    options: argparse.Namespace, recorded: RecordedRun, domain: int
+) -> dict[str, list[bytes]]:
+    """Start the nodes, play the bag, stop the nodes; return the results by topic."""
+    from gait_entrainment_nodes.replay_client import ReplayClient, ReplayError
+
+    environment = set_environment(domain)
+    with BagReader(options.bag) as bag:
+        events = next(name for name in bag.topics if name.endswith("/gait_events"))
+        played = set(bag.topics)
+    namespace = events.removesuffix("/gait_events")
+    analyzed = [f"{namespace}/{name}" for name in ANALYZED]
+    expected = [name for name in analyzed if name in played]
+    recorder = options.out is not None
+    parameters = {
+        "bag_player": {
+            "bag": str(options.bag.absolute()),
+            "rate": options.rate or 0.0,
+            "start_paused": True,
+            "exclude": list(NOT_REPLAYED),
+            # The analyzer, and where the replay is recorded the recorder.
+            "expect": expected * (2 if recorder else 1),
+            "use_sim_time": False,
+        },
+        "gait_analyzer": {"side": recorded.protocol.side.name.lower(), "use_sim_time": True},
+    }
+    if recorder:
+        with BagReader(options.bag) as bag:
+            custom_data = bag.custom_data | {"replay_of": options.bag.name}
+        parameters["bag_recorder"] = {
+            "output": str(options.out.absolute()),
+            "publishers": ["gait_analyzer", "bag_player"],
+            "custom_data": json.dumps(custom_data),
+            "use_sim_time": True,
+        }
+    with tempfile.TemporaryDirectory(prefix="entrain_") as folder:
+        parameter_file = Path(folder) / "parameters.yaml"
+        parameter_file.write_text(
+            yaml.safe_dump({f"/**/{n}": {"ros__parameters": p} for n, p in parameters.items()})
+        )
+        supervisor = Supervisor(Path(folder), environment)
+        client: ReplayClient | None = None
+        try:
+            for node in parameters:
+                arguments = ["--ros-args", "--params-file", str(parameter_file)]
+                if namespace and node != "bag_player":
+                    arguments += ["-r", f"__ns:={namespace}"]
+                supervisor.start(node, arguments)
+            client = ReplayClient(supervisor, namespace, listeners=2 if recorder else 1)
+            client.play(quiet=options.json)
+            if recorder and supervisor.wait("bag_recorder", CLOSING_TIMEOUT) != 0:
+                raise ReplayError(
+                    "bag_recorder did not complete the record\n"
+                    + supervisor.last_lines("bag_recorder")
+                )
+            return client.results
+        finally:
+            if client is not None:
+                client.close()
+            supervisor.stop(STOP_ORDER)
+
+
+def report(
+    options: argparse.Namespace, recorded: RecordedRun, results: dict[str, list[bytes]]
+) -> int:
+    """Print what came of the replay, and how it compares with the record."""
+    differing, compared = differences(options.bag, results)
+    names = ("strides", "pulse phases", "verdicts")
+    counts = dict(zip(names, (len(messages) for messages in results.values()), strict=True))
+    outcome = outcome_of(
+        recorded.protocol,
+        recorded.analysis,
+        recorded.events,
+        recorded.measured_period,
+        recorded.pulse_period,
+    )
+    outcome |= {
+        "bag": str(options.bag),
+        "replayed": counts,
+        "as_published_live": not differing if compared else None,
+        "differences": differing,
+    }
+    if options.json:
+        print(json.dumps(outcome))
+        return 1 if differing else 0
+    live = "the same, byte for byte" if compared else "nothing was recorded"
+    print(summary(outcome))
+    print(f"replayed         {', '.join(f'{count} {name}' for name, count in counts.items())}")
+    print(f"recorded live    {'differs: ' + '; '.join(differing) if differing else live}")
+    if options.out is not None:
+        print(f"bag              {options.out}")
+    return 1 if differing else 0
+
+
+def differences(path: Path, results: dict[str, list[bytes]]) -> tuple[list[str], bool]:
+    """
+    Compare results with those in a bag, byte for byte.
+
+    Returns
+    -------
+    differing
+        A line for each topic that differs.
+    compared
+        Whether there was anything to compare with.
+
+    """
+    differing = []
+    compared = False
+    with BagReader(path) as bag:
+        for topic, messages in results.items():
+            name = next((name for name in bag.topics if name.endswith(f"/{topic}")), None)
+            if name is None:
+                continue
+            compared = True
+            found = sorted(bag.messages([name]), key=lambda message: message.place)
+            for number, (live, again) in enumerate(zip(found, messages, strict=False), start=1):
+                if live.data != again:
+                    differing.append(f"{topic}: message {number} is another")
+                    break
+            else:
+                if len(found) != len(messages):
+                    differing.append(
+                        f"{topic}: {len(found)} messages recorded, {len(messages)} replayed"
+                    )
+    return differing, compared
