@@ -14,15 +14,17 @@
 
 """A ROS domain for each run, so that concurrent runs do not hear each other."""
 
-import fcntl
 import os
-import tempfile
+import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 # Domains whose ports lie below those that Linux gives to other connections.
 DOMAINS = range(1, 102)
+# The largest domain that DDS can give ports to.
+LARGEST_DOMAIN = 232
+# Under which name claims are made.
+CLAIMS = "gait_entrainment/domain"
 
 
 class DomainError(RuntimeError):
@@ -34,7 +36,9 @@ def claimed_domain() -> Iterator[int]:
     """
     Claim a ROS domain for the time of a run: ROS_DOMAIN_ID where it is set, else a free one.
 
-    Claims are file locks: they end with the process, however it ends.
+    A claim is the name of an abstract Unix socket. Such names belong to the network namespace,
+    and so do the ports by which runs would hear each other: it holds between users and between
+    containers that share a network, and ends with the process, however that ends.
 
     Raises
     ------
@@ -43,21 +47,16 @@ def claimed_domain() -> Iterator[int]:
 
     """
     wanted = os.environ.get("ROS_DOMAIN_ID")
-    if wanted is not None and not (wanted.isdigit() and int(wanted) <= 232):
-        raise DomainError(f"ROS_DOMAIN_ID: {wanted!r}; allowed: 0 to 232, or unset for a free one")
-    candidates = DOMAINS if wanted is None else [int(wanted)]
-    for domain in candidates:
-        file = _claim_file(domain)
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            os.close(file)
-            continue
-        try:
-            yield domain
-        finally:
-            os.close(file)
-        return
+    if wanted is not None and not (wanted.isdigit() and int(wanted) <= LARGEST_DOMAIN):
+        raise DomainError(
+            f"ROS_DOMAIN_ID: {wanted!r}; allowed: 0 to {LARGEST_DOMAIN}, or unset for a free one"
+        )
+    for domain in DOMAINS if wanted is None else [int(wanted)]:
+        claim = _claim(domain)
+        if claim is not None:
+            with claim:
+                yield domain
+            return
     if wanted is None:
         raise DomainError(f"every ROS domain from {DOMAINS[0]} to {DOMAINS[-1]} is in use")
     raise DomainError(
@@ -65,22 +64,24 @@ def claimed_domain() -> Iterator[int]:
     )
 
 
-def _claim_file(domain: int) -> int:
-    """
-    Open the file whose lock is the claim on a domain.
+def domains_in_use() -> list[int]:
+    """Return the domains in which runs of this machine go on."""
+    claimed = []
+    for domain in range(LARGEST_DOMAIN + 1):
+        claim = _claim(domain)
+        if claim is None:
+            claimed.append(domain)
+        else:
+            claim.close()
+    return claimed
 
-    Another user's claims are honoured too: everyone may make such files, and reading suffices to
-    lock one.
-    """
-    folder = Path(tempfile.gettempdir()) / "gait_entrainment_domains"
+
+def _claim(domain: int) -> socket.socket | None:
+    """Return the socket whose name is the claim on a domain, None where another holds it."""
+    claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     try:
-        folder.mkdir()
-        folder.chmod(0o1777)
-    except FileExistsError:
-        pass
-    try:
-        return os.open(folder / str(domain), os.O_RDONLY)
-    except FileNotFoundError:
-        return os.open(folder / str(domain), os.O_RDONLY | os.O_CREAT, 0o644)
-    except OSError as error:
-        raise DomainError(f"{folder / str(domain)}: {error.strerror}; remove it") from None
+        claim.bind(f"\0{CLAIMS}/{domain}")
+    except OSError:
+        claim.close()
+        return None
+    return claim

@@ -14,22 +14,19 @@
 
 """Claims on ROS domains: exclusive among all processes, and gone with their holder."""
 
-import stat
 import subprocess
 import sys
-import tempfile
 
 import pytest
 
 from gait_entrainment_nodes import domain as module
-from gait_entrainment_nodes.domain import DOMAINS, DomainError, claimed_domain
+from gait_entrainment_nodes.domain import DOMAINS, DomainError, claimed_domain, domains_in_use
 
 
 @pytest.fixture(autouse=True)
 def own_claims(tmp_path, monkeypatch):
     """Keep claims apart from those of runs that go on beside the tests."""
-    monkeypatch.setenv("TMPDIR", str(tmp_path))
-    monkeypatch.setattr(tempfile, "tempdir", None)
+    monkeypatch.setattr(module, "CLAIMS", f"gait_entrainment/test{tmp_path}")
     monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
 
 
@@ -66,9 +63,10 @@ def test_every_domain_taken_is_said(monkeypatch):
 
 def test_claim_ends_with_a_killed_process():
     program = (
-        "from gait_entrainment_nodes.domain import claimed_domain as c\n"
-        "import sys, time\n"
-        "with c() as d: print(d, flush=True); time.sleep(60)\n"
+        "import time\n"
+        "from gait_entrainment_nodes import domain as module\n"
+        f"module.CLAIMS = {module.CLAIMS!r}\n"
+        "with module.claimed_domain() as d: print(d, flush=True); time.sleep(60)\n"
     )
     with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE) as holder:
         first = int(holder.stdout.readline())
@@ -79,9 +77,11 @@ def test_claim_ends_with_a_killed_process():
         assert free == first
 
 
-def test_other_users_can_claim_too(tmp_path):
+def test_domains_in_use_are_those_that_are_claimed(monkeypatch):
+    assert domains_in_use() == []
+    monkeypatch.setenv("ROS_DOMAIN_ID", "200")
     with claimed_domain():
-        folder = tmp_path / "gait_entrainment_domains"
-        assert stat.S_IMODE(folder.stat().st_mode) == 0o1777
-        (claim,) = folder.iterdir()
-        assert stat.S_IMODE(claim.stat().st_mode) & 0o444 == 0o444
+        monkeypatch.delenv("ROS_DOMAIN_ID")
+        with claimed_domain() as other:
+            assert domains_in_use() == [other, 200]
+    assert domains_in_use() == []
