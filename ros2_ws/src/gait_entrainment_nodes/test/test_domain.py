@@ -14,34 +14,42 @@
 
 """Claims on ROS domains: exclusive among all processes, and gone with their holder."""
 
+import os
 import subprocess
 import sys
 
 import pytest
 
 from gait_entrainment_nodes import domain as module
-from gait_entrainment_nodes.domain import DOMAINS, DomainError, claimed_domain, domains_in_use
+from gait_entrainment_nodes.domain import DomainError, claimed_domain
 
 
 @pytest.fixture(autouse=True)
-def own_claims(tmp_path, monkeypatch):
-    """Keep claims apart from those of runs that go on beside the tests."""
-    monkeypatch.setattr(module, "CLAIMS", f"gait_entrainment/test{tmp_path}")
+def own_domains(monkeypatch):
+    """Keep to domains that runs beside the tests do not claim by themselves."""
+    monkeypatch.setattr(module, "DOMAINS", range(210, 212))
     monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
 
 
 def test_claims_differ_and_end():
     with claimed_domain() as one, claimed_domain() as other:
-        assert {one, other} == {DOMAINS[0], DOMAINS[1]}
+        assert (one, other) == (210, 211)
     with claimed_domain() as again:
-        assert again == one
+        assert again == 210
+
+
+def test_claim_ends_where_its_holder_fails():
+    with pytest.raises(RuntimeError), claimed_domain():
+        raise RuntimeError
+    with claimed_domain() as free:
+        assert free == 210
 
 
 def test_chosen_domain_is_claimed_once(monkeypatch):
-    monkeypatch.setenv("ROS_DOMAIN_ID", "42")
+    monkeypatch.setenv("ROS_DOMAIN_ID", "212")
     with claimed_domain() as domain:
-        assert domain == 42
-        with pytest.raises(DomainError, match="ROS_DOMAIN_ID: 42 is in use"), claimed_domain():
+        assert domain == 212
+        with pytest.raises(DomainError, match="ROS_DOMAIN_ID: 212 is in use"), claimed_domain():
             pass
     with claimed_domain():
         pass
@@ -54,34 +62,25 @@ def test_what_is_no_domain_is_refused(wanted, monkeypatch):
         pass
 
 
-def test_every_domain_taken_is_said(monkeypatch):
-    monkeypatch.setattr(module, "DOMAINS", range(1, 3))
-    taken = pytest.raises(DomainError, match="every ROS domain from 1 to 2 is in use")
+def test_every_domain_taken_is_said():
+    taken = pytest.raises(DomainError, match="every ROS domain from 210 to 211 is in use")
     with claimed_domain(), claimed_domain(), taken, claimed_domain():
         pass
 
 
-def test_claim_ends_with_a_killed_process():
+def test_claim_ends_with_a_killed_process(monkeypatch):
     program = (
+        "from gait_entrainment_nodes.domain import claimed_domain\n"
         "import time\n"
-        "from gait_entrainment_nodes import domain as module\n"
-        f"module.CLAIMS = {module.CLAIMS!r}\n"
-        "with module.claimed_domain() as d: print(d, flush=True); time.sleep(60)\n"
+        "with claimed_domain() as domain: print(domain, flush=True); time.sleep(60)\n"
     )
-    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE) as holder:
-        first = int(holder.stdout.readline())
-        with claimed_domain() as other:
-            assert other != first
+    monkeypatch.setenv("ROS_DOMAIN_ID", "213")
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, env=dict(os.environ)
+    ) as holder:
+        assert holder.stdout.readline() == b"213\n"
+        with pytest.raises(DomainError, match="213 is in use"), claimed_domain():
+            pass
         holder.kill()
     with claimed_domain() as free:
-        assert free == first
-
-
-def test_domains_in_use_are_those_that_are_claimed(monkeypatch):
-    assert domains_in_use() == []
-    monkeypatch.setenv("ROS_DOMAIN_ID", "200")
-    with claimed_domain():
-        monkeypatch.delenv("ROS_DOMAIN_ID")
-        with claimed_domain() as other:
-            assert domains_in_use() == [other, 200]
-    assert domains_in_use() == []
+        assert free == 213
