@@ -47,6 +47,8 @@ setup(
         "gait_entrainment.commands": [
             f"run = {NAME}.run_command:add_command",
             f"replay = {NAME}.replay_command:add_command",
+            f"stop = {NAME}.stop_command:add_command",
         ],
+        "gait_entrainment.node_check": [f"node = {NAME}.node_check:check_node"],
     },
 )

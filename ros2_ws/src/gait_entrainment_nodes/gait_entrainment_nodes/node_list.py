@@ -16,6 +16,7 @@
 
 from typing import Any
 
+from gait_entrainment.device import find_driver
 from gait_entrainment.protocol import Protocol
 
 # In the order in which they are started. Executable and node have the same name.
@@ -26,10 +27,19 @@ STOP_ORDER = ("perturbator", "experiment", "walker_sim", "gait_analyzer", "bag_r
 PUBLISHERS = ("walker_sim", "perturbator", "gait_analyzer", "experiment")
 # In real time promises are short, so that more can be decided late, but longer than a hiccup.
 REAL_TIME_LOOKAHEAD = 0.3
+# A real robot's torque is known only once it has been measured and promised: so much later than
+# the wall clock [s] the walker shows what it felt.
+MEASURED_DELAY = 0.1
 
 
 def parameters(
-    protocol: Protocol, bag: str, custom_data: str, *, real_time: bool, sampling: dict[str, Any]
+    protocol: Protocol,
+    bag: str,
+    custom_data: str,
+    *,
+    real_time: bool,
+    sampling: dict[str, Any],
+    armed: bool = False,
 ) -> dict[str, dict[str, Any]]:
     """
     Return the parameters of every node for one run, by node name.
@@ -46,6 +56,8 @@ def parameters(
         Real time instead of lock-step.
     sampling
         Parameters of walker_sim that say what it samples and how often.
+    armed
+        Whether a real robot may deliver torque without another word.
 
     """
     side = protocol.side.name.lower()
@@ -53,6 +65,7 @@ def parameters(
     experiment: dict[str, Any] = {"participants": [node for node in NODES if node != "experiment"]}
     if real_time:
         experiment["longest_lookahead"] = REAL_TIME_LOOKAHEAD
+    measured = real_time and not find_driver(protocol.driver).simulated
     return {
         "walker_sim": {
             **walker,
@@ -60,8 +73,14 @@ def parameters(
             "first_heel_strike": side,
             "real_time": real_time,
             "acknowledged": not real_time,
+            "presentation_delay": MEASURED_DELAY if measured else 0.0,
         },
-        "perturbator": {"side": side, "driver": protocol.driver},
+        "perturbator": {
+            "side": side,
+            "driver": protocol.driver,
+            "seed": protocol.seed,
+            "armed": armed,
+        },
         "gait_analyzer": {"side": side},
         "experiment": experiment,
         "bag_recorder": {

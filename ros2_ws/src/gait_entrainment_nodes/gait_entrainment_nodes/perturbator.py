@@ -21,9 +21,14 @@ the latched stop service and with the process, whatever ends that.
 
 A horizon that is known to its end closes the run: it is answered with a profile without length,
 after which there is no torque that could be stopped.
+
+A robot in simulated time answers a horizon at once and in full. A real one knows its torque only
+afterwards, in real time: what it has measured is promised every few milliseconds, up to the
+horizon.
 """
 
 import sys
+import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -35,18 +40,25 @@ from std_srvs.srv import Trigger
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.device import (
+    DeviceError,
     DeviceLimits,
-    IdealAnkleRobot,
+    Fault,
+    GuardedRobot,
     LimitError,
     PulseTrain,
+    RobotState,
     find_driver,
 )
 from gait_entrainment.device import TorqueProfile as CoreProfile
+from gait_entrainment.device.faults import STOPPED
 from gait_entrainment_msgs.action import DeliverPulseTrain
 from gait_entrainment_msgs.msg import AnkleRobotState, Horizon, TorqueProfile, TorquePulse
 from gait_entrainment_nodes.node import Participant, declare, declare_fields, run_node
 from gait_entrainment_nodes.stamps import header, to_nanoseconds, to_time
 from gait_entrainment_nodes.topics import HORIZON, PULSES, ROBOT_STATE, TORQUE_PROFILE
+
+# How often what a real robot has measured is promised [s].
+MEASURED_PERIOD = 0.01
 
 
 class Perturbator(Participant, LifecycleNode):
@@ -58,7 +70,16 @@ class Perturbator(Participant, LifecycleNode):
         if side not in ("left", "right"):
             raise ValueError(f"side: {side!r}; allowed: left, right")
         self.side = Side[side.upper()]
-        self.driver = declare(self, "driver", "ideal", "ankle robot driver")
+        self.driver = declare(
+            self, "driver", "ideal", "ankle robot driver: NAME or NAME:OPTION=VALUE,..."
+        )
+        self.seed = declare(self, "seed", 0, "seed of a driver that draws random numbers")
+        self.armed = declare(
+            self,
+            "armed",
+            False,
+            "arm a real robot on activation; else a person does it by the service ~/arm",
+        )
         self.limits = declare_fields(self, DeviceLimits, "limits")
         self.begin_participation()
 
@@ -66,17 +87,22 @@ class Perturbator(Participant, LifecycleNode):
         self.pulses = self.publisher(PULSES)
         self.states = self.publisher(ROBOT_STATE)
 
-        self.robot: IdealAnkleRobot | None = None  # of the run that goes on
-        self.active = False
-        self.stopped = False  # latched by the stop service until cleanup and configure
+        self.robot: GuardedRobot | None = None  # from configuring to cleaning up
+        self.open = False  # a run goes on whose closing horizon has not come
+        self.committed = False  # torque may still come, of a train that was accepted
+        self.reported: tuple[Fault, ...] = ()  # faults that /diagnostics has been told of
         self.run_number = 0
         self.revision = 0
         self.now = 0  # latest instant that is known to be over [ns since 1970]
+        self.horizon = 0  # up to which a real robot owes its torque [ns since 1970]
+        self.last = False  # the run ends there
+        self.look_at: float | None = None  # when to look after a real robot, steady time [s]
         self._goal: Any = None
         self._goal_ended: Future | None = None  # its result: (outcome, message, delivered)
 
         self.subscription(HORIZON, self.on_horizon)
         self.create_service(Trigger, "~/stop", self.on_stop_service)
+        self.create_service(Trigger, "~/arm", self.on_arm_service)
         self._server = ActionServer(
             self,
             DeliverPulseTrain,
@@ -102,66 +128,130 @@ class Perturbator(Participant, LifecycleNode):
             return response
 
     def on_configure(self, _: LifecycleState) -> TransitionCallbackReturn:
-        """Load the driver; releases a latched stop."""
+        """Connect to the robot; no torque is possible yet. Releases a latched stop."""
         try:
-            self.make_robot = find_driver(self.driver)
-        except LimitError as error:
-            self.get_logger().error(str(error))
-            return TransitionCallbackReturn.FAILURE
-        self.stopped = False
+            driver = find_driver(self.driver)
+            if self.get_parameter("use_sim_time").value and not driver.simulated:
+                raise DeviceError(f"driver: {driver.name} runs in real time only")
+            robot = driver.make(self.side, self.limits, self.seed)
+            robot.configure()
+        except (LimitError, DeviceError) as error:
+            return self.refuse(error)
+        self.robot, self.reported = robot, ()
         return TransitionCallbackReturn.SUCCESS
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Allow torque; refused while a stop is latched."""
-        if self.stopped:
-            self.get_logger().error("a stop is latched: clean up and configure first")
-            return TransitionCallbackReturn.FAILURE
-        self.active = True
+        """Enable the robot at zero torque; refused while a stop is latched."""
+        assert self.robot is not None
+        try:
+            self.robot.activate()
+            if self.armed:
+                self.robot.arm()
+        except DeviceError as error:
+            return self.refuse(error)
+        if not self.robot.capabilities.simulated:
+            self.look_at = time.monotonic()
         return super().on_activate(state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Bring the torque to zero, then forbid it."""
+        """Bring the torque to zero, then disable the robot."""
         self.end_torque(DeliverPulseTrain.Result.STOPPED, "the perturbator was deactivated")
-        self.active = False
+        if self.robot is not None:
+            self.robot.deactivate()
         return super().on_deactivate(state)
 
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Release the robot."""
+        self.release()
+        return super().on_cleanup(state)
+
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Bring the torque to zero."""
-        return self.on_deactivate(state)
+        """Bring the torque to zero and release the robot."""
+        result = self.on_deactivate(state)
+        self.release()
+        return result
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Bring the torque to zero."""
-        return self.on_deactivate(state)
+        """Bring the torque to zero and release the robot."""
+        return self.on_shutdown(state)
 
     def on_stop(self) -> None:
-        """End of the process: bring the torque to zero."""
-        self.end_torque(DeliverPulseTrain.Result.STOPPED, "the perturbator was shut down")
+        """End of the process: bring the torque to zero and release the robot."""
+        try:
+            self.end_torque(DeliverPulseTrain.Result.STOPPED, "the perturbator was shut down")
+        finally:
+            self.release()
+
+    def release(self) -> None:
+        """Bring the torque to zero and let go of the robot."""
+        robot, self.robot = self.robot, None
+        self.open = self.committed = False
+        self.look_at = None
+        if robot is not None:
+            robot.close()
+
+    def refuse(self, error: Exception) -> TransitionCallbackReturn:
+        """Say why a transition is refused."""
+        self.get_logger().error(str(error))
+        self.diagnose(self.now, DiagnosticStatus.ERROR, str(error))
+        return TransitionCallbackReturn.FAILURE
+
+    def on_arm_service(self, _: Trigger.Request, response: Trigger.Response) -> Any:
+        """Allow a real robot torque: a person has seen that all is well."""
+        try:
+            if self.robot is None:
+                raise DeviceError("the perturbator is not active")
+            self.robot.arm()
+        except DeviceError as error:
+            response.message = str(error)
+        else:
+            response.success, response.message = True, "armed: torque is possible from now on"
+            self.diagnose(self.now, DiagnosticStatus.OK, "armed")
+        return response
 
     def on_stop_service(self, _: Trigger.Request, response: Trigger.Response) -> Any:
         """Bring the torque to zero and keep it there until cleanup and configure."""
-        self.stopped = True
-        self.end_torque(DeliverPulseTrain.Result.STOPPED, "the stop service was called")
-        self.diagnose(self.now, DiagnosticStatus.ERROR, "stopped by service; latched")
+        if self.robot is not None:
+            self.robot.stop()
+            self.report_faults("the stop service was called")
         response.success, response.message = True, "torque is zero, latched"
         return response
 
     def end_torque(self, outcome: int, reason: str) -> None:
         """Bring the torque to zero now, whatever was promised."""
+        robot = self.robot
+        if robot is not None:
+            robot.cancel()  # the robot first, whatever becomes of the messages
         self.end_goal(outcome, reason)
-        if self.robot is not None and self.robot.committed:
-            self.robot.cancel()
-            self.profiles.publish(
-                TorqueProfile(
-                    header=header(self.now),
-                    run=self.run_number,
-                    side=self.side,
-                    stop=True,
-                    revision=self.revision,
-                    valid_until=to_time(self.robot.promised_until),
-                )
+        if robot is None or not self.committed:
+            return
+        self.committed = False
+        self.profiles.publish(
+            TorqueProfile(
+                header=header(self.now),
+                run=self.run_number,
+                side=self.side,
+                stop=True,
+                revision=self.revision,
+                valid_until=to_time(robot.promised_until),
             )
-            self.revision += 1
-            self.publish_state(self.now, 0.0)
+        )
+        self.revision += 1
+        self.publish_state(RobotState(self.now, 0.0, 0.0, float("nan")))
+
+    def report_faults(self, reason: str = "") -> None:
+        """Tell of faults that are new; each has ended the torque, and ends the goal."""
+        robot = self.robot
+        if robot is None or robot.faults == self.reported:
+            return
+        new = [fault for fault in robot.faults if fault not in self.reported]
+        self.reported = robot.faults
+        for fault in new:
+            self.diagnose(
+                self.now, DiagnosticStatus.ERROR, f"latched: {fault.name}: {fault.meaning}"
+            )
+        reason = reason or "; ".join(f"{fault.name}: {fault.meaning}" for fault in new)
+        self.end_torque(DeliverPulseTrain.Result.STOPPED, reason)
 
     # The action
 
@@ -181,13 +271,11 @@ class Perturbator(Participant, LifecycleNode):
 
     def schedule(self, goal: DeliverPulseTrain.Goal) -> str:
         """Schedule a train; return why it cannot be, or an empty text."""
-        if not self.active:
+        if self.robot is None:
             return "the perturbator is not active"
-        if self.stopped:
-            return "a stop is latched: clean up and configure first"
         if self._goal_ended is not None:
             return "a pulse train is under way; allowed: one at a time"
-        if self.robot is None or goal.run != self.run_number:
+        if not self.open or goal.run != self.run_number:
             return f"run: {goal.run} is not under way"
         try:
             self.robot.schedule(
@@ -200,8 +288,9 @@ class Perturbator(Participant, LifecycleNode):
                     duration=goal.duration,
                 )
             )
-        except LimitError as error:
+        except (LimitError, DeviceError) as error:
             return str(error)
+        self.committed = True
         return ""
 
     async def execute(self, goal: Any) -> DeliverPulseTrain.Result:
@@ -233,31 +322,75 @@ class Perturbator(Participant, LifecycleNode):
 
     def on_horizon(self, message: Horizon) -> None:
         """Answer a horizon with the torque up to it, promised."""
+        robot = self.robot
         new = message.run != self.run_number
-        if not (self.active if new else self.robot is not None):
+        if robot is None or not (robot.enabled if new else self.open):
             return
         self.now = to_nanoseconds(message.header.stamp)
+        self.horizon, self.last = to_nanoseconds(message.until), message.last
         if new:
-            self.robot = self.make_robot(self.side, self.now, self.limits)
-            self.run_number, self.revision = message.run, 0
-        assert self.robot is not None
-        until = to_nanoseconds(message.until)
-        if self.now >= until:
+            robot.begin(self.now)
+            self.run_number, self.revision, self.open = message.run, 0, True
+            self.committed = False
+        robot.heard()
+        if self.now >= self.horizon:
             self.end_goal(DeliverPulseTrain.Result.ENDED, "the run ended before the last pulse")
-            self.publish_profile(CoreProfile(self.side, (until,), (0.0,), (), until), message.last)
-            self.robot = None
-            self.publish_counts(self.run_number, until)
+            end = self.horizon
+            self.publish_profile(CoreProfile(self.side, (end,), (0.0,), (), end), self.last)
+            self.publish_state(RobotState(end, 0.0, 0.0, float("nan")))
+            robot.cancel()
+            self.open = self.committed = False
+            self.publish_counts(self.run_number, end)
+        else:
+            self.deliver(robot)
+
+    def deliver(self, robot: GuardedRobot) -> None:
+        """Promise what is known of the torque up to the horizon."""
+        first = robot.delivered + 1
+        train = robot.train
+        try:
+            profile = robot.promise(self.horizon)
+            states = robot.read()
+        except DeviceError as error:
+            self.report_faults()
+            self.failure = str(error)
             return
-        first = self.robot.delivered + 1
-        profile = self.robot.promise(until)
-        self.publish_profile(profile, message.last)
+        if profile.valid_until > profile.times[0]:
+            self.publish_profile(profile, self.last and profile.valid_until == self.horizon)
         for number, onset in enumerate(profile.onsets, first):
-            self.announce_pulse(number, onset)
-        if not self.robot.busy:
+            assert train is not None
+            self.announce_pulse(number, onset, train)
+        for state in states:
+            self.publish_state(state)
+        self.report_faults()
+        if not robot.busy:
             self.end_goal(DeliverPulseTrain.Result.DELIVERED, "every pulse was delivered")
 
+    def next_deadline(self) -> float | None:
+        """Return when a real robot is to be looked after."""
+        return self.look_at
+
+    def on_deadline(self) -> None:
+        """Promise what a real robot has measured, and note its faults."""
+        robot = self.robot
+        if robot is None:
+            return
+        self.look_at = time.monotonic() + MEASURED_PERIOD
+        if self.open and robot.promised_until < self.horizon:
+            self.deliver(robot)
+        else:
+            self.look_after(robot)
+
+    def look_after(self, robot: GuardedRobot) -> None:
+        """Note the faults of a robot of which no torque is asked for."""
+        try:
+            robot.read()
+        except DeviceError as error:
+            self.failure = str(error)
+        self.report_faults()
+
     def publish_profile(self, profile: CoreProfile, last: bool) -> None:
-        """Publish a promise, and the robot's state at every change of torque in it."""
+        """Publish a promise."""
         self.profiles.publish(
             TorqueProfile(
                 header=header(profile.times[0]),
@@ -272,13 +405,9 @@ class Perturbator(Participant, LifecycleNode):
             )
         )
         self.revision += 1
-        for instant, torque in zip(profile.times, profile.torques, strict=True):
-            self.publish_state(instant, torque)
 
-    def announce_pulse(self, number: int, onset: int) -> None:
+    def announce_pulse(self, number: int, onset: int, train: PulseTrain) -> None:
         """Tell people, tools and the client of one pulse."""
-        train = self.robot.train if self.robot is not None else None
-        assert train is not None
         self.pulses.publish(
             TorquePulse(
                 header=header(onset),
@@ -294,18 +423,25 @@ class Perturbator(Participant, LifecycleNode):
                 DeliverPulseTrain.Feedback(number=number, onset=to_time(onset))
             )
 
-    def publish_state(self, instant: int, torque: float) -> None:
-        """Publish the robot's state; the ideal robot changes only where its torque does."""
-        status = AnkleRobotState.ACTIVE if self.active else AnkleRobotState.INACTIVE
+    def publish_state(self, state: RobotState) -> None:
+        """Publish the robot's state at one instant."""
+        robot = self.robot
+        assert robot is not None
+        status = AnkleRobotState.ACTIVE if robot.enabled else AnkleRobotState.INACTIVE
+        if robot.faults:
+            status = AnkleRobotState.FAULT
+        if STOPPED in robot.faults:
+            status = AnkleRobotState.STOPPED
         self.states.publish(
             AnkleRobotState(
-                header=header(instant),
+                header=header(state.stamp),
                 run=self.run_number,
                 side=self.side,
-                status=AnkleRobotState.STOPPED if self.stopped else status,
-                commanded_torque=torque,
-                measured_torque=torque,
-                angle=float("nan"),
+                status=status,
+                commanded_torque=state.commanded,
+                measured_torque=state.measured,
+                angle=state.angle,
+                faults=[fault.name for fault in (state.faults or robot.faults)],
             )
         )
 

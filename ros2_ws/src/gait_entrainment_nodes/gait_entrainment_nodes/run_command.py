@@ -32,7 +32,7 @@ from ament_index_python.packages import get_package_share_directory
 
 from gait_entrainment.bags import BagError, BagReader, UnreadableBagError, recover
 from gait_entrainment.commands.protocol_options import add_protocol_options, chosen_protocol
-from gait_entrainment.device import DeviceLimits, LimitError, find_driver
+from gait_entrainment.device import DeviceError, DeviceLimits, LimitError, find_driver
 from gait_entrainment.protocol import Protocol, ProtocolError, write_protocol
 from gait_entrainment_nodes.domain import DomainError, claimed_domain
 from gait_entrainment_nodes.node_list import NODES, STOP_ORDER, parameters
@@ -65,6 +65,9 @@ def add_command(commands: Any) -> None:
     parser.add_argument(
         "--real-time", action="store_true", help="at the pace of the wall clock, not in lock-step"
     )
+    parser.add_argument(
+        "--arm", action="store_true", help="let a real ankle robot deliver torque (docs/safety.md)"
+    )
     parser.add_argument("--out", type=Path, help="folder of the bag; default bags/<time>_<name>")
     parser.add_argument(
         "--sample-rate",
@@ -84,15 +87,15 @@ def run(options: argparse.Namespace) -> int:
     """Run one experiment; 1 where it failed, 2 for a protocol or an option that is wrong."""
     try:
         protocol = chosen_protocol(options)
-        find_driver(protocol.driver)
+        check_driver(protocol.driver, options)
         DeviceLimits().check_pulse(protocol.pulse_torque, protocol.pulses.width)
         if not 0 <= options.sample_rate <= 1000:
             raise ProtocolError(f"--sample-rate: {options.sample_rate:g}; allowed: 0 to 1000 Hz")
         bag = options.out or Path("bags") / f"{datetime.now():%Y%m%d-%H%M%S}_{protocol.name}"
         check_output(bag)
-    except (ProtocolError, LimitError) as error:
+    except (ProtocolError, LimitError, DeviceError) as error:
         print(f"entrain run: {error}", file=sys.stderr)
-        return 2
+        return 1 if isinstance(error, DeviceError) else 2
     # Stopping from outside takes the same path as Ctrl-C: torque first, then the rest.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
@@ -104,6 +107,30 @@ def run(options: argparse.Namespace) -> int:
     except (RunError, DomainError, BagError) as error:
         print(f"entrain run: {error}", file=sys.stderr)
     return 1
+
+
+def check_driver(text: str, options: argparse.Namespace) -> None:
+    """
+    Hold a driver against the mode of the run, before anything is started for it.
+
+    Raises
+    ------
+    LimitError
+        where there is no such driver, or it is a real one and the run is in lock-step, or nobody
+        has armed it.
+    DeviceError
+        where it cannot be loaded.
+
+    """
+    driver = find_driver(text)
+    if driver.simulated:
+        return
+    if not options.real_time:
+        raise LimitError(f"driver: {driver.name} runs in real time only; add --real-time")
+    if not options.arm:
+        raise LimitError(
+            f"driver: {driver.name} applies real torque: see that all is well, then add --arm"
+        )
 
 
 def check_output(bag: Path) -> None:
@@ -168,6 +195,7 @@ def conduct(protocol: Protocol, bag: Path, domain: int, options: argparse.Namesp
         json.dumps(provenance(protocol, text, options.real_time)),
         real_time=options.real_time,
         sampling=sampling,
+        armed=options.arm,
     )
     with tempfile.TemporaryDirectory(prefix="entrain_") as folder:
         parameter_file = Path(folder) / "parameters.yaml"
@@ -227,6 +255,11 @@ def publish_lateness(bag: Path) -> dict[str, float]:
 
 def report(bag: Path, options: argparse.Namespace) -> int:
     """Print the outcome from the bag and draw its figures."""
+    from gait_entrainment.report.pulse_timing import (
+        recorded_timings,
+        timing_outcome,
+        timing_summary,
+    )
     from gait_entrainment.report.recorded_run import read_run
     from gait_entrainment.report.summary import outcome_of, summary
 
@@ -244,6 +277,7 @@ def report(bag: Path, options: argparse.Namespace) -> int:
         "messages": recorded.messages,
         "lost": recorded.lost,
         "real_time_factor": None if math.isnan(factor) else factor,
+        "pulse_timing": timing_outcome(recorded_timings(bag), recorded.measured_period),
     }
     lateness = publish_lateness(bag)
     if lateness:
@@ -256,7 +290,8 @@ def report(bag: Path, options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps(outcome))
         return 0
-    print(summary(outcome))
+    for line in (summary(outcome), *timing_summary(outcome["pulse_timing"])):
+        print(line)
     if not math.isnan(factor):
         print(f"speed            {factor:.0f} times real time")
     if lateness:

@@ -47,6 +47,11 @@ def run(options: argparse.Namespace) -> int:
     """Analyze and print; 1 where the bag cannot be analyzed, 2 where there is none."""
     # Imported here: other commands do without the readers.
     from gait_entrainment.bags import BagError
+    from gait_entrainment.report.pulse_timing import (
+        recorded_timings,
+        timing_outcome,
+        timing_summary,
+    )
     from gait_entrainment.report.recorded_run import read_run
     from gait_entrainment.report.summary import outcome_of, summary
 
@@ -56,6 +61,7 @@ def run(options: argparse.Namespace) -> int:
     figures: list[Path] = []
     try:
         recorded = read_run(options.bag, torques=options.figures is not None)
+        timing = timing_outcome(recorded_timings(options.bag), recorded.measured_period)
         if options.figures is not None:
             from gait_entrainment.report.figures import draw_figures
 
@@ -75,6 +81,7 @@ def run(options: argparse.Namespace) -> int:
         "bag": str(options.bag),
         "messages": recorded.messages,
         "lost": recorded.lost,
+        "pulse_timing": timing,
         "real_time_factor": None if math.isnan(factor) else factor,
         "as_published_live": (None if recorded.differences is None else not recorded.differences),
         "differences": list(recorded.differences or ()),
@@ -82,7 +89,8 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps(outcome))
         return 0
-    print(summary(outcome))
+    for line in (summary(outcome), *timing_summary(timing)):
+        print(line)
     print(f"live analysis    {_comparison(recorded.differences)}")
     lost = "" if recorded.lost is None else f", {recorded.lost} lost"
     print(f"messages         {recorded.messages} recorded{lost}")

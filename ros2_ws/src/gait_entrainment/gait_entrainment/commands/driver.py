@@ -17,16 +17,24 @@
 import argparse
 import json
 import sys
+from collections.abc import Iterable
 from dataclasses import asdict, fields
-from typing import Any
+from importlib.metadata import entry_points
+from typing import TYPE_CHECKING, Any
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.device import DeviceError, Driver, LimitError, driver_names, find_driver
 
+if TYPE_CHECKING:
+    from gait_entrainment.device.conformance import Result
+
+# Where the check of a running node is found: it needs ROS, which this package does not know.
+NODE_CHECK = "gait_entrainment.node_check"
 _EXAMPLES = """examples:
   entrain driver list                       every driver, with its options
   entrain driver check emulated:delay=0.01  does it keep every promise of the contract?
   entrain driver check my_robot --arm --json
+  entrain driver check --node perturbator   any node that speaks the perturbator's topics
 """
 
 
@@ -44,7 +52,16 @@ def add_command(commands: Any) -> None:
     listing.add_argument("--json", action="store_true", help="print one JSON object")
     listing.set_defaults(run=list_drivers)
     check = actions.add_parser("check", help="the conformance kit")
-    check.add_argument("driver", metavar="NAME[:OPTION=VALUE,...]")
+    checked = check.add_mutually_exclusive_group(required=True)
+    checked.add_argument("driver", nargs="?", metavar="NAME[:OPTION=VALUE,...]")
+    checked.add_argument(
+        "--node",
+        metavar="NAME",
+        help="check from outside a node that speaks the perturbator's topics, in any language",
+    )
+    check.add_argument(
+        "--side", choices=("left", "right"), default="right", help="ankle of the node's robot"
+    )
     check.add_argument(
         "--arm",
         action="store_true",
@@ -75,6 +92,8 @@ def check_driver(options: argparse.Namespace) -> int:
     """Run the conformance kit; 1 where a promise is broken, 2 for a driver that is not there."""
     from gait_entrainment.device.conformance import Tolerances, run_checks
 
+    if options.node is not None:
+        return check_node(options)
     try:
         driver = find_driver(options.driver)
         refuse_unarmed(driver, options.arm)
@@ -94,10 +113,37 @@ def check_driver(options: argparse.Namespace) -> int:
         except DeviceError as error:
             print(f"entrain driver: {error}", file=sys.stderr)
             return 1
-    results = []
-    for result in run_checks(driver, Tolerances(torque=options.torque)):
-        results.append(result)
-        if not options.json:
+    results = run_checks(driver, Tolerances(torque=options.torque))
+    return report(options.driver, results, options.json)
+
+
+def check_node(options: argparse.Namespace) -> int:
+    """Run the kit on a running node; the code that speaks ROS is in another package."""
+    from gait_entrainment.device.conformance import Tolerances
+
+    found = list(entry_points(group=NODE_CHECK))
+    if not found:
+        print(
+            "entrain driver: --node needs the package gait_entrainment_nodes, and ROS",
+            file=sys.stderr,
+        )
+        return 1
+    results = found[0].load()(
+        options.node, Side[options.side.upper()], Tolerances(torque=options.torque)
+    )
+    try:
+        return report(options.node, results, options.json)
+    except DeviceError as error:
+        print(f"entrain driver: {error}", file=sys.stderr)
+        return 1
+
+
+def report(name: str, results: Iterable["Result"], as_json: bool) -> int:
+    """Print the results as they come; 1 where a promise is broken."""
+    done = []
+    for result in results:
+        done.append(result)
+        if not as_json:
             figures = ", ".join(f"{k} {v:.3g}" for k, v in result.figures.items())
             print(
                 f"{'kept  ' if result.kept else 'BROKEN'} {result.check}: {result.promise}"
@@ -105,14 +151,14 @@ def check_driver(options: argparse.Namespace) -> int:
                 + (f"\n       {result.broken}" if result.broken else ""),
                 flush=True,
             )
-    broken = sum(not result.kept for result in results)
-    if options.json:
-        report = {"driver": options.driver, "broken": broken}
-        print(json.dumps(report | {"checks": [asdict(result) for result in results]}))
+    broken = sum(not result.kept for result in done)
+    if as_json:
+        content = {"checked": name, "broken": broken}
+        print(json.dumps(content | {"checks": [asdict(result) for result in done]}))
     else:
-        print(f"{options.driver}: {len(results) - broken} promises kept, {broken} broken")
+        print(f"{name}: {len(done) - broken} promises kept, {broken} broken")
     if broken:
-        print(f"entrain driver: {options.driver} breaks {broken} promises", file=sys.stderr)
+        print(f"entrain driver: {name} breaks {broken} promises", file=sys.stderr)
     return 1 if broken else 0
 
 

@@ -1,0 +1,117 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""entrain stop: torque to zero, latched, on every perturbator that can be found."""
+
+import argparse
+import json
+import os
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+from gait_entrainment_nodes.domain import domains_in_use
+
+# How long to look for perturbators, and to wait for their answer [s].
+DISCOVERY = 2.0
+ANSWER = 2.0
+# Where nodes are that were started one by one, without a run that claims a domain.
+DEFAULT_DOMAIN = 0
+# A stop service is a perturbator's where the same node takes pulse trains.
+STOP, TRAIN = "/stop", "/deliver_pulse_train/_action/send_goal"
+
+
+def add_command(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser = commands.add_parser(
+        "stop",
+        help="torque to zero, latched, in every run on this machine",
+        description=(
+            "Call the stop service of every perturbator: in ROS_DOMAIN_ID where it is set, else "
+            "in every domain in which a run of this machine goes on. Latched until it "
+            "was cleaned up and configured again. No substitute for a switch in the hand: see "
+            "docs/safety.md."
+        ),
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Stop everything; 1 where nothing was found or something did not answer."""
+    wanted = os.environ.get("ROS_DOMAIN_ID")
+    if wanted is not None and wanted.isdigit():
+        domains = [int(wanted)]
+    else:
+        domains = sorted({DEFAULT_DOMAIN, *domains_in_use()})
+    answers: dict[str, str | None] = {}
+    # Side by side: no run waits for another one to be stopped.
+    with ThreadPoolExecutor(len(domains)) as threads:
+        for found in threads.map(stop_all, domains):
+            answers |= found
+    silent = [name for name, answer in answers.items() if answer is None]
+    if options.json:
+        print(json.dumps({"stopped": answers}))
+    else:
+        for name, answer in answers.items():
+            print(f"{name}: {answer or 'did not answer'}")
+    if not answers:
+        print("entrain stop: no perturbator was found: is a run going on?", file=sys.stderr)
+    elif silent:
+        print(f"entrain stop: no answer of {', '.join(silent)}: cut the power", file=sys.stderr)
+    return 0 if answers and not silent else 1
+
+
+def stop_all(domain: int) -> dict[str, str | None]:
+    """Call every stop service in a domain; return the answers, None where there was none."""
+    # Imported here: other commands do without ROS.
+    import rclpy
+    from rclpy.context import Context
+    from rclpy.experimental import EventsExecutor
+    from rclpy.node import Node
+    from std_srvs.srv import Trigger
+
+    context = Context()
+    rclpy.init(context=context, domain_id=domain)
+    node = Node("entrain_stop", context=context)
+    executor = EventsExecutor(context=context)
+    executor.add_node(node)
+    clients: dict[str, Any] = {}
+    calls: dict[str, Any] = {}
+    begun = time.monotonic()
+    try:
+        # Called as soon as it is seen: what is found first need not wait for what comes later.
+        while (waited := time.monotonic() - begun) < DISCOVERY + ANSWER:
+            services = {name for name, _ in node.get_service_names_and_types()}
+            stops = {s.removesuffix(TRAIN) + STOP for s in services if s.endswith(TRAIN)}
+            for name in (stops & services) - set(clients):
+                clients[name] = node.create_client(Trigger, name)
+            for name, client in clients.items():
+                if name not in calls and client.service_is_ready():
+                    calls[name] = client.call_async(Trigger.Request())
+            executor.spin_once(timeout_sec=0.02)
+            answered = sum(call.done() for call in calls.values())
+            if waited > DISCOVERY and answered == len(clients):
+                break
+        return {
+            f"domain {domain} {name}": (
+                calls[name].result().message if name in calls and calls[name].done() else None
+            )
+            for name in clients
+        }
+    finally:
+        executor.shutdown()
+        node.destroy_node()
+        rclpy.try_shutdown(context=context)
