@@ -341,8 +341,10 @@ def double_stance_time(
             part, converged = panel(model, work, segment, here, there)
         if converged or abs(width) < NARROWEST_PANEL:
             total += part
+            if not total < LONGEST:
+                return LONGEST
             here = there
             width = 2.0 * width
         else:
             width = 0.5 * width
-    return total if total < LONGEST else LONGEST
+    return total

@@ -76,6 +76,17 @@ def test_cutting_promises_and_advances_changes_nothing(left, right, cuts, data):
         assert np.array_equal(joined, getattr(samples, name)), name
 
 
+def test_a_promise_that_ends_where_the_walk_stops_is_no_switch():
+    """Torque zero past a promise is provisional until it has been walked through."""
+    train = [(0, RUN - 1, 7.0)]
+    _, events, _ = whole(((), train), np.empty(0, np.int64))
+    walker, cut_events = Walker(TABLE_1), []
+    for begin in range(0, RUN, 20_000_000):
+        walker.extend_torque(Side.RIGHT, [begin], [7.0], begin + 20_000_000)
+        cut_events += walker.advance(begin + 20_000_000)
+    assert cut_events == events
+
+
 @SETTINGS
 @given(right=pulse_trains(TORQUES), order=st.randoms(use_true_random=False))
 def test_a_sample_does_not_depend_on_the_others(right, order):

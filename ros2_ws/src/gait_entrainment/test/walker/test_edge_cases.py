@@ -247,6 +247,22 @@ def test_fly_off_in_between_by_a_pulse_that_is_just_too_large():
     assert 0 <= ending.missing < 1e-6
 
 
+@pytest.mark.parametrize("torque", [0.0, 5.0, 20.0, 30.0, 60.0, -20.0])
+def test_fly_off_at_the_speed_where_the_leading_leg_has_no_force_left(torque):
+    """Both where bounds clear a segment without a search and where they do not."""
+    p = TABLE_1
+    pulse = (((0, ns(0.05), torque),), ())
+    arm = (1 - 0.8 * math.sin(p.leg_angle)) / (0.2 * math.cos(p.leg_angle))
+    hold = p.mass * 9.81 * math.cos(p.leg_angle) - arm * (p.peak_torque + torque)
+    # A newton above and below what is needed at the start, where the force is least.
+    slow, fast = (math.sqrt((hold - spare) / p.mass) for spare in (1.0, -1.0))
+    assert walked(pulse, 0.1, initial_speed=slow)[0].ending is None
+    ending = walked(pulse, 0.1, initial_speed=fast)[0].ending
+    assert ending.kind == EndingKind.FLY_OFF
+    assert ending.time == 0
+    assert ending.missing == pytest.approx(1.0, rel=1e-6)
+
+
 def test_fly_off_in_single_stance_where_gravity_no_longer_holds():
     """A fast walker whose push-off is held back at first, when it would lift the leg."""
     p = TABLE_1
