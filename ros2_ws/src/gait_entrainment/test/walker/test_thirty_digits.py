@@ -43,6 +43,7 @@ def worst(events, reference):
     strikes, offs = reference
     errors = [float(t - mpf(float(s))) for s, t in zip(events.heel_strikes, strikes, strict=True)]
     errors += [float(t - mpf(float(s))) for s, t in zip(events.toe_offs, offs, strict=True)]
+    print(f"\nworst of {len(errors)} events: {np.abs(errors).max():.1e} s")
     return np.abs(errors).max()
 
 
