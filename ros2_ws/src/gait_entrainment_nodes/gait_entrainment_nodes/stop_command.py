@@ -24,9 +24,10 @@ from typing import Any
 
 from gait_entrainment_nodes.domain import domains_in_use
 
-# How long to look for perturbators, and to wait for their answer [s].
+# For so long perturbators are looked for [s]; and, in a domain where a run should be, until one is
+# found and all have answered, but no longer than this.
 DISCOVERY = 2.0
-ANSWER = 2.0
+PATIENCE = 6.0
 # Where nodes are that were started one by one, without a run that claims a domain.
 DEFAULT_DOMAIN = 0
 # A stop service is a perturbator's where the same node takes pulse trains.
@@ -53,13 +54,13 @@ def run(options: argparse.Namespace) -> int:
     """Stop everything; 1 where nothing was found or something did not answer."""
     wanted = os.environ.get("ROS_DOMAIN_ID")
     if wanted is not None and wanted.isdigit():
-        domains = [int(wanted)]
+        domains = {int(wanted): PATIENCE}
     else:
-        domains = sorted({DEFAULT_DOMAIN, *domains_in_use()})
+        domains = {DEFAULT_DOMAIN: DISCOVERY, **dict.fromkeys(domains_in_use(), PATIENCE)}
     answers: dict[str, str | None] = {}
     # Side by side: no run waits for another one to be stopped.
     with ThreadPoolExecutor(len(domains)) as threads:
-        for found in threads.map(stop_all, domains):
+        for found in threads.map(stop_all, domains, domains.values()):
             answers |= found
     silent = [name for name, answer in answers.items() if answer is None]
     if options.json:
@@ -74,7 +75,7 @@ def run(options: argparse.Namespace) -> int:
     return 0 if answers and not silent else 1
 
 
-def stop_all(domain: int) -> dict[str, str | None]:
+def stop_all(domain: int, patience: float) -> dict[str, str | None]:
     """Call every stop service in a domain; return the answers, None where there was none."""
     # Imported here: other commands do without ROS.
     import rclpy
@@ -85,7 +86,7 @@ def stop_all(domain: int) -> dict[str, str | None]:
 
     context = Context()
     rclpy.init(context=context, domain_id=domain)
-    node = Node("entrain_stop", context=context)
+    node = Node(f"entrain_stop_{domain}", context=context)
     executor = EventsExecutor(context=context)
     executor.add_node(node)
     clients: dict[str, Any] = {}
@@ -93,7 +94,7 @@ def stop_all(domain: int) -> dict[str, str | None]:
     begun = time.monotonic()
     try:
         # Called as soon as it is seen: what is found first need not wait for what comes later.
-        while (waited := time.monotonic() - begun) < DISCOVERY + ANSWER:
+        while (waited := time.monotonic() - begun) < patience:
             services = {name for name, _ in node.get_service_names_and_types()}
             stops = {s.removesuffix(TRAIN) + STOP for s in services if s.endswith(TRAIN)}
             for name in (stops & services) - set(clients):
@@ -103,7 +104,7 @@ def stop_all(domain: int) -> dict[str, str | None]:
                     calls[name] = client.call_async(Trigger.Request())
             executor.spin_once(timeout_sec=0.02)
             answered = sum(call.done() for call in calls.values())
-            if waited > DISCOVERY and answered == len(clients):
+            if waited > DISCOVERY and clients and answered == len(clients):
                 break
         return {
             f"domain {domain} {name}": (
