@@ -1,0 +1,153 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The bag that comes with the project holds what was recorded live over the nodes."""
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from gait_entrainment.bags import BagReader, BagWriter, check, recover
+from gait_entrainment.commands import main
+from gait_entrainment.report.recorded_run import read_run
+
+BAG = Path(__file__).parents[5] / "bags" / "paper_example"
+
+
+def entrain(capsys, *arguments):
+    code = main([*map(str, arguments)])
+    return code, *capsys.readouterr()
+
+
+def test_the_outcome_is_that_of_the_simulation(capsys):
+    code, out, err = entrain(capsys, "analyze", BAG, "--json")
+    assert (code, err) == (0, "")
+    told = json.loads(out)
+    simulated = json.loads(entrain(capsys, "simulate", "--json")[1])
+    assert {key: told[key] for key in simulated} == simulated
+    assert told["as_published_live"] is True
+    assert told["differences"] == []
+    assert (told["messages"], told["lost"]) == (16643, 0)
+    assert "the same to the last bit" in entrain(capsys, "analyze", BAG)[1]
+
+
+def copy(out, keep):
+    """Copy the bag; `keep` may change the bytes of a message, or leave it out with None."""
+    with (
+        BagReader(BAG) as bag,
+        BagWriter(out, ros_distro="jazzy", custom_data=bag.custom_data) as writer,
+    ):
+        for topic in bag.topics.values():
+            writer.add_topic(topic)
+        number = dict.fromkeys(bag.topics, 0)
+        for message in sorted(bag.messages(), key=lambda message: message.place):
+            data = keep(message.topic, number[message.topic], message.data)
+            number[message.topic] += 1
+            if data is not None:
+                writer.write(message.topic, data, message.log_time, message.publish_time)
+    return out
+
+
+def test_one_changed_bit_of_a_result_is_found(capsys, tmp_path):
+    def changed(topic, number, data):
+        if (topic, number) == ("/gait/pulse_phases", 17):
+            place = len(data) - 20  # the lowest bits of the unwrapped lag
+            return data[: place - 4] + bytes([data[place - 4] ^ 1]) + data[place - 3 :]
+        return data
+
+    bag = copy(tmp_path / "changed", changed)
+    code, out, _ = entrain(capsys, "analyze", bag, "--json")
+    told = json.loads(out)
+    assert (code, told["as_published_live"]) == (0, False)
+    (difference,) = told["differences"]
+    assert difference.startswith("gait/pulse_phases: ")
+    assert "message 18" in difference
+
+
+def test_deleted_events_are_analyzed_as_they_are(capsys, tmp_path):
+    bag = copy(
+        tmp_path / "gaps",
+        lambda topic, n, data: None if topic == "/gait_events" and n in (100, 101) else data,
+    )
+    code, out, _ = entrain(capsys, "analyze", bag, "--json")
+    told = json.loads(out)
+    assert code == 0
+    assert len(told["stride_period"]) in (78, 79)
+    assert told["as_published_live"] is False
+
+
+def test_a_rescued_bag_is_analyzed_up_to_where_it_ends(capsys, tmp_path):
+    shutil.copytree(BAG, tmp_path / "cut")
+    file = tmp_path / "cut" / "paper_example_0.mcap"
+    file.write_bytes(file.read_bytes()[:600_000])
+    code, _, err = entrain(capsys, "analyze", tmp_path / "cut")
+    assert code == 1
+    assert "entrain bag recover" in err
+    recover(tmp_path / "cut", tmp_path / "rescued")
+    code, out, _ = entrain(capsys, "analyze", tmp_path / "rescued", "--json")
+    assert code == 0
+    assert 10 < len(json.loads(out)["stride_period"]) < 80
+
+
+def test_torque_is_read_where_figures_need_it(tmp_path, capsys):
+    assert len(read_run(BAG, torques=False).torques.stamps) == 0
+    torques = read_run(BAG).torques
+    assert 0 < len(torques.stamps) < 0.5 * 7700
+    assert torques.effective.max() == pytest.approx(13.35, abs=0.01)
+    code, out, _ = entrain(capsys, "analyze", BAG, "--figures", tmp_path / "figures")
+    assert code == 0
+    assert out.count(".png") == 3
+
+
+def test_the_bag_follows_every_rule_and_opens_without_ros_and_message_packages():
+    assert check(BAG) == []
+    code = (
+        "import sys\n"
+        "class Block:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name.split('.')[0] in ('rclpy', 'gait_entrainment_msgs', 'std_msgs'):\n"
+        "            raise ImportError(name)\n"
+        "sys.meta_path.insert(0, Block())\n"
+        "from gait_entrainment.commands import analyze, bag\n"
+        "import argparse\n"
+        "commands = argparse.ArgumentParser().add_subparsers()\n"
+        "analyze.add_command(commands)\n"
+        f"options = commands.choices['analyze'].parse_args([{str(BAG)!r}])\n"
+        "sys.exit(options.run(options))\n"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+    assert "entrained since stride 29" in ended.stdout
+
+
+@pytest.mark.parametrize(
+    ("name", "expected", "words"),
+    [
+        ("nowhere", 2, "no such file"),
+        ("foreign", 1, "holds no protocol"),
+        ("text", 1, "not an MCAP"),
+    ],
+)
+def test_what_cannot_be_analyzed_is_one_line(capsys, tmp_path, name, expected, words):
+    with BagWriter(tmp_path / "foreign", ros_distro="jazzy"):
+        pass
+    (tmp_path / "text").write_text("hello")
+    code, out, err = entrain(capsys, "analyze", tmp_path / name)
+    assert (code, out) == (expected, "")
+    assert err.count("\n") == 1
+    assert words in err

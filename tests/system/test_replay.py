@@ -1,0 +1,260 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Live, replayed and analyzed offline: the same strides and pulse phases, byte for byte."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from harness import PATIENCE, Probe, entrain_run, payloads, probe
+from std_srvs.srv import Trigger
+
+from gait_entrainment.bags import BagReader, BagWriter
+from gait_entrainment.report.recorded_run import read_run
+from gait_entrainment_msgs.srv import Burst, GetRate, IsPaused, Play, Seek, SetRate
+from gait_entrainment_nodes.domain import claimed_domain
+from gait_entrainment_nodes.gait_analyzer import GaitAnalyzerNode
+from gait_entrainment_nodes.raw_messages import serialize
+from gait_entrainment_nodes.stamps import to_time
+from gait_entrainment_nodes.topics import CLOCK, GAIT_EVENTS
+
+BAG = Path(__file__).parents[2] / "bags" / "paper_example"
+RESULTS = ("/gait/strides", "/gait/pulse_phases")
+RUNS = {
+    "entrained": ("--pulses=25", "--baseline=4", "--washout=4", "--initial-phase=0.7"),
+    # Too far from its own period: the gait follows for a while, then slips.
+    "drifting": ("--pulses=25", "--baseline=4", "--washout=4", "--period-offset=-0.2"),
+}
+
+
+@pytest.fixture(scope="module", params=list(RUNS))
+def live(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    bag = tmp_path_factory.mktemp(request.param) / "live"
+    with entrain_run(bag, *RUNS[request.param], "--sample-rate=20", "--json") as run:
+        assert run.outcome()["verdict"] == request.param
+    return bag
+
+
+def replay(*arguments: object) -> tuple[int, Any]:
+    """Run ``entrain replay --json``; return its exit code and what it printed."""
+    ended = subprocess.run(
+        ["entrain", "replay", *map(str, arguments), "--json"],
+        capture_output=True,
+        text=True,
+        timeout=2 * PATIENCE,
+    )
+    assert ended.stdout, ended.stderr
+    return ended.returncode, json.loads(ended.stdout)
+
+
+def offline(bag: Path) -> dict[str, list[bytes]]:
+    """Analyze without ROS; return what a node would have published of it."""
+    run = read_run(bag, torques=False)
+    node: Any = SimpleNamespace(run_number=1, side=run.protocol.side)
+    strides = (GaitAnalyzerNode.stride_message(node, s) for s in run.analysis.strides)
+    pulses = (GaitAnalyzerNode.pulse_message(node, p) for p in run.analysis.pulses)
+    return {
+        "/gait/strides": [serialize(message) for message in strides],
+        "/gait/pulse_phases": [serialize(message) for message in pulses],
+    }
+
+
+def recorded(bag: Path) -> dict[str, list[bytes]]:
+    return {topic: [data for _, data in found] for topic, found in payloads(bag, RESULTS).items()}
+
+
+def test_live_replayed_and_offline_are_the_same(live: Path, tmp_path: Path) -> None:
+    again = tmp_path / "again"
+    code, told = replay(live, "--out", again)
+    assert (code, told["as_published_live"], told["differences"]) == (0, True, [])
+    assert recorded(again) == recorded(live) == offline(live)
+    assert all(recorded(live).values())
+    # What was replayed is a record like the first, and gives the same outcome.
+    first, second = (read_run(bag, torques=False) for bag in (live, again))
+    assert first.differences == second.differences == ()
+    assert second.analysis == first.analysis
+    assert second.lost == 0
+
+
+def test_the_rate_does_not_matter(live: Path) -> None:
+    for rate in (15, 200):
+        code, told = replay(live, "--rate", rate)
+        assert (code, told["as_published_live"]) == (0, True)
+
+
+def without(bag: Path, out: Path, drop: Callable[[int, str, Any], bool]) -> Path:
+    """Copy a bag without the messages that number on the topic, topic and content single out."""
+    with BagReader(bag) as reader:
+        data = {k: v for k, v in reader.custom_data.items() if k != "messages_lost"}
+        with BagWriter(out, ros_distro="jazzy", custom_data=data) as writer:
+            numbers = dict.fromkeys(reader.topics, 0)
+            for topic in reader.topics.values():
+                writer.add_topic(topic)
+            for message in sorted(reader.messages(), key=lambda message: message.place):
+                number = numbers[message.topic]
+                numbers[message.topic] += 1
+                content = reader.decoder(message.topic)(message.data)
+                if not drop(number, message.topic, content):
+                    writer.write(
+                        message.topic, message.data, message.log_time, message.publish_time
+                    )
+    return out
+
+
+@pytest.mark.parametrize(
+    "drop",
+    [
+        pytest.param(
+            lambda n, topic, _: topic == "/gait_events" and n in (30, 47, 48, 61), id="gaps"
+        ),
+        pytest.param(lambda _, topic, c: topic == "/walker_sim/progress" and c.state, id="no end"),
+    ],
+)
+def test_a_bag_that_lacks_messages_gives_the_same_replayed_and_offline(
+    live: Path, tmp_path: Path, drop: Callable[[int, str, Any], bool]
+) -> None:
+    damaged = without(live, tmp_path / "damaged", drop)
+    again = tmp_path / "again"
+    code, told = replay(damaged, "--out", again)
+    lacks_events = offline(damaged) != offline(live)
+    assert code == lacks_events
+    assert bool(told["differences"]) is lacks_events
+    assert recorded(again) == offline(damaged)
+    assert (read_run(damaged, torques=False).differences != ()) is lacks_events
+
+
+class Player:
+    """A player of a bag in the domain of a probe, paused at the start."""
+
+    def __init__(self, bag: Path, domain: int, folder: Path, *parameters: str) -> None:
+        arguments = ["--ros-args", "-p", f"bag:={bag}", "-p", "start_paused:=true"]
+        for parameter in parameters:
+            arguments += ["-p", parameter]
+        self.log = folder / "player.log"
+        with self.log.open("wb") as log:
+            self.process = subprocess.Popen(
+                [sys.executable, "-m", "gait_entrainment_nodes.bag_player", *arguments],
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                env={**os.environ, "ROS_DOMAIN_ID": str(domain)},
+            )
+
+
+@pytest.fixture
+def player(tmp_path: Path) -> Any:
+    with claimed_domain() as domain, probe(domain) as listener:
+        started: list[Player] = []
+
+        def start(*parameters: str) -> tuple[Player, Probe]:
+            started.append(Player(BAG, domain, tmp_path, *parameters))
+            return started[-1], listener
+
+        yield start
+        for each in started:
+            each.process.kill()
+            each.process.wait()
+
+
+def test_the_services_of_the_player(player: Any) -> None:
+    process, listener = player(
+        "topics:=[/gait_events]", "expect:=[/gait_events]", "stay:=true", "clock:=100.0"
+    )
+    heard = listener.listen(GAIT_EVENTS)
+    clock = listener.listen(CLOCK)
+    ask = listener.call
+    events = list(payloads(BAG, ["/gait_events"])["/gait_events"])
+    assert ask(IsPaused, "bag_player/is_paused").paused
+    assert ask(GetRate, "bag_player/get_rate").rate == 1.0
+    assert not ask(SetRate, "bag_player/set_rate", SetRate.Request(rate=-1.0)).success
+    assert ask(SetRate, "bag_player/set_rate", SetRate.Request(rate=1e6)).success
+    assert ask(GetRate, "bag_player/get_rate").rate == 1e6
+    # Single messages, once the expected subscription has been matched.
+    listener.until(lambda: ask(Trigger, "bag_player/play_next").success, "the start")
+    assert ask(Burst, "bag_player/burst", Burst.Request(num_messages=3)).actually_burst == 3
+    listener.until(lambda: len(heard) == 4, "four events")
+    # Back to the start, and on from there to the end.
+    start = events[0][0]
+    assert not ask(Seek, "bag_player/seek", Seek.Request(time=to_time(start - 10**12))).success
+    assert ask(Seek, "bag_player/seek", Seek.Request(time=to_time(start))).success
+    assert ask(Trigger, "bag_player/toggle_paused").message == "goes on"
+    listener.until(lambda: len(heard) == 4 + len(events), "all events")
+    assert [e.header.stamp for e in heard[4:]] == [to_time(stamp) for stamp, _ in events]
+    ticks = [tick.clock.sec * 10**9 + tick.clock.nanosec for tick in clock]
+    assert start in ticks
+    assert {(tick - start) % 10_000_000 for tick in ticks} == {0}
+    # Anew from the middle, for a second.
+    middle = Play.Request(start_offset=to_time(events[10][0] - start))
+    middle.playback_duration.sec = 1
+    listener.until(lambda: ask(Play, "bag_player/play", middle).success, "the end")
+    within = [s for s, _ in events if events[10][0] <= s < events[10][0] + 10**9]
+    listener.until(lambda: len(heard) == 4 + len(events) + len(within), "a second of events")
+    assert heard[4 + len(events)].header.stamp == to_time(events[10][0])
+    assert ask(Trigger, "bag_player/pause").success
+    assert ask(Trigger, "bag_player/resume").success
+    assert ask(Trigger, "bag_player/stop").success
+    assert process.process.poll() is None
+
+
+def test_nothing_is_played_without_those_who_are_expected(player: Any) -> None:
+    process, _ = player("expect:=[/gait_events]", "expect_timeout:=0.5")
+    assert process.process.wait(PATIENCE) == 1
+    assert "no subscriptions of /gait_events within 0.5 s" in process.log.read_text()
+
+
+def test_topics_are_remapped_and_played_in_a_loop(player: Any) -> None:
+    process, listener = player(
+        "remap:=['/gait_events:=/again/gait_events']",
+        "exclude:=['/gait/*', /clock]",
+        "expect:=[/again/gait_events]",
+        "loop:=true",
+        "rate:=0.0",
+        "clock:=0.0",
+    )
+    heard = listener.listen(GAIT_EVENTS._replace(name="/again/gait_events"))
+    assert listener.call(Trigger, "bag_player/resume").success
+    count = len(payloads(BAG, ["/gait_events"])["/gait_events"])
+    listener.until(lambda: len(heard) > 2 * count, "the third round")
+    assert heard[:count] == heard[count : 2 * count]
+    topics = dict(listener.node.get_topic_names_and_types())
+    assert "/joint_states" in topics
+    assert not {"/gait_events", "/gait/strides", "/clock"} & topics.keys()
+    process.process.terminate()
+    assert process.process.wait(PATIENCE) == 0
+    assert "messages played" in process.log.read_text()
+
+
+@pytest.mark.parametrize(
+    ("parameter", "words"),
+    [
+        ("topics:=[/nothing]", "/nothing matches no topic"),
+        ("rate:=-1.0", "rate: -1"),
+        ("start_offset:=1e9", "start_offset"),
+        ("remap:=['/nothing:=/x']", "no topic /nothing"),
+        ("remap:=[gait_events]", "allowed: /from:=/to"),
+        ("expect:=[/nothing]", "/nothing is not played"),
+    ],
+)
+def test_a_wrong_parameter_is_one_line(player: Any, parameter: str, words: str) -> None:
+    process, _ = player(parameter)
+    assert process.process.wait(PATIENCE) == 2
+    text = process.log.read_text()
+    assert words in text
+    assert text.count("\n") == 1
