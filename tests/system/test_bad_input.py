@@ -20,7 +20,7 @@ import shutil
 import subprocess
 
 import pytest
-from harness import LONG, PATIENCE, entrain_run
+from harness import LONG, PATIENCE, QUICK, entrain_run
 
 from gait_entrainment.bags import BagReader
 from gait_entrainment_nodes.domain import claimed_domain
@@ -138,6 +138,18 @@ def test_full_disk_ends_the_run_with_a_readable_bag(small_disk):
         assert "Traceback" not in run.text
         assert_readable(run.bag)
         assert run.survivors() == []
+
+
+def test_full_disk_in_real_time_lets_the_walk_end_and_then_fails(small_disk):
+    # The recorder puts 3 MB aside; little is left for a walk of a few seconds.
+    (small_disk / "filler").write_bytes(bytes(2_700_000))
+    options = (*QUICK, "--baseline=2", "--pulses=14", "--washout=1", "--sample-rate=1000")
+    with entrain_run(small_disk / "bag", "--real-time", *options) as run:
+        assert run.wait() == 1
+        assert "bag_recorder did not complete the record" in run.text.splitlines()[0]
+        assert "disk full" in run.text
+        assert "Traceback" not in run.text
+        assert_readable(run.bag)
 
 
 def test_file_that_may_not_grow_ends_the_run_with_a_readable_bag(tmp_path):

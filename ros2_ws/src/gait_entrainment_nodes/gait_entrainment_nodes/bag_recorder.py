@@ -340,7 +340,9 @@ class BagRecorder(Participant, Node):
                 self.break_off(error)
         if self.final_at is None or not self.expected:
             return
-        if self.expected <= self.published.keys() and (self.broken_off or not self.lost()):
+        if self.expected <= self.published.keys() and self.broken_off:
+            self.failure = "the recording had ended before the run did"
+        elif self.expected <= self.published.keys() and not self.lost():
             self.finished = True
         elif time.monotonic() - self.final_at > CLOSING_TIMEOUT:
             silent = sorted(self.expected - self.published.keys())

@@ -85,6 +85,8 @@ def parameters(
         "experiment": experiment,
         "bag_recorder": {
             "output": bag,
+            # Without its record a simulated run is worth nothing; a person's goes on.
+            "required": not real_time,
             "publishers": list(PUBLISHERS),
             "custom_data": custom_data,
         },
