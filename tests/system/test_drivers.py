@@ -203,7 +203,7 @@ def test_kit_from_outside_finds_a_broken_node(tmp_path, fault):
 
 
 def test_stop_from_the_command_line_ends_a_run(tmp_path):
-    with entrain_run(tmp_path / "bag", "--real-time", *SHORT) as run:
+    with entrain_run(tmp_path / "bag", "--real-time", "--baseline=2") as run:
         run.wait_for_stride(2)
         code, out, err = entrain(run.domain(), "stop")
         assert code == 0, out + err
