@@ -17,7 +17,6 @@
 from gait_entrainment.device.drivers import Driver, driver_names, find_driver
 from gait_entrainment.device.faults import DeviceError, Fault, LimitError
 from gait_entrainment.device.guard import GuardedRobot
-from gait_entrainment.device.ideal import IdealAnkleRobot
 from gait_entrainment.device.limits import DeviceLimits
 from gait_entrainment.device.profile import TorqueProfile
 from gait_entrainment.device.pulse_train import PulseTrain
@@ -32,7 +31,6 @@ __all__ = [
     "Driver",
     "Fault",
     "GuardedRobot",
-    "IdealAnkleRobot",
     "LimitError",
     "PulseTiming",
     "PulseTrain",

@@ -54,14 +54,6 @@ class Driver:
         """Return the robot behind the safety envelope, in the state before ``configure``."""
         return GuardedRobot(self.robot(side, self.options, seed), side, limits)
 
-    def __call__(self, side: Side, start: int, limits: DeviceLimits) -> GuardedRobot:
-        """Return the robot ready for a run that begins at ``start`` [ns]."""
-        robot = self.make(side, limits)
-        robot.configure()
-        robot.activate()
-        robot.begin(start)
-        return robot
-
     @property
     def simulated(self) -> bool:
         """Whether it lives in simulated time, so that it can run in lock-step."""
