@@ -140,6 +140,7 @@ class BagRecorder(Participant, Node):
             # What tells of the end is heard in any case.
             self.chosen |= {self.resolved[t.name] for t in (PUBLISHED_COUNTS, WALKER_PROGRESS)}
         self.broken_off = False  # the recording has ended before its time
+        self.reason = ""  # why it was broken off
         # Messages that came before ROS time began: topic, bytes, time of reception [ns].
         self.early: list[tuple[str, bytes, int]] = []
         self.latest: dict[str, int] = {}  # log time of the latest message, by topic
@@ -274,7 +275,7 @@ class BagRecorder(Participant, Node):
         """End the recording where nothing more can be written; the run goes on unless told to."""
         if self.broken_off:
             return
-        self.broken_off = True
+        self.broken_off, self.reason = True, str(error)
         if self.required:
             self.failure = str(error)
             return
@@ -341,7 +342,7 @@ class BagRecorder(Participant, Node):
         if self.final_at is None or not self.expected:
             return
         if self.expected <= self.published.keys() and self.broken_off:
-            self.failure = "the recording had ended before the run did"
+            self.failure = f"the recording ended before the run did: {self.reason}"
         elif self.expected <= self.published.keys() and not self.lost():
             self.finished = True
         elif time.monotonic() - self.final_at > CLOSING_TIMEOUT:
