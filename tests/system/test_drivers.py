@@ -26,6 +26,7 @@ from harness import PROMISED_TOPICS, entrain_run, payloads, probe, session, stam
 
 from gait_entrainment.bags import BagReader
 from gait_entrainment.protocol import read_protocol
+from gait_entrainment.report.pulse_timing import recorded_timings
 from gait_entrainment.simulation import simulate
 from gait_entrainment_nodes.domain import claimed_domain
 from gait_entrainment_nodes.topics import ROBOT_STATE
@@ -79,9 +80,16 @@ def test_emulated_robot_walks_as_in_the_simulation_and_twice_the_same(tmp_path):
             outcome = run.outcome()
     with BagReader(bags[0]) as reader:
         events = [message for _, message in reader.decoded(["/gait_events"])]
-        simulated = simulate(read_protocol(reader.custom_data["protocol"])).events
+        simulation = simulate(read_protocol(reader.custom_data["protocol"]))
     walked = [stamp_of(event.header) - stamp_of(events[0].header) for event in events]
-    assert walked == [event.stamp for event in simulated]
+    assert walked == [event.stamp for event in simulation.events]
+    # Commanded, sent and measured onset of each pulse are in the bag.
+    late = [
+        [(t.sent - t.commanded, t.measured - t.commanded) for t in timings]
+        for timings in (recorded_timings(bags[0]), simulation.timings)
+    ]
+    assert late[0] == late[1]
+    assert len(late[0]) == 3
     first, second = (payloads(bag, PROMISED_TOPICS) for bag in bags)
     assert first == second
     assert len(first["/perturbator/state"]) > 250 * 10

@@ -18,12 +18,14 @@ import argparse
 import json
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 _EXAMPLES = """examples:
   entrain analyze bags/paper_example            outcome of a recorded run
   entrain analyze bags/paper_example --json     one JSON object, as of entrain simulate
+  entrain analyze bags/mine --onset measured    pulses begin where the measured torque rises
   entrain analyze bags/mine --figures out       draws the figures into the folder out
 """
 
@@ -39,6 +41,12 @@ def add_command(commands: Any) -> None:
     )
     parser.add_argument("bag", type=Path, metavar="BAG", help="folder or .mcap file")
     parser.add_argument("--figures", type=Path, metavar="FOLDER", help="draw figures into it")
+    parser.add_argument(
+        "--onset",
+        choices=("commanded", "measured"),
+        default="commanded",
+        help="take the onset of a pulse from the command (default) or from the measured torque",
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.set_defaults(run=run)
 
@@ -46,6 +54,7 @@ def add_command(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Analyze and print; 1 where the bag cannot be analyzed, 2 where there is none."""
     # Imported here: other commands do without the readers.
+    from gait_entrainment.analysis import analyze
     from gait_entrainment.bags import BagError
     from gait_entrainment.report.pulse_timing import (
         recorded_timings,
@@ -61,7 +70,12 @@ def run(options: argparse.Namespace) -> int:
     figures: list[Path] = []
     try:
         recorded = read_run(options.bag, torques=options.figures is not None)
-        timing = timing_outcome(recorded_timings(options.bag), recorded.measured_period)
+        timings = recorded_timings(options.bag)
+        timing = timing_outcome(timings, recorded.measured_period)
+        if options.onset == "measured":
+            onsets = [t.commanded if t.measured is None else t.measured for t in timings]
+            analysis = analyze(recorded.events, onsets, recorded.protocol.side)
+            recorded = replace(recorded, analysis=analysis)
         if options.figures is not None:
             from gait_entrainment.report.figures import draw_figures
 
