@@ -20,6 +20,7 @@ import math
 import os
 import shutil
 import signal
+import subprocess
 import sys
 import tempfile
 from datetime import datetime
@@ -28,15 +29,15 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from ament_index_python.packages import get_package_share_directory
 
 from gait_entrainment.bags import BagError, BagReader, UnreadableBagError, recover
 from gait_entrainment.commands.protocol_options import add_protocol_options, chosen_protocol
 from gait_entrainment.device import DeviceError, DeviceLimits, LimitError, find_driver
 from gait_entrainment.protocol import Protocol, ProtocolError, write_protocol
 from gait_entrainment_nodes.domain import DomainError, claimed_domain
+from gait_entrainment_nodes.environment import set_environment
 from gait_entrainment_nodes.node_list import NODES, STOP_ORDER, parameters
-from gait_entrainment_nodes.supervisor import PACKAGE, Supervisor
+from gait_entrainment_nodes.supervisor import Supervisor
 
 _EXAMPLES = """examples:
   entrain run                          the paper's example, as fast as it goes
@@ -175,15 +176,7 @@ def conduct(protocol: Protocol, bag: Path, domain: int, options: argparse.Namesp
     # Imported here, so that a mistake in the protocol is answered without waiting for rclpy.
     from gait_entrainment_nodes.run_client import RunClient
 
-    environment = {
-        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-        "FASTRTPS_DEFAULT_PROFILES_FILE": str(
-            Path(get_package_share_directory(PACKAGE)) / "config" / "fastdds.xml"
-        ),
-        **os.environ,
-        "ROS_DOMAIN_ID": str(domain),
-    }
-    os.environ.update(environment)  # for the client in this process
+    environment = set_environment(domain)
     text = write_protocol(protocol)
     sampling = {
         "sample_rate": options.sample_rate,
@@ -235,7 +228,21 @@ def provenance(protocol: Protocol, text: str, real_time: bool) -> dict[str, str]
         "seed": str(protocol.seed),
         "mode": "real time" if real_time else "lock-step",
         "versions": json.dumps({package: version(package) for package in packages}),
+        "commit": commit(),
     }
+
+
+def commit() -> str:
+    """Return the git commit of the sources that run, "+" where they were changed since."""
+    git = ["git", "-C", str(Path(__file__).resolve().parent)]
+    try:
+        head, changes = (
+            subprocess.run([*git, *words], capture_output=True, text=True, check=True).stdout
+            for words in (["rev-parse", "HEAD"], ["status", "--porcelain", "-uno", "--", "."])
+        )
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown: the sources are not under git"
+    return head.strip() + ("+" if changes.strip() else "")
 
 
 def publish_lateness(bag: Path) -> dict[str, float]:
@@ -299,7 +306,10 @@ def report(bag: Path, options: argparse.Namespace) -> int:
             f"real time        samples published {lateness['p50']:.2f} ms after they were due"
             f" (median), {lateness['p99']:.2f} ms (99 %), {lateness['worst']:.2f} ms (worst)"
         )
-    print(f"messages         {recorded.messages} recorded, {recorded.lost} lost")
+    left_out = f", {recorded.lost} lost"
+    if recorded.ended_early:
+        left_out = f"; the recording ended early: {recorded.ended_early}"
+    print(f"messages         {recorded.messages} recorded{left_out}")
     print(f"bag              {bag}")
     for figure in figures:
         print(f"figure           {figure}")

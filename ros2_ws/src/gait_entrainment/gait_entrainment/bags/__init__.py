@@ -30,10 +30,11 @@ from gait_entrainment.bags.playback import FASTEST, Moment, Playback, choose_top
 from gait_entrainment.bags.reader import BagInfo, BagReader, info
 from gait_entrainment.bags.recovery import Recovery, recover
 from gait_entrainment.bags.tables import export
-from gait_entrainment.bags.writer import BagWriter
+from gait_entrainment.bags.writer import ENDED_EARLY, BagWriter
 
 __all__ = [
     "BagWriter",
+    "ENDED_EARLY",
     "BagReader",
     "BagMessage",
     "BagInfo",

@@ -95,6 +95,7 @@ def run(options: argparse.Namespace) -> int:
         "bag": str(options.bag),
         "messages": recorded.messages,
         "lost": recorded.lost,
+        "ended_early": recorded.ended_early or None,
         "pulse_timing": timing,
         "real_time_factor": None if math.isnan(factor) else factor,
         "as_published_live": (None if recorded.differences is None else not recorded.differences),
@@ -106,8 +107,10 @@ def run(options: argparse.Namespace) -> int:
     for line in (summary(outcome), *timing_summary(timing)):
         print(line)
     print(f"live analysis    {_comparison(recorded.differences)}")
-    lost = "" if recorded.lost is None else f", {recorded.lost} lost"
-    print(f"messages         {recorded.messages} recorded{lost}")
+    left_out = "" if recorded.lost is None else f", {recorded.lost} lost"
+    if recorded.ended_early:
+        left_out = f"; the recording ended early: {recorded.ended_early}"
+    print(f"messages         {recorded.messages} recorded{left_out}")
     for figure in figures:
         print(f"figure           {figure}")
     return 0

@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait_entrainment.analysis import Analysis, Entrainment, PulsePhase, VerdictSettings, analyze
-from gait_entrainment.bags import BagError, BagMessage, BagReader
+from gait_entrainment.bags import ENDED_EARLY, BagError, BagMessage, BagReader
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
 from gait_entrainment.events import GaitEvent, Stride
 from gait_entrainment.experiment import Conductor
@@ -76,6 +76,7 @@ class RecordedRun:
     messages: int  # in the bag, on all topics
     lost: int | None  # published but not recorded; None where no publisher gave a count
     real_time_factor: float  # walked time over wall time, first to last /clock; NaN without
+    ended_early: str = ""  # why the recording ended before the run did
     differences: tuple[str, ...] | None = None
     """How what the analyzer published live differs from `analysis`, a line per topic; () where
     they are equal to the last bit, None where nothing was recorded."""
@@ -135,6 +136,7 @@ def read_run(
             messages=bag.message_count,
             lost=None if lost is None else sum(lost.values()),
             real_time_factor=record.real_time_factor,
+            ended_early=bag.custom_data.get(ENDED_EARLY, ""),
         )
 
 
