@@ -238,7 +238,10 @@ def commit() -> str:
     try:
         head, changes = (
             subprocess.run([*git, *words], capture_output=True, text=True, check=True).stdout
-            for words in (["rev-parse", "HEAD"], ["status", "--porcelain", "-uno", "--", "."])
+            for words in (
+                ["rev-parse", "HEAD"],
+                ["status", "--porcelain", "-uno", "--", ":/ros2_ws/src"],
+            )
         )
     except (OSError, subprocess.CalledProcessError):
         return "unknown: the sources are not under git"
