@@ -26,7 +26,7 @@ from gait_entrainment_nodes.node_list import NODES
 from gait_entrainment_nodes.topics import ANKLE_TORQUE, PULSES, TORQUE_PROFILE
 
 # From the signal to the end of the process [s], on a machine that does other things too.
-PROMPTLY = 2.0
+PROMPTLY = 5.0
 # Pulses that are on nearly all the time.
 BROAD = (*QUICK, "--pulses=100000", "--width=0.4", "--baseline=2")
 
