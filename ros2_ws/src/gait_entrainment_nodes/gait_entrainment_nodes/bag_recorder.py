@@ -204,14 +204,18 @@ class BagRecorder(Participant, Node):
         )
 
     def note_offers(self, name: str) -> None:
-        """Keep what a publisher that came later offers."""
+        """
+        Say where a publisher that came later is not recorded.
+
+        The bag keeps what was offered at first: a channel cannot be changed, and readers that
+        find another quality in metadata.yaml than in the channel drop the topic.
+        """
         known = self.offers.get(name)
         # Asked for by their number first: asking for their quality costs ten times as much.
         if known is None or self.count_publishers(name) <= len(known):
             return
         infos = self.get_publishers_info_by_topic(name)
         self.offers[name] = tuple(_offered(info.qos_profile) for info in infos)
-        self.bag.set_qos_profiles(name, self.offers[name])
         lossy = {o.reliability for o in self.offers[name]} - {o.reliability for o in known}
         if "best_effort" in lossy and all(o.reliability == "reliable" for o in known):
             self.get_logger().error(

@@ -26,7 +26,6 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from io import FileIO
 from pathlib import Path
 from types import TracebackType
@@ -40,7 +39,6 @@ from gait_entrainment.bags.metadata import (
     RECORD_NAME,
     BagDescription,
     FileInformation,
-    QosProfile,
     TopicInfo,
     first_line,
     offered_qos_text,
@@ -181,15 +179,6 @@ class BagWriter:
             self._write_description()
         except OSError as error:
             raise self._failure(error) from None
-
-    def set_qos_profiles(self, topic: str, profiles: tuple[QosProfile, ...]) -> None:
-        """
-        Change what publishers of a topic offer, where more of them have come.
-
-        It stands in the description, and in the channels of the files that follow; a channel of
-        the present file cannot be changed any more.
-        """
-        self._topics[topic] = replace(self._topics[topic], qos_profiles=profiles)
 
     def write(self, topic: str, data: bytes, log_time: int, publish_time: int) -> None:
         """
