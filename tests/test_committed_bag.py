@@ -1,0 +1,52 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The bag that comes with the project, read by two readers that are not ours."""
+
+from pathlib import Path
+
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
+
+from gait_entrainment.bags import BagReader
+
+BAG = Path(__file__).parents[1] / "bags" / "paper_example"
+
+
+def counts_of(topics):
+    return {topic: topics.count(topic) for topic in set(topics)}
+
+
+def recorded():
+    with BagReader(BAG) as bag:
+        return {topic: count for topic, count in bag.counts.items() if count}
+
+
+def test_rosbags_decodes_every_message():
+    # A store without any message: the definitions come from the bag alone.
+    with AnyReader([BAG], default_typestore=get_typestore(Stores.EMPTY)) as reader:
+        topics = []
+        for connection, _, data in reader.messages():
+            reader.deserialize(data, connection.msgtype)
+            topics.append(connection.topic)
+    assert counts_of(topics) == recorded()
+
+
+def test_mcap_decodes_every_message():
+    with (BAG / "paper_example_0.mcap").open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        topics = [channel.topic for _, channel, _, _ in reader.iter_decoded_messages()]
+    assert counts_of(topics) == recorded()
