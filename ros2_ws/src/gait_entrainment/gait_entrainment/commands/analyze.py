@@ -22,6 +22,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from gait_entrainment.commands.outcome_options import add_outcome_options
+
 _EXAMPLES = """examples:
   entrain analyze bags/paper_example            outcome of a recorded run
   entrain analyze bags/paper_example --json     one JSON object, as of entrain simulate
@@ -41,13 +43,7 @@ def add_command(commands: Any) -> None:
     )
     parser.add_argument("bag", type=Path, metavar="BAG", help="folder or .mcap file")
     parser.add_argument("--figures", type=Path, metavar="FOLDER", help="draw figures into it")
-    parser.add_argument(
-        "--onset",
-        choices=("commanded", "measured"),
-        default="commanded",
-        help="take the onset of a pulse from the command (default) or from the measured torque",
-    )
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    add_outcome_options(parser)
     parser.set_defaults(run=run)
 
 

@@ -20,6 +20,7 @@ import math
 import sys
 from typing import Any
 
+from gait_entrainment.commands.outcome_options import add_outcome_options
 from gait_entrainment.commands.protocol_options import add_protocol_options, chosen_protocol
 from gait_entrainment.device import DeviceError, LimitError
 from gait_entrainment.protocol import ProtocolError
@@ -43,13 +44,7 @@ def add_command(commands: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_protocol_options(parser)
-    parser.add_argument(
-        "--onset",
-        choices=("commanded", "measured"),
-        default="commanded",
-        help="take the onset of a pulse from the command (default) or from the measured torque",
-    )
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    add_outcome_options(parser)
     parser.set_defaults(run=run)
 
 
