@@ -32,6 +32,9 @@ Pulse = tuple[float, float, float]
 # Tighter than the 1e-9 s that is compared: near a stall an error grows a thousandfold.
 TOLERANCE = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-14, "max_step": 0.01}
 
+# Perturbation that has taken all torque from the ankle, which only pushes.
+UNLOADED = None
+
 
 @dataclass(frozen=True)
 class Table1:
@@ -63,7 +66,10 @@ class Table1:
         return torque * reach / (self.L * self.l * np.sin(psi))
 
     def torque(self, theta, perturbation):
-        return np.maximum(0.0, self.k * (self.mu - self.psi(theta)) + perturbation)
+        """Torque that is never clipped: no step of the integrator may straddle a kink."""
+        if perturbation is UNLOADED:
+            return 0.0
+        return self.k * (self.mu - self.psi(theta)) + perturbation
 
     def acceleration(self, theta, perturbation):
         phi = self.phi(theta)
@@ -115,8 +121,8 @@ def walk(
         while True:
             stop = next((border for border in borders if border > time), time + 10.0)
             level = perturbation_at(pulses[trailing], time)
-            if unloaded:
-                level = -math.inf
+            if unloaded or p.torque(theta, level) < 0:
+                level, unloaded = UNLOADED, True
             if p.leading_force(theta, rate, level) < 0:
                 result.ending, result.end_time, result.end_angle = "fly_off", time, theta
                 return result
@@ -134,10 +140,9 @@ def walk(
                 return p.leading_force(y[0], y[1], level)
 
             def kink(_, y, level=level):
-                return p.k * (p.mu - p.psi(y[0])) + level
+                return p.torque(y[0], level)
 
-            # Terminal at the kink too, so that no step of the integrator straddles it.
-            bent = level < 0 and not unloaded
+            bent = not unloaded and level < 0
             toe_off.terminal = stall.terminal = lift_off.terminal = kink.terminal = True
             toe_off.direction, stall.direction, lift_off.direction, kink.direction = 1, 1, -1, -1
             piece = solve_ivp(
