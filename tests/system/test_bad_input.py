@@ -130,8 +130,8 @@ def assert_readable(bag):
         assert sum(1 for _ in reader.messages()) == reader.message_count > 0
 
 
-def test_full_disk_ends_the_run_with_a_readable_bag(small_disk):
-    with entrain_run(small_disk / "bag", *LONG, "--sample-rate=1000") as run:
+def test_full_disk_ends_the_run_where_the_record_is_required(small_disk):
+    with entrain_run(small_disk / "bag", *LONG, "--sample-rate=1000", "--require-record") as run:
         run.find_nodes()
         assert run.wait() == 1
         assert "disk full" in run.text
@@ -140,12 +140,14 @@ def test_full_disk_ends_the_run_with_a_readable_bag(small_disk):
         assert run.survivors() == []
 
 
-def test_full_disk_in_real_time_lets_the_walk_end_and_then_fails(small_disk):
+@pytest.mark.parametrize("mode", [(), ("--real-time",)], ids=["lock-step", "real time"])
+def test_full_disk_lets_the_walk_end_and_then_fails(mode, small_disk):
     # The recorder puts 3 MB aside; little is left for a walk of a few seconds.
     (small_disk / "filler").write_bytes(bytes(2_700_000))
     options = (*QUICK, "--baseline=2", "--pulses=14", "--washout=1", "--sample-rate=1000")
-    with entrain_run(small_disk / "bag", "--real-time", *options) as run:
+    with entrain_run(small_disk / "bag", *mode, *options) as run:
         assert run.wait() == 1
+        # Said only once the experiment has conducted all of the protocol.
         assert "bag_recorder did not complete the record" in run.text.splitlines()[0]
         assert "disk full" in run.text
         assert "Traceback" not in run.text
@@ -153,7 +155,7 @@ def test_full_disk_in_real_time_lets_the_walk_end_and_then_fails(small_disk):
 
 
 def test_file_that_may_not_grow_ends_the_run_with_a_readable_bag(tmp_path):
-    with entrain_run(tmp_path / "bag", *LONG, "--sample-rate=1000") as run:
+    with entrain_run(tmp_path / "bag", *LONG, "--sample-rate=1000", "--require-record") as run:
         run.wait_for_stride(1)
         limits = (2 * 2**20, resource.RLIM_INFINITY)
         resource.prlimit(run.nodes["bag_recorder"], resource.RLIMIT_FSIZE, limits)

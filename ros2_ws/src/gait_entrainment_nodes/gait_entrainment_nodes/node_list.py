@@ -40,6 +40,7 @@ def parameters(
     real_time: bool,
     sampling: dict[str, Any],
     armed: bool = False,
+    record_required: bool = False,
 ) -> dict[str, dict[str, Any]]:
     """
     Return the parameters of every node for one run, by node name.
@@ -58,6 +59,8 @@ def parameters(
         Parameters of walker_sim that say what it samples and how often.
     armed
         Whether a real robot may deliver torque without another word.
+    record_required
+        Whether the run ends where nothing more can be recorded.
 
     """
     side = protocol.side.name.lower()
@@ -85,8 +88,7 @@ def parameters(
         "experiment": experiment,
         "bag_recorder": {
             "output": bag,
-            # Without its record a simulated run is worth nothing; a person's goes on.
-            "required": not real_time,
+            "required": record_required,
             "publishers": list(PUBLISHERS),
             "custom_data": custom_data,
         },

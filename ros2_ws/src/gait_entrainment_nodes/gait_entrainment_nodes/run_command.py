@@ -71,6 +71,11 @@ def add_command(commands: Any) -> None:
     )
     parser.add_argument("--out", type=Path, help="folder of the bag; default bags/<time>_<name>")
     parser.add_argument(
+        "--require-record",
+        action="store_true",
+        help="end the run where nothing more can be recorded, as on a full disk",
+    )
+    parser.add_argument(
         "--sample-rate",
         type=float,
         default=200.0,
@@ -189,6 +194,7 @@ def conduct(protocol: Protocol, bag: Path, domain: int, options: argparse.Namesp
         real_time=options.real_time,
         sampling=sampling,
         armed=options.arm,
+        record_required=options.require_record,
     )
     with tempfile.TemporaryDirectory(prefix="entrain_") as folder:
         parameter_file = Path(folder) / "parameters.yaml"
