@@ -143,9 +143,8 @@ class Participant:
         self.finished = False  # set to end the loop with exit code 0
         self._publishers_counted: list[CountedPublisher] = []
         self._diagnostics = self.publisher(DIAGNOSTICS)
-        self._counts = self.create_publisher(
-            PUBLISHED_COUNTS.type, PUBLISHED_COUNTS.name, PUBLISHED_COUNTS.qos
-        )
+        # Not counted itself: its message says what the others published.
+        self._counts = CountedPublisher(self, PUBLISHED_COUNTS)
 
     def offer_ready(self) -> None:
         """
@@ -161,6 +160,10 @@ class Participant:
         publisher = CountedPublisher(self, topic)
         self._publishers_counted.append(publisher)
         return publisher
+
+    @property
+    def _offered(self) -> list[CountedPublisher]:
+        return [*self._publishers_counted, self._counts]
 
     def subscription(self, topic: Topic, callback: Callable[[Any], None], **options: Any) -> Any:
         """Create a subscription with the quality of service of its topic."""
@@ -193,12 +196,12 @@ class Participant:
 
     def not_ready(self) -> str:
         """Return what this node still waits for before a run, or an empty text."""
-        waiting = [p.topic_name for p in self._publishers_counted if p.unmatched]
+        waiting = [p.topic_name for p in self._offered if p.unmatched]
         return f"subscriptions of {', '.join(waiting)}" if waiting else ""
 
     def _on_ready(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         waiting = self.not_ready()
-        matched = {p.topic_name: p.matched for p in self._publishers_counted}
+        matched = {p.topic_name: p.matched for p in self._offered}
         response.success, response.message = not waiting, waiting or json.dumps(matched)
         return response
 
@@ -243,7 +246,7 @@ class Participant:
         except Exception as error:
             self.fail_with(error)
         deadline = time.monotonic() + LAST_WORDS
-        for publisher in self._publishers_counted:
+        for publisher in self._offered:
             publisher.wait_until_received(max(deadline - time.monotonic(), 0.0))
 
 

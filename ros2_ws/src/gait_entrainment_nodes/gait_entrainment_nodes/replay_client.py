@@ -100,7 +100,7 @@ class ReplayClient:
 
         """
         self._ask("gait_analyzer/ready", self._all_listen)
-        self._ask("/bag_player/ready")
+        self._ask("/bag_player/ready", self._all_recorded)
         self._ask("/bag_player/resume")
         with tqdm(
             desc="replay", unit="stride", disable=True if quiet else None, leave=False
@@ -123,6 +123,13 @@ class ReplayClient:
             return False
         matched = json.loads(answer.message)
         return all(matched.get(name, 0) >= self._listeners for name in self._topic_names)
+
+    def _all_recorded(self, answer: Trigger.Response) -> bool:
+        """Whether a recorder, if there is one, hears all that is played, hidden topics apart."""
+        if not answer.success:
+            return False
+        heard = json.loads(answer.message)
+        return self._listeners == 1 or all(heard[name] for name in heard if "/_" not in name)
 
     def _complete(self) -> bool:
         """Whether everything that the analyzer says it has published is here."""
