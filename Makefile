@@ -16,7 +16,7 @@ demo: build ## set up, build, then simulate a walk and entrain it: entrain run
 	@$(in_env) entrain run
 
 test: build ## set up, build, then run every test (PYTEST_ARGS="-k name" for some)
-	@$(in_env) pytest $(PYTEST_ARGS)
+	@$(in_env) scripts/test.sh $(PYTEST_ARGS)
 
 lint: build ## ruff, mypy, import-linter, licence headers
 	@$(in_env) scripts/lint.sh

@@ -66,10 +66,7 @@ class Table1:
         return torque * reach / (self.L * self.l * np.sin(psi))
 
     def torque(self, theta, perturbation):
-        """Torque that is never clipped: no step of the integrator may straddle a kink."""
-        if perturbation is UNLOADED:
-            return 0.0
-        return self.k * (self.mu - self.psi(theta)) + perturbation
+        return np.maximum(0.0, self.k * (self.mu - self.psi(theta)) + perturbation)
 
     def acceleration(self, theta, perturbation):
         phi = self.phi(theta)
@@ -92,6 +89,15 @@ class Table1:
         )
 
 
+class WithoutKink(Table1):
+    """The same between two kinks: none of the integrator's steps may straddle one."""
+
+    def torque(self, theta, perturbation):
+        if perturbation is UNLOADED:
+            return 0.0
+        return self.k * (self.mu - self.psi(theta)) + perturbation
+
+
 @dataclass
 class Walk:
     """Heel strikes and toe-offs [s], and how the walk ended."""
@@ -112,6 +118,7 @@ def walk(
     p: Table1, pulses: Sequence[Sequence[Pulse]], leading: int, steps: int, rate=None
 ) -> Walk:
     """Walk `steps` steps; pulses[side] perturb the ankle of that side."""
+    p = WithoutKink(**vars(p))
     time, theta, rate = 0.0, p.alpha, p.start_rate() if rate is None else rate
     result = Walk([0.0], [], [rate])
     for _ in range(steps):
