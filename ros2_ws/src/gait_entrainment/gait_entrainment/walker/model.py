@@ -35,10 +35,10 @@ from gait_entrainment.parameters import WalkerParameters
 Floats = NDArray[np.float64]
 
 # Gauss-Legendre nodes of one panel of double stance, and of a whole single stance. At Table 1 the
-# Legendre coefficients of the whole unperturbed double stance fall by 3 each, so 24 nodes leave
-# 3^-48 of it; those of single stance, which comes near a stall at the apex, fall by 2.2 each.
-PANEL_NODES = 24
-SINGLE_STANCE_NODES = 32
+# Legendre coefficients of the whole unperturbed double stance fall by 3 each, so 20 nodes leave
+# 3^-40 of it; those of single stance, which comes near a stall at the apex, fall by 2.2 each.
+PANEL_NODES = 20
+SINGLE_STANCE_NODES = 28
 
 # Rows of a quadrature rule.
 NODES: Final = 0
