@@ -84,7 +84,10 @@ class BagRecorder(Participant, Node):
         if not output:
             raise ValueError("output: is empty; give the folder of the bag to make")
         chosen = declare(
-            self, "topics", [""], "topics to record, fully qualified; empty records all"
+            self,
+            "topics",
+            [""],
+            "topics to record, fully qualified; empty records all below the node's namespace",
         )
         self.chosen = {topic for topic in chosen if topic}
         expected = declare(
@@ -145,6 +148,7 @@ class BagRecorder(Participant, Node):
         self.early: list[tuple[str, bytes, int]] = []
         self.latest: dict[str, int] = {}  # log time of the latest message, by topic
         self.offers: dict[str, tuple[OfferedQos, ...]] = {}
+        self.beneath = self.get_namespace().rstrip("/") + "/"  # how names in the namespace begin
         self.seen: set[str] = set()  # topics that are recorded, or cannot be
         self.progress: Progress | None = None  # not acknowledged yet
         self.published: dict[str, dict[str, int]] = {}  # by node: final count by topic
@@ -157,7 +161,7 @@ class BagRecorder(Participant, Node):
         """Subscribe to every topic that has a publisher and is not recorded yet."""
         for name, types in self.get_topic_names_and_types():
             hidden = "/_" in name or name == self.resolved[RECORDER_PROGRESS.name]
-            chosen = not self.chosen or name in self.chosen
+            chosen = name in self.chosen if self.chosen else name.startswith(self.beneath)
             if hidden or not chosen or not self.count_publishers(name):
                 continue
             if name in self.seen:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The environment that the processes of a run share."""
+"""What the processes of a run share: environment and configuration files."""
 
 import os
 from pathlib import Path
@@ -22,6 +22,11 @@ from ament_index_python.packages import get_package_share_directory
 from gait_entrainment_nodes.supervisor import PACKAGE
 
 
+def config_file(name: str) -> Path:
+    """Return the path of an installed file of config/."""
+    return Path(get_package_share_directory(PACKAGE)) / "config" / name
+
+
 def set_environment(domain: int) -> dict[str, str]:
     """
     Put this process into a ROS domain, and return the environment for those that it starts.
@@ -29,9 +34,6 @@ def set_environment(domain: int) -> dict[str, str]:
     What the user has set stays: the range of discovery, the profiles of Fast DDS.
     """
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    os.environ.setdefault(
-        "FASTRTPS_DEFAULT_PROFILES_FILE",
-        str(Path(get_package_share_directory(PACKAGE)) / "config" / "fastdds.xml"),
-    )
+    os.environ.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(config_file("fastdds.xml")))
     os.environ["ROS_DOMAIN_ID"] = str(domain)
     return dict(os.environ)

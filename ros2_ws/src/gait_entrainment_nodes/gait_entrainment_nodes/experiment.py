@@ -15,8 +15,9 @@
 """
 experiment: conducts a protocol over the running nodes.
 
-It brings the participants together, starts the walker, and from then on answers every progress
-of the walker with a horizon. What to perturb and when is the core's Conductor; who is waited
+A protocol comes as a goal of ``~/run_protocol``, or as the parameter ``protocol``: then the node
+ends with it. It brings the participants together, starts the walker, and from then on answers
+every progress of the walker with a horizon. What to perturb and when is the core's Conductor; who is waited
 for, and for how long, is decided here.
 """
 
@@ -113,12 +114,20 @@ class Experiment(Participant, Node):
             minimum=1.0,
             maximum=600.0,
         )
+        self.protocol = declare(
+            self,
+            "protocol",
+            "",
+            "protocol to conduct at once, a file or its text: the node ends with it, with exit "
+            "code 1 where it failed; empty waits for goals of ~/run_protocol",
+        )
         self.begin_participation()
         self.horizons = self.publisher(HORIZON)
         self.states = self.publisher(EXPERIMENT_STATE)
 
         self.run_number = 0
-        self.busy = False  # a protocol has been accepted and has not ended yet
+        self.busy = bool(self.protocol)  # a protocol has been accepted and has not ended yet
+        self.own_begun = False  # the protocol of the parameter is conducted
         self.conductor: Conductor | None = None  # of the run that goes on
         self._goal: Any = None
         self._tick_at = time.monotonic() + TICK
@@ -155,33 +164,48 @@ class Experiment(Participant, Node):
         return GoalResponse.ACCEPT
 
     async def execute(self, goal: Any) -> RunProtocol.Result:
-        """Conduct one protocol; the result says how it ended."""
+        """Conduct the protocol of a goal."""
         self._goal = goal
+        result = await self.run(goal.request.protocol)
+        self._goal = None
+        if result.outcome == RunProtocol.Result.FINISHED:
+            goal.succeed()
+        elif result.outcome == RunProtocol.Result.CANCELLED:
+            goal.canceled()
+        else:
+            goal.abort()
+        return result
+
+    async def conduct_own(self) -> None:
+        """Conduct the protocol of the parameter, and end the node with it."""
+        result = await self.run(self.protocol)
+        if result.outcome == RunProtocol.Result.FINISHED:
+            self.finished = True
+        else:
+            self.failure = self.failure or result.message
+
+    async def run(self, protocol: str) -> RunProtocol.Result:
+        """Conduct a protocol, a file or its text; the result says how it ended."""
         self.run_number += 1
         self.begin_run()
         result = RunProtocol.Result(run=self.run_number, outcome=RunProtocol.Result.FAILED)
         try:
-            final = await self.conduct(read_protocol(goal.request.protocol))
+            final = await self.conduct(read_protocol(protocol))
             result.outcome = RunProtocol.Result.FINISHED
             result.reproducible = final.reproducible
             result.message = final.message or "every stride of the protocol was walked"
             self.publish_state(Phase.FINISHED, result.message)
             await self.transition(Transition.TRANSITION_DEACTIVATE)
-            goal.succeed()
         except (ExperimentError, ProtocolError) as failure:
             result.message = str(failure)
             await self.give_up(result.message)
-            if goal.is_cancel_requested:
+            if self.cancelled:
                 result.outcome = RunProtocol.Result.CANCELLED
-                goal.canceled()
-            else:
-                goal.abort()
         except Exception as error:
             result.message = str(error)
             self.fail_with(error)
-            goal.abort()
         self.publish_counts(self.run_number, self.known_until)
-        self.conductor = self._goal = None
+        self.conductor = None
         self.busy = False
         return result
 
@@ -253,17 +277,21 @@ class Experiment(Participant, Node):
 
     async def not_ready_yet(self) -> str:
         """Return who is waited for, and for what; an empty text once all are ready."""
+        here = self.get_namespace()
+        nodes = self.get_node_names_and_namespaces()
         for name, client in self._ready.items():
             if not client.service_is_ready():
                 return f"{name} does not answer"
+            if nodes.count((name, here)) > 1:
+                return (
+                    f"there are two {name} in {here}: another experiment runs here; choose "
+                    "another namespace or ROS_DOMAIN_ID"
+                )
         if not (self._start.service_is_ready() and self._deliver.server_is_ready()):
             return "walker_sim or perturbator is not there"
         if "bag_recorder" in self.participants:
-            for name, _ in self.get_topic_names_and_types():
-                nodes = [i.node_name for i in self.get_subscriptions_info_by_topic(name)]
-                hidden = "/_" in name or name.endswith(RECORDER_PROGRESS.name)
-                if not hidden and self.count_publishers(name) and "bag_recorder" not in nodes:
-                    return f"bag_recorder has not subscribed to {name}"
+            for topic in self.not_recorded():
+                return f"bag_recorder has not subscribed to {topic}"
         for name, client in self._ready.items():
             # An answer may be lost, as long as the participant does not know who asked. Who has
             # answered here knows all clients of this node: discovery goes in their order.
@@ -278,6 +306,24 @@ class Experiment(Participant, Node):
             for topic in self.reaching_too_few(response.message):
                 return f"{name} waits for subscriptions of {topic}"
         return f"experiment waits for {self.not_ready()}" if self.not_ready() else ""
+
+    def not_recorded(self) -> list[str]:
+        """Return the topics of participants that the recorder has not subscribed to."""
+        here = self.get_namespace()
+        beneath = here.rstrip("/") + "/"
+        recorder = (here, "bag_recorder")
+        publishers = {(here, name) for name in (*self.participants, self.get_name())} - {recorder}
+        missing = []
+        for name, _ in self.get_topic_names_and_types():
+            if not name.startswith(beneath) or "/_" in name:
+                continue
+            offers = self.get_publishers_info_by_topic(name)
+            readers = self.get_subscriptions_info_by_topic(name)
+            if publishers & {(offer.node_namespace, offer.node_name) for offer in offers} and (
+                recorder not in {(reader.node_namespace, reader.node_name) for reader in readers}
+            ):
+                missing.append(name)
+        return missing
 
     def reaching_too_few(self, matched: str) -> list[str]:
         """
@@ -457,6 +503,9 @@ class Experiment(Participant, Node):
 
     def on_deadline(self) -> None:
         """Look after everything that is waited for."""
+        if self.protocol and not self.own_begun:
+            self.own_begun = True
+            self.executor.create_task(self.conduct_own)
         now = time.monotonic()
         if now > self._tick_at + HELD_UP:
             self.excuse_everyone(now)
@@ -474,10 +523,15 @@ class Experiment(Participant, Node):
             future.set_result(None)
         if self.conductor is not None and not self.ended.done():
             silent = self.silent_participant(now)
-            if self._goal.is_cancel_requested:
+            if self.cancelled:
                 self.fail("cancelled by the client")
             elif silent:
                 self.fail(f"{silent} has been silent for {self.silence_timeout:g} s")
+
+    def on_stop(self) -> None:
+        """Say so where the node is ended before its own protocol is."""
+        if self.protocol and self.busy and not self.failure:
+            self.failure = "stopped before the end of the protocol"
 
     def excuse_everyone(self, now: float) -> None:
         """Begin all waiting anew: what came meanwhile has not been heard yet."""
@@ -501,9 +555,14 @@ class Experiment(Participant, Node):
             return ""
         return "walker_sim" if max(self.progress_at, self.profile_at) < latest else ""
 
+    @property
+    def cancelled(self) -> bool:
+        """Whether the client has cancelled the run."""
+        return self._goal is not None and bool(self._goal.is_cancel_requested)
+
     def fail_if_cancelled(self) -> None:
         """Raise where the client has cancelled the run."""
-        if self._goal.is_cancel_requested:
+        if self.cancelled:
             raise ExperimentError("cancelled by the client")
 
     def fail(self, reason: str) -> None:

@@ -12,12 +12,23 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The nodes of an experiment: one list for ``entrain run`` and the launch files."""
+"""
+The nodes of an experiment and of a replay: one list for the commands and the launch files.
 
+What a user may set is in config/nodes.yaml. Here is what follows from the protocol, the mode and
+the bag.
+"""
+
+from datetime import datetime
+from pathlib import Path
 from typing import Any
 
+import yaml
+
+from gait_entrainment.bags import BagError, BagReader
 from gait_entrainment.device import find_driver
-from gait_entrainment.protocol import Protocol
+from gait_entrainment.protocol import Protocol, read_protocol
+from gait_entrainment_nodes.environment import config_file
 
 # In the order in which they are started. Executable and node have the same name.
 NODES = ("bag_recorder", "walker_sim", "perturbator", "gait_analyzer", "experiment")
@@ -31,6 +42,19 @@ REAL_TIME_LOOKAHEAD = 0.3
 # the wall clock [s] the walker shows what it felt.
 MEASURED_DELAY = 0.1
 
+# In a replay made anew, or of the processes that were recorded.
+NOT_REPLAYED = (
+    "*/gait/strides",
+    "*/gait/pulse_phases",
+    "*/gait/entrainment",
+    "*/published_counts",
+    "*/bag_recorder/progress",
+    "*/clock",
+    "/rosout",
+    "/parameter_events",
+)
+ANALYZED = ("gait_events", "perturbation/torque_profile", "walker_sim/progress")
+
 
 def parameters(
     protocol: Protocol,
@@ -38,7 +62,6 @@ def parameters(
     custom_data: str,
     *,
     real_time: bool,
-    sampling: dict[str, Any],
     armed: bool = False,
     record_required: bool = False,
 ) -> dict[str, dict[str, Any]]:
@@ -55,8 +78,6 @@ def parameters(
         JSON object that the bag keeps.
     real_time
         Real time instead of lock-step.
-    sampling
-        Parameters of walker_sim that say what it samples and how often.
     armed
         Whether a real robot may deliver torque without another word.
     record_required
@@ -69,10 +90,9 @@ def parameters(
     if real_time:
         experiment["longest_lookahead"] = REAL_TIME_LOOKAHEAD
     measured = real_time and not find_driver(protocol.driver).simulated
-    return {
+    given = {
         "walker_sim": {
             **walker,
-            **sampling,
             "first_heel_strike": side,
             "real_time": real_time,
             "acknowledged": not real_time,
@@ -93,3 +113,74 @@ def parameters(
             "custom_data": custom_data,
         },
     }
+    return {name: given[name] | {"use_sim_time": not real_time} for name in NODES}
+
+
+def replay_parameters(
+    path: Path, namespace: str | None = None, listeners: int = 1
+) -> tuple[str, dict[str, dict[str, Any]]]:
+    """
+    Return what a replay of a bag to the analyzer needs.
+
+    Parameters
+    ----------
+    path
+        The bag: a folder or an ``.mcap`` file.
+    namespace
+        To play into, with a slash before it; None for the one that was recorded.
+    listeners
+        Subscriptions that what is analyzed must have before the first message.
+
+    Returns
+    -------
+    namespace
+        Of the replay, without a slash at its end; "" for the root.
+    parameters
+        By node name.
+
+    Raises
+    ------
+    BagError
+        where the bag cannot be read, or holds no run of this project.
+
+    """
+    with BagReader(path) as bag:
+        topics = list(bag.topics)
+        recorded = next((name for name in topics if name.endswith("/gait_events")), None)
+        if recorded is None or "protocol" not in bag.custom_data:
+            raise BagError(f"{path}: not a run of this project: no protocol or no gait events")
+        side = read_protocol(bag.custom_data["protocol"]).side
+    recorded = recorded.removesuffix("/gait_events")
+    namespace = recorded if namespace is None else namespace.rstrip("/")
+    moved = [name for name in topics if namespace != recorded and name.startswith(f"{recorded}/")]
+    expected = [f"{namespace}/{n}" for n in ANALYZED if f"{recorded}/{n}" in topics]
+    return namespace, {
+        "bag_player": {
+            "bag": str(path.absolute()),
+            "exclude": list(NOT_REPLAYED),
+            "remap": [f"{name}:={namespace}{name.removeprefix(recorded)}" for name in moved]
+            or [""],
+            "expect": expected * listeners,
+            "use_sim_time": False,
+        },
+        "gait_analyzer": {"side": side.name.lower(), "use_sim_time": True},
+    }
+
+
+def bag_folder(protocol: Protocol) -> Path:
+    """Return where a run is recorded unless the user says otherwise."""
+    return Path("bags") / f"{datetime.now():%Y%m%d-%H%M%S}_{protocol.name}"
+
+
+def parameter_arguments(given: dict[str, dict[str, Any]], folder: Path) -> list[str]:
+    """
+    Write parameters by node name into a file in a folder.
+
+    Returns the arguments by which a node loads config/nodes.yaml and then that file.
+    """
+    file = folder / "parameters.yaml"
+    file.write_text(
+        yaml.safe_dump({f"/**/{n}": {"ros__parameters": p} for n, p in given.items()})
+    )
+    files = (config_file("nodes.yaml"), file)
+    return ["--ros-args", *(word for f in files for word in ("--params-file", str(f)))]

@@ -22,13 +22,12 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from gait_entrainment.bags import BagError, BagReader
 from gait_entrainment.report.recorded_run import RecordedRun, read_run
 from gait_entrainment.report.summary import outcome_of, summary
 from gait_entrainment_nodes.domain import DomainError, claimed_domain
 from gait_entrainment_nodes.environment import set_environment
+from gait_entrainment_nodes.node_list import parameter_arguments, replay_parameters
 from gait_entrainment_nodes.supervisor import Supervisor
 
 _EXAMPLES = """examples:
@@ -39,18 +38,6 @@ _EXAMPLES = """examples:
 
 Exit code 1 where the results differ from those that were recorded, or the replay failed.
 """
-# Made anew in a replay, or of the processes that were recorded.
-NOT_REPLAYED = (
-    "*/gait/strides",
-    "*/gait/pulse_phases",
-    "*/gait/entrainment",
-    "*/published_counts",
-    "*/bag_recorder/progress",
-    "/clock",
-    "/rosout",
-    "/parameter_events",
-)
-ANALYZED = ("gait_events", "perturbation/torque_profile", "walker_sim/progress")
 # After the replay has ended, the recorder has this long to close the bag [s].
 CLOSING_TIMEOUT = 15.0
 STOP_ORDER = ("bag_player", "gait_analyzer", "bag_recorder")
@@ -93,7 +80,7 @@ def run(options: argparse.Namespace) -> int:
     try:
         recorded = read_run(options.bag, torques=False)
         with claimed_domain() as domain:
-            results = replay(options, recorded, domain)
+            results = replay(options, domain)
         return report(options, recorded, results)
     except KeyboardInterrupt:
         print("entrain replay: interrupted", file=sys.stderr)
@@ -102,32 +89,16 @@ def run(options: argparse.Namespace) -> int:
     return 1
 
 
-def replay(
-    options: argparse.Namespace, recorded: RecordedRun, domain: int
-) -> dict[str, list[bytes]]:
+def replay(options: argparse.Namespace, domain: int) -> dict[str, list[bytes]]:
     """Start the nodes, play the bag, stop the nodes; return the results by topic."""
     from gait_entrainment_nodes.replay_client import ReplayClient, ReplayError
 
     environment = set_environment(domain)
-    with BagReader(options.bag) as bag:
-        events = next(name for name in bag.topics if name.endswith("/gait_events"))
-        played = set(bag.topics)
-    namespace = events.removesuffix("/gait_events")
-    analyzed = [f"{namespace}/{name}" for name in ANALYZED]
-    expected = [name for name in analyzed if name in played]
     recorder = options.out is not None
-    parameters = {
-        "bag_player": {
-            "bag": str(options.bag.absolute()),
-            "rate": options.rate or 0.0,
-            "start_paused": True,
-            "exclude": list(NOT_REPLAYED),
-            # The analyzer, and where the replay is recorded the recorder.
-            "expect": expected * (2 if recorder else 1),
-            "use_sim_time": False,
-        },
-        "gait_analyzer": {"side": recorded.protocol.side.name.lower(), "use_sim_time": True},
-    }
+    # The analyzer listens, and where the replay is recorded the recorder.
+    listeners = 2 if recorder else 1
+    namespace, parameters = replay_parameters(options.bag, listeners=listeners)
+    parameters["bag_player"] |= {"rate": options.rate or 0.0, "start_paused": True}
     if recorder:
         with BagReader(options.bag) as bag:
             custom_data = bag.custom_data | {"replay_of": options.bag.name}
@@ -138,19 +109,14 @@ def replay(
             "use_sim_time": True,
         }
     with tempfile.TemporaryDirectory(prefix="entrain_") as folder:
-        parameter_file = Path(folder) / "parameters.yaml"
-        parameter_file.write_text(
-            yaml.safe_dump({f"/**/{n}": {"ros__parameters": p} for n, p in parameters.items()})
-        )
+        common = parameter_arguments(parameters, Path(folder))
         supervisor = Supervisor(Path(folder), environment)
         client: ReplayClient | None = None
         try:
             for node in parameters:
-                arguments = ["--ros-args", "--params-file", str(parameter_file)]
-                if namespace and node != "bag_player":
-                    arguments += ["-r", f"__ns:={namespace}"]
-                supervisor.start(node, arguments)
-            client = ReplayClient(supervisor, namespace, listeners=2 if recorder else 1)
+                moved = namespace and node != "bag_player"
+                supervisor.start(node, [*common, *(["-r", f"__ns:={namespace}"] if moved else [])])
+            client = ReplayClient(supervisor, namespace, listeners=listeners)
             client.play(quiet=options.json)
             if recorder and supervisor.wait("bag_recorder", CLOSING_TIMEOUT) != 0:
                 raise ReplayError(

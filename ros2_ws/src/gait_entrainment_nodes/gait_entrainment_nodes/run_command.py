@@ -20,15 +20,10 @@ import math
 import os
 import shutil
 import signal
-import subprocess
 import sys
 import tempfile
-from datetime import datetime
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
-
-import yaml
 
 from gait_entrainment.bags import BagError, BagReader, UnreadableBagError, recover
 from gait_entrainment.commands.protocol_options import add_protocol_options, chosen_protocol
@@ -36,7 +31,14 @@ from gait_entrainment.device import DeviceError, DeviceLimits, LimitError, find_
 from gait_entrainment.protocol import Protocol, ProtocolError, write_protocol
 from gait_entrainment_nodes.domain import DomainError, claimed_domain
 from gait_entrainment_nodes.environment import set_environment
-from gait_entrainment_nodes.node_list import NODES, STOP_ORDER, parameters
+from gait_entrainment_nodes.node_list import (
+    NODES,
+    STOP_ORDER,
+    bag_folder,
+    parameter_arguments,
+    parameters,
+)
+from gait_entrainment_nodes.provenance import provenance
 from gait_entrainment_nodes.supervisor import Supervisor
 
 _EXAMPLES = """examples:
@@ -78,7 +80,6 @@ def add_command(commands: Any) -> None:
     parser.add_argument(
         "--sample-rate",
         type=float,
-        default=200.0,
         help="samples per second, 0 to 1000; 0 samples at gait events only (default 200)",
     )
     parser.add_argument(
@@ -95,9 +96,9 @@ def run(options: argparse.Namespace) -> int:
         protocol = chosen_protocol(options)
         check_driver(protocol.driver, options)
         DeviceLimits().check_pulse(protocol.pulse_torque, protocol.pulses.width)
-        if not 0 <= options.sample_rate <= 1000:
+        if options.sample_rate is not None and not 0 <= options.sample_rate <= 1000:
             raise ProtocolError(f"--sample-rate: {options.sample_rate:g}; allowed: 0 to 1000 Hz")
-        bag = options.out or Path("bags") / f"{datetime.now():%Y%m%d-%H%M%S}_{protocol.name}"
+        bag = options.out or bag_folder(protocol)
         check_output(bag)
     except (ProtocolError, LimitError, DeviceError) as error:
         print(f"entrain run: {error}", file=sys.stderr)
@@ -183,32 +184,23 @@ def conduct(protocol: Protocol, bag: Path, domain: int, options: argparse.Namesp
 
     environment = set_environment(domain)
     text = write_protocol(protocol)
-    sampling = {
-        "sample_rate": options.sample_rate,
-        "ground_reaction": not options.no_ground_reaction,
-    }
     node_parameters = parameters(
         protocol,
         str(bag.absolute()),
-        json.dumps(provenance(protocol, text, options.real_time)),
+        json.dumps(provenance(protocol, real_time=options.real_time)),
         real_time=options.real_time,
-        sampling=sampling,
         armed=options.arm,
         record_required=options.require_record,
     )
+    if options.sample_rate is not None:
+        node_parameters["walker_sim"]["sample_rate"] = options.sample_rate
+    if options.no_ground_reaction:
+        node_parameters["walker_sim"]["ground_reaction"] = False
     with tempfile.TemporaryDirectory(prefix="entrain_") as folder:
-        parameter_file = Path(folder) / "parameters.yaml"
-        parameter_file.write_text(
-            yaml.safe_dump(
-                {f"/**/{n}": {"ros__parameters": p} for n, p in node_parameters.items()}
-            )
-        )
+        arguments = parameter_arguments(node_parameters, Path(folder))
         supervisor = Supervisor(Path(folder), environment)
         try:
             for node in NODES:
-                arguments = ["--ros-args", "--params-file", str(parameter_file)]
-                if not options.real_time:
-                    arguments += ["-p", "use_sim_time:=true"]
                 supervisor.start(node, arguments)
             client = RunClient(supervisor, protocol, quiet=options.json)
             try:
@@ -225,42 +217,13 @@ def conduct(protocol: Protocol, bag: Path, domain: int, options: argparse.Namesp
     (bag / "protocol.yaml").write_text(text)
 
 
-def provenance(protocol: Protocol, text: str, real_time: bool) -> dict[str, str]:
-    """Return what the bag keeps of how it came about."""
-    packages = ("gait_entrainment", "numpy", "mcap")
-    return {
-        "protocol": text,
-        "driver": protocol.driver,
-        "seed": str(protocol.seed),
-        "mode": "real time" if real_time else "lock-step",
-        "versions": json.dumps({package: version(package) for package in packages}),
-        "commit": commit(),
-    }
-
-
-def commit() -> str:
-    """Return the git commit of the sources that run, "+" where they were changed since."""
-    git = ["git", "-C", str(Path(__file__).resolve().parent)]
-    try:
-        head, changes = (
-            subprocess.run([*git, *words], capture_output=True, text=True, check=True).stdout
-            for words in (
-                ["rev-parse", "HEAD"],
-                ["status", "--porcelain", "-uno", "--", ":/ros2_ws/src"],
-            )
-        )
-    except (OSError, subprocess.CalledProcessError):
-        return "unknown: the sources are not under git"
-    return head.strip() + ("+" if changes.strip() else "")
-
-
 def publish_lateness(bag: Path) -> dict[str, float]:
     """Return how late the walker's samples were [ms] as its last diagnostics say, if they do."""
     from gait_entrainment_nodes.topics import DIAGNOSTICS
 
     lateness = {}
     with BagReader(bag) as reader:
-        topics = [name for name in reader.topics if name == DIAGNOSTICS.name]
+        topics = [name for name in reader.topics if name.endswith(DIAGNOSTICS.name)]
         for _, message in reader.decoded(topics):
             for status in message.status:
                 for value in status.values:

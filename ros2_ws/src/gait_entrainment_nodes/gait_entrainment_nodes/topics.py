@@ -15,8 +15,9 @@
 """
 Every topic of the testbed: its name, type and quality of service, in one table.
 
-Names are relative, so that a namespace or a remapping moves a whole experiment. Quality of
-service: what a run depends on or is judged by is reliable and keeps all, on both ends, so that
+Names are relative, so that a namespace or a remapping moves a whole experiment; but for those that
+others expect at the root, which the launch files move into the namespace of an experiment. Quality
+of service: what a run depends on or is judged by is reliable and keeps all, on both ends, so that
 nothing is lost without an error; what tells a late-comer how things stand is transient local.
 """
 

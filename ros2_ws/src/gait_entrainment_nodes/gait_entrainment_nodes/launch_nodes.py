@@ -1,0 +1,156 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What the launch files share: arguments, nodes in a namespace, and how a launch ends."""
+
+from typing import Any
+
+from launch import Action, LaunchContext
+from launch.actions import DeclareLaunchArgument, RegisterEventHandler, SetEnvironmentVariable
+from launch.event_handlers import OnProcessExit
+from launch.events.process import ProcessExited
+from launch.substitutions import EnvironmentVariable, LaunchConfiguration
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+from launch_ros.utilities import make_namespace_absolute, prefix_namespace
+
+from gait_entrainment_nodes.environment import config_file
+from gait_entrainment_nodes.supervisor import PACKAGE
+
+# Arguments of a launch file: name, default, what --show-args tells. Without a default it is needed.
+Argument = tuple[str, str | None, str]
+NAMESPACE: Argument = ("namespace", "", "of all nodes and topics, for several side by side")
+PARAMETERS_FILE: Argument = (
+    "params_file",
+    str(config_file("nodes.yaml")),
+    "what may be set of the nodes (YAML)",
+)
+RVIZ: Argument = ("rviz", "false", "show the walker in RViz: true or false")
+# Names of the root that are moved into a namespace: each experiment keeps its own time.
+MOVED = ("/clock", "/diagnostics", "/tf", "/tf_static")
+
+
+class LaunchError(Exception):
+    """The launch ends with exit code 1; the message says why."""
+
+
+def declared(*arguments: Argument) -> list[Action]:
+    """
+    Declare arguments of a launch file.
+
+    Fast DDS gets the shared memory that a lock-step run needs, unless the user has a profile.
+    """
+    profile = "FASTRTPS_DEFAULT_PROFILES_FILE"
+    own = str(config_file("fastdds.xml"))
+    return [
+        *(
+            DeclareLaunchArgument(name, default_value=default, description=text)
+            for name, default, text in arguments
+        ),
+        SetEnvironmentVariable(profile, EnvironmentVariable(profile, default_value=own)),
+    ]
+
+
+def value(context: LaunchContext, name: str) -> str:
+    """Return the value of an argument."""
+    return str(LaunchConfiguration(name).perform(context))
+
+
+def is_true(context: LaunchContext, name: str) -> bool:
+    """Return the value of an argument; LaunchError where it is neither true nor false."""
+    text = value(context, name).lower()
+    if text not in ("true", "false"):
+        raise LaunchError(f"{name}: {text!r}; allowed: true, false")
+    return text == "true"
+
+
+def full_namespace(context: LaunchContext, namespace: str) -> str:
+    """Return a namespace from the root on, as launch files that include this one push it."""
+    pushed = context.launch_configurations.get("ros_namespace")
+    return str(make_namespace_absolute(prefix_namespace(pushed, namespace)) or "/")
+
+
+def make_node(
+    context: LaunchContext,
+    name: str,
+    namespace: str,
+    given: dict[str, Any],
+    kind: type[Node] = Node,
+    **options: Any,
+) -> Node:
+    """Return the action that runs a node; what is given wins over the file of parameters."""
+    # Text stays text, also where it reads like YAML, as a protocol does.
+    typed = {
+        key: ParameterValue(item, value_type=str) if isinstance(item, str) else item
+        for key, item in given.items()
+    }
+    rooted = full_namespace(context, namespace) == "/"
+    return kind(
+        **{"package": PACKAGE, "executable": name, "output": "screen"} | options,
+        name=name,
+        namespace=namespace,
+        parameters=[value(context, "params_file"), typed],
+        remappings=[] if rooted else [(topic, topic[1:]) for topic in MOVED],
+    )
+
+
+def rviz(context: LaunchContext, namespace: str, *, simulated_time: bool) -> list[Action]:
+    """Return RViz with the picture of the walker, where it is wanted."""
+    if not is_true(context, "rviz"):
+        return []
+    picture = config_file("").parent / "rviz" / "walker.rviz"
+    return [
+        make_node(
+            context,
+            "rviz",
+            namespace,
+            {"use_sim_time": simulated_time},
+            package="rviz2",
+            executable="rviz2",
+            arguments=["-d", str(picture)],
+        )
+    ]
+
+
+def ended_by(nodes: list[Node], last: set[str], over: list[Action]) -> list[Action]:
+    """
+    Return the handlers that end the launch with its nodes.
+
+    Parameters
+    ----------
+    nodes
+        None of them may end with another exit code than 0: the launch then ends with 1, and so it
+        does where one ends that should stay.
+    last
+        Names of the nodes that end by themselves.
+    over
+        What to do once all of these have ended well.
+
+    """
+    waited_for = set(last)
+
+    def on_exit(event: ProcessExited, context: LaunchContext) -> list[Action]:
+        if context.is_shutdown:
+            return []
+        name = event.process_name.rpartition("-")[0]
+        if event.returncode != 0 or name not in last:
+            # launch has no other way to an exit code than an exception, which it tells in a line.
+            raise LaunchError(f"{name} ended with exit code {event.returncode}")
+        waited_for.discard(name)
+        return [] if waited_for else over
+
+    return [
+        RegisterEventHandler(OnProcessExit(target_action=node, on_exit=on_exit)) for node in nodes
+    ]

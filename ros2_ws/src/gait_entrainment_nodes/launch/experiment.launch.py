@@ -1,0 +1,82 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Conduct one protocol over the nodes and record it: `entrain run` as a launch file.
+
+Nodes and parameters are those of `entrain run`. The experiment brings the perturbator up, and the
+launch ends with the experiment: exit code 0 once it is over and recorded, 1 where it failed.
+"""
+
+import json
+
+from launch import Action, LaunchContext, LaunchDescription
+from launch.actions import EmitEvent, OpaqueFunction
+from launch.events import Shutdown
+
+from gait_entrainment.protocol import read_protocol, write_protocol
+from gait_entrainment_nodes.launch_nodes import (
+    NAMESPACE,
+    PARAMETERS_FILE,
+    RVIZ,
+    declared,
+    ended_by,
+    is_true,
+    make_node,
+    rviz,
+    value,
+)
+from gait_entrainment_nodes.node_list import NODES, bag_folder, parameters
+from gait_entrainment_nodes.provenance import provenance
+
+
+def nodes(context: LaunchContext) -> list[Action]:
+    """Make the nodes once the arguments are known: the protocol says what they are given."""
+    protocol = read_protocol(value(context, "protocol") or None)
+    real_time = is_true(context, "real_time")
+    given = parameters(
+        protocol,
+        value(context, "bag") or str(bag_folder(protocol).absolute()),
+        json.dumps(provenance(protocol, real_time=real_time)),
+        real_time=real_time,
+        armed=is_true(context, "arm"),
+    )
+    given["experiment"]["protocol"] = write_protocol(protocol)
+    namespace = value(context, "namespace")
+    made = [make_node(context, name, namespace, given[name]) for name in NODES]
+    over = [EmitEvent(event=Shutdown(reason="the experiment is over and recorded"))]
+    return [
+        *ended_by(made, {"experiment", "bag_recorder"}, over),
+        *made,
+        *rviz(context, namespace, simulated_time=not real_time),
+    ]
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Declare the arguments, then make the nodes."""
+    return LaunchDescription(
+        [
+            *declared(
+                ("protocol", "", "protocol file (YAML); empty: the paper's example"),
+                ("real_time", "false", "at the pace of the wall clock, not in lock-step"),
+                ("arm", "false", "let a real ankle robot deliver torque at once: see safety.md"),
+                ("bag", "", "folder of the bag; empty: bags/<time>_<name>"),
+                NAMESPACE,
+                PARAMETERS_FILE,
+                RVIZ,
+            ),
+            OpaqueFunction(function=nodes),
+        ]
+    )

@@ -1,0 +1,82 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Play a bag to the gait analyzer, at the pace of the record or as fast as it goes.
+
+The launch ends once the bag is played and the analyzer has published all that it makes of it.
+"""
+
+from pathlib import Path
+
+from launch import Action, LaunchContext, LaunchDescription
+from launch.actions import OpaqueFunction
+from launch.events import Shutdown
+from launch_ros.ros_adapters import get_ros_node
+from std_srvs.srv import Trigger
+
+from gait_entrainment_nodes.launch_nodes import (
+    PARAMETERS_FILE,
+    RVIZ,
+    declared,
+    ended_by,
+    full_namespace,
+    make_node,
+    rviz,
+    value,
+)
+from gait_entrainment_nodes.node_list import replay_parameters
+
+
+def nodes(context: LaunchContext) -> list[Action]:
+    """Make the nodes once the arguments are known: the bag says what they are given."""
+    chosen = value(context, "namespace")
+    namespace, given = replay_parameters(
+        Path(value(context, "bag")), full_namespace(context, chosen) if chosen else None
+    )
+    if value(context, "rate"):
+        given["bag_player"]["rate"] = float(value(context, "rate"))
+    made = [make_node(context, name, namespace or "/", given[name]) for name in given]
+    analyzer = get_ros_node(context).create_client(Trigger, f"{namespace}/gait_analyzer/finish")
+
+    def finish(context: LaunchContext) -> None:
+        """Let the analyzer publish its last word, then end the launch."""
+        over = Shutdown(reason="the bag is played and analyzed")
+        answer = analyzer.call_async(Trigger.Request())
+        answer.add_done_callback(
+            lambda _: context.asyncio_loop.call_soon_threadsafe(context.emit_event_sync, over)
+        )
+
+    return [
+        *ended_by(made, {"bag_player"}, [OpaqueFunction(function=finish)]),
+        *made,
+        *rviz(context, namespace or "/", simulated_time=True),
+    ]
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Declare the arguments, then make the nodes."""
+    return LaunchDescription(
+        [
+            *declared(
+                ("bag", None, "bag to play: a folder or an .mcap file"),
+                ("rate", "", "seconds of the bag per second; 0: as fast as it goes; empty: 1"),
+                ("namespace", "", "to play into; empty: the one that was recorded"),
+                PARAMETERS_FILE,
+                RVIZ,
+            ),
+            OpaqueFunction(function=nodes),
+        ]
+    )
