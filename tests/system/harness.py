@@ -124,7 +124,7 @@ class Probe:
         """Call a service and return its response."""
         client = self.node.create_client(kind, service)
         self.until(client.service_is_ready, service)
-        self.known_to(service.partition("/")[0])
+        self.known_to(service.rpartition("/")[0])
         future = client.call_async(request or kind.Request())
         self.until(future.done, f"an answer of {service}")
         return future.result()
@@ -189,17 +189,16 @@ def cpu_seconds(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-class EntrainRun:
-    """One ``entrain run`` as a process, with a look at the processes that it starts."""
+class Started:
+    """A command that starts nodes, as a process, with a look at the processes that it starts."""
 
-    def __init__(self, bag: Path, *options: str, **environment: str) -> None:
-        self.bag = bag
-        self.out = bag.with_name(bag.name + ".out")
-        with self.out.open("wb") as out:
+    def __init__(self, command: Sequence[str], out: Path, **environment: str) -> None:
+        self.out = out
+        with self.out.open("wb") as out_file:
             self.process = subprocess.Popen(
-                ["entrain", "run", "--out", str(bag), "--no-figures", *options],
+                command,
                 stdin=subprocess.DEVNULL,
-                stdout=out,
+                stdout=out_file,
                 stderr=subprocess.STDOUT,
                 env={**os.environ, **environment},
             )
@@ -224,15 +223,10 @@ class EntrainRun:
         """What it has printed so far."""
         return self.out.read_text(errors="replace")
 
-    def outcome(self) -> dict[str, Any]:
-        """Wait for its end, which must be a good one; return what ``--json`` printed."""
-        assert self.wait() == 0, self.text
-        return dict(json.loads(self.text.splitlines()[-1]))
-
-    def find_nodes(self) -> dict[str, int]:
+    def find_nodes(self, names: Sequence[str] = NODES) -> dict[str, int]:
         """Return the process ids of all its nodes, once they are there."""
         deadline = time.monotonic() + PATIENCE
-        while self.nodes.keys() != set(NODES):
+        while self.nodes.keys() != set(names):
             assert self.process.poll() is None, self.text
             assert time.monotonic() < deadline
             for folder in Path("/proc").glob("[0-9]*"):
@@ -245,9 +239,33 @@ class EntrainRun:
                     continue
                 for word in words[:2]:
                     name = word.decode().rpartition("/")[2]
-                    if name in NODES:
+                    if name in names:
                         self.nodes[name] = int(folder.name)
         return self.nodes
+
+    def survivors(self) -> list[int]:
+        """Return which of its processes are still there."""
+        return [pid for pid in (self.process.pid, *self.nodes.values()) if alive(pid)]
+
+    def end(self) -> None:
+        """Leave nothing behind, whatever the test found."""
+        for pid in self.survivors():
+            os.kill(pid, signal.SIGKILL)
+        self._watcher.join()
+
+
+class EntrainRun(Started):
+    """One ``entrain run``."""
+
+    def __init__(self, bag: Path, *options: str, **environment: str) -> None:
+        self.bag = bag
+        command = ["entrain", "run", "--out", str(bag), "--no-figures", *options]
+        super().__init__(command, bag.with_name(bag.name + ".out"), **environment)
+
+    def outcome(self) -> dict[str, Any]:
+        """Wait for its end, which must be a good one; return what ``--json`` printed."""
+        assert self.wait() == 0, self.text
+        return dict(json.loads(self.text.splitlines()[-1]))
 
     def domain(self) -> int:
         """Return its domain."""
@@ -267,16 +285,6 @@ class EntrainRun:
             )
         assert self.process.poll() is None, self.text
 
-    def survivors(self) -> list[int]:
-        """Return which of its processes are still there."""
-        return [pid for pid in (self.process.pid, *self.nodes.values()) if alive(pid)]
-
-    def end(self) -> None:
-        """Leave nothing behind, whatever the test found."""
-        for pid in self.survivors():
-            os.kill(pid, signal.SIGKILL)
-        self._watcher.join()
-
 
 @contextmanager
 def entrain_run(bag: Path, *options: str, **environment: str) -> Iterator[EntrainRun]:
@@ -294,9 +302,7 @@ class Session:
     def __init__(self, folder: Path, domain: int, options: Sequence[str], real_time: bool) -> None:
         self.bag = folder / "bag"
         self.protocol = protocol_of(*options)
-        node_parameters = parameters(
-            self.protocol, str(self.bag), "{}", real_time=real_time, sampling={}
-        )
+        node_parameters = parameters(self.protocol, str(self.bag), "{}", real_time=real_time)
         del node_parameters["bag_recorder"]["publishers"]  # it records until it is stopped
         file = folder / "parameters.yaml"
         file.write_text(

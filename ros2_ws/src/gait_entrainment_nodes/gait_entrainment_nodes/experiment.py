@@ -17,8 +17,8 @@ experiment: conducts a protocol over the running nodes.
 
 A protocol comes as a goal of ``~/run_protocol``, or as the parameter ``protocol``: then the node
 ends with it. It brings the participants together, starts the walker, and from then on answers
-every progress of the walker with a horizon. What to perturb and when is the core's Conductor; who is waited
-for, and for how long, is decided here.
+every progress of the walker with a horizon. What to perturb and when is the core's Conductor; who
+is waited for, and for how long, is decided here.
 """
 
 import contextlib

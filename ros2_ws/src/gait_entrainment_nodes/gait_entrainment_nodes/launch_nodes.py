@@ -15,6 +15,7 @@
 
 """What the launch files share: arguments, nodes in a namespace, and how a launch ends."""
 
+from pathlib import Path
 from typing import Any
 
 from launch import Action, LaunchContext
@@ -29,7 +30,7 @@ from launch_ros.utilities import make_namespace_absolute, prefix_namespace
 from gait_entrainment_nodes.environment import config_file
 from gait_entrainment_nodes.supervisor import PACKAGE
 
-# Arguments of a launch file: name, default, what --show-args tells. Without a default it is needed.
+# Argument of a launch file: name, default (None where it must be given), what --show-args tells.
 Argument = tuple[str, str | None, str]
 NAMESPACE: Argument = ("namespace", "", "of all nodes and topics, for several side by side")
 PARAMETERS_FILE: Argument = (
@@ -90,7 +91,14 @@ def make_node(
     kind: type[Node] = Node,
     **options: Any,
 ) -> Node:
-    """Return the action that runs a node; what is given wins over the file of parameters."""
+    """
+    Return the action that runs a node; what is given wins over the file of parameters.
+
+    Raises LaunchError where that file is not there: launch_ros would go on without it.
+    """
+    file = value(context, "params_file")
+    if not Path(file).is_file():
+        raise LaunchError(f"params_file: {file}: no such file")
     # Text stays text, also where it reads like YAML, as a protocol does.
     typed = {
         key: ParameterValue(item, value_type=str) if isinstance(item, str) else item
@@ -101,7 +109,7 @@ def make_node(
         **{"package": PACKAGE, "executable": name, "output": "screen"} | options,
         name=name,
         namespace=namespace,
-        parameters=[value(context, "params_file"), typed],
+        parameters=[file, typed],
         remappings=[] if rooted else [(topic, topic[1:]) for topic in MOVED],
     )
 

@@ -179,8 +179,6 @@ def parameter_arguments(given: dict[str, dict[str, Any]], folder: Path) -> list[
     Returns the arguments by which a node loads config/nodes.yaml and then that file.
     """
     file = folder / "parameters.yaml"
-    file.write_text(
-        yaml.safe_dump({f"/**/{n}": {"ros__parameters": p} for n, p in given.items()})
-    )
+    file.write_text(yaml.safe_dump({f"/**/{n}": {"ros__parameters": p} for n, p in given.items()}))
     files = (config_file("nodes.yaml"), file)
     return ["--ros-args", *(word for f in files for word in ("--params-file", str(f)))]

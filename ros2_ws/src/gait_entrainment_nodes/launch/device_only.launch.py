@@ -55,8 +55,8 @@ def nodes(context: LaunchContext) -> list[Action]:
     analyzer = make_node(context, "gait_analyzer", namespace, {"side": side})
 
     def change(transition: int) -> EmitEvent:
-        to_it = matches_action(perturbator)
-        return EmitEvent(event=ChangeState(to_it, transition_id=transition))
+        this = matches_action(perturbator)
+        return EmitEvent(event=ChangeState(lifecycle_node_matcher=this, transition_id=transition))
 
     def go_on(context: LaunchContext) -> list[Action]:
         start, goal = context.locals.event.start_state, context.locals.event.goal_state
@@ -85,7 +85,11 @@ def generate_launch_description() -> LaunchDescription:
     return LaunchDescription(
         [
             *declared(
-                ("driver", None, "ankle robot: NAME or NAME:OPTION=VALUE,...; entrain driver list"),
+                (
+                    "driver",
+                    None,
+                    "ankle robot: NAME or NAME:OPTION=VALUE,... (entrain driver list)",
+                ),
                 ("side", "right", "ankle on which the robot sits: left or right"),
                 ("arm", "false", "let a real ankle robot deliver torque at once: see safety.md"),
                 NAMESPACE,

@@ -59,8 +59,8 @@ def nodes(context: LaunchContext) -> list[Action]:
     over = [EmitEvent(event=Shutdown(reason="the experiment is over and recorded"))]
     return [
         *ended_by(made, {"experiment", "bag_recorder"}, over),
-        *made,
         *rviz(context, namespace, simulated_time=not real_time),
+        *made,
     ]
 
 

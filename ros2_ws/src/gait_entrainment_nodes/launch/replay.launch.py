@@ -61,8 +61,8 @@ def nodes(context: LaunchContext) -> list[Action]:
 
     return [
         *ended_by(made, {"bag_player"}, [OpaqueFunction(function=finish)]),
-        *made,
         *rviz(context, namespace or "/", simulated_time=True),
+        *made,
     ]
 
 

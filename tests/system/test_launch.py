@@ -1,0 +1,269 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The launch files with the real launch: exit codes, namespaces, remapping, replay, a device."""
+
+import json
+import os
+import signal
+import sys
+import textwrap
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from ament_index_python.packages import get_package_share_directory
+from harness import Started, alive, probe, stamp_of
+from lifecycle_msgs.msg import State
+from lifecycle_msgs.srv import GetState
+from std_srvs.srv import Trigger
+
+from gait_entrainment.bags import BagReader
+from gait_entrainment.protocol import read_protocol
+from gait_entrainment.report.recorded_run import read_run
+from gait_entrainment.simulation import simulate
+from gait_entrainment_nodes.domain import claimed_domain
+from gait_entrainment_nodes.topics import GAIT_EVENTS, STRIDES, Topic
+
+pytest.importorskip("ros2launch.api", reason="needs launch, launch_ros and ros2launch")
+
+FILES = Path(get_package_share_directory("gait_entrainment_nodes")) / "launch"
+BAG = Path(__file__).parents[2] / "bags" / "paper_example"
+# What `ros2 launch` does with a file and arguments.
+ROS2_LAUNCH = (
+    "import sys; from ros2launch.api import launch_a_launch_file as go;"
+    "sys.exit(go(launch_file_path=sys.argv[1], launch_file_arguments=sys.argv[2:]))"
+)
+
+
+class Launch(Started):
+    """One ``ros2 launch`` as a process."""
+
+    def __init__(self, file: Path, out: Path, domain: int, *arguments: str) -> None:
+        command = [sys.executable, "-c", ROS2_LAUNCH, str(file), *arguments]
+        logs = str(out.with_suffix(".logs"))
+        super().__init__(command, out, ROS_DOMAIN_ID=str(domain), ROS_LOG_DIR=logs)
+
+
+@contextmanager
+def launched(file, out, domain, *arguments):
+    """Start a launch file, and see that nothing of it stays."""
+    launch = Launch(FILES / file, out, domain, *arguments)
+    try:
+        yield launch
+    finally:
+        launch.end()
+
+
+def short_protocol(folder, name, pulses):
+    file = folder / f"{name}.yaml"
+    file.write_text(f"{{name: {name}, baseline: 4, pulses: {{count: {pulses}}}, washout: 2}}")
+    return file
+
+
+def recorded_events(bag):
+    """Return the topics of a bag, and its events as instants since the start."""
+    with BagReader(bag) as reader:
+        topic = next(name for name in reader.topics if name.endswith("/gait_events"))
+        events = [message for _, message in reader.decoded([topic])]
+        simulation = simulate(read_protocol(reader.custom_data["protocol"]))
+        simulated = [(e.stamp, int(e.kind), int(e.side), e.step) for e in simulation.events]
+        topics = set(reader.topics)
+    start = stamp_of(events[0].header)
+    recorded = [(stamp_of(e.header) - start, e.kind, e.side, e.step) for e in events]
+    return topics, recorded, simulated
+
+
+@pytest.mark.parametrize("name", ["experiment", "replay", "device_only"])
+def test_every_argument_is_documented(name):
+    from launch import LaunchContext
+    from launch.launch_description_sources import PythonLaunchDescriptionSource
+
+    source = PythonLaunchDescriptionSource(str(FILES / f"{name}.launch.py"))
+    arguments = source.get_launch_description(LaunchContext()).get_launch_arguments()
+    assert {"namespace", "params_file"} <= {argument.name for argument in arguments}
+    for argument in arguments:
+        assert argument.description not in ("", "no description given")
+
+
+def test_experiment_ends_the_launch_with_success(tmp_path):
+    file, bag = short_protocol(tmp_path, "alone", 6), tmp_path / "bag"
+    with (
+        claimed_domain() as domain,
+        launched(
+            "experiment.launch.py", tmp_path / "out", domain, f"protocol:={file}", f"bag:={bag}"
+        ) as launch,
+    ):
+        launch.find_nodes()
+        assert launch.wait() == 0, launch.text
+        assert launch.survivors() == []
+    topics, recorded, simulated = recorded_events(bag)
+    assert recorded == simulated
+    assert {"/clock", "/joint_states", "/gait/strides", "/rosout"} <= topics
+    run = read_run(bag)
+    assert (run.lost, run.differences) == (0, ())
+
+
+def test_two_experiments_run_side_by_side(tmp_path):
+    bags = {name: tmp_path / name for name in ("left", "right")}
+    protocols = {
+        name: short_protocol(tmp_path, name, n) for name, n in (("left", 5), ("right", 7))
+    }
+    # One of them is included by a launch file of somebody else, who pushes a namespace and remaps.
+    other = tmp_path / "other.launch.py"
+    other.write_text(
+        textwrap.dedent(
+            f"""
+            from launch import LaunchDescription
+            from launch.actions import GroupAction, IncludeLaunchDescription
+            from launch_ros.actions import PushRosNamespace, SetRemap
+
+            def generate_launch_description():
+                arguments = {{"protocol": "{protocols["right"]}", "bag": "{bags["right"]}"}}
+                file = "{FILES / "experiment.launch.py"}"
+                return LaunchDescription([GroupAction([
+                    PushRosNamespace("laboratory"),
+                    SetRemap("joint_states", "robot/joint_states"),
+                    IncludeLaunchDescription(file, launch_arguments=arguments.items()),
+                ])])
+            """
+        )
+    )
+    alone = ["namespace:=a/left", f"protocol:={protocols['left']}", f"bag:={bags['left']}"]
+    with (
+        claimed_domain() as domain,
+        launched("experiment.launch.py", tmp_path / "l", domain, *alone) as first,
+        launched(other, tmp_path / "r", domain) as second,
+    ):
+        assert first.wait() == 0, first.text
+        assert second.wait() == 0, second.text
+    for name, namespace, pulses in (("left", "/a/left", 5), ("right", "/laboratory", 7)):
+        topics, recorded, simulated = recorded_events(bags[name])
+        assert recorded == simulated
+        assert {topic for topic in topics if not topic.startswith(f"{namespace}/")} == set()
+        assert {f"{namespace}/clock", f"{namespace}/diagnostics"} <= topics
+        with BagReader(bags[name]) as reader:
+            assert reader.counts[f"{namespace}/gait/pulse_phases"] == pulses
+    assert "/laboratory/robot/joint_states" in topics
+    assert "/laboratory/joint_states" not in topics
+
+
+@pytest.mark.parametrize("node", ["gait_analyzer", "experiment"])
+def test_death_of_a_node_fails_the_launch_and_ends_everything(node, tmp_path):
+    bag = tmp_path / "bag"
+    with (
+        claimed_domain() as domain,
+        launched(
+            "experiment.launch.py", tmp_path / "out", domain, f"bag:={bag}", "real_time:=true"
+        ) as launch,
+        probe(domain) as listener,
+    ):
+        strides = listener.listen(STRIDES)
+        launch.find_nodes()
+        listener.until(lambda: strides or not alive(launch.process.pid), "strides")
+        os.kill(launch.nodes[node], signal.SIGKILL)
+        assert launch.wait() == 1, launch.text
+        assert f"{node} ended with exit code -9" in launch.text
+        assert launch.survivors() == []
+    with BagReader(bag) as reader:
+        assert reader.counts["/gait/strides"] >= 1
+
+
+def test_experiment_that_fails_fails_the_launch(tmp_path):
+    file = tmp_path / "fall.yaml"
+    file.write_text("{baseline: 2, pulses: {count: 20, torque: -30, width: 0.4, period: 0.9}}")
+    bag = tmp_path / "bag"
+    with (
+        claimed_domain() as domain,
+        launched(
+            "experiment.launch.py", tmp_path / "out", domain, f"protocol:={file}", f"bag:={bag}"
+        ) as launch,
+    ):
+        launch.find_nodes()
+        assert launch.wait() == 1, launch.text
+        assert "The walker fell" in launch.text
+        assert launch.survivors() == []
+    assert read_run(bag).lost == 0
+
+
+def test_replay_ends_once_everything_is_played_and_analyzed(tmp_path):
+    paused = tmp_path / "paused.yaml"
+    paused.write_text("/**/bag_player: {ros__parameters: {start_paused: true, rate: 0.0}}")
+    with (
+        claimed_domain() as domain,
+        probe(domain) as listener,
+        launched(
+            "replay.launch.py",
+            tmp_path / "out",
+            domain,
+            f"bag:={BAG}",
+            f"params_file:={paused}",
+            "namespace:=again",
+        ) as launch,
+    ):
+        heard = listener.listen(Topic("again/gait/strides", STRIDES.type, STRIDES.qos))
+
+        def matched():
+            answer = listener.call(Trigger, "again/gait_analyzer/ready").message
+            return answer.startswith("{") and json.loads(answer)["/again/gait/strides"] == 1
+
+        listener.until(matched, "a match with the analyzer")
+        assert listener.call(Trigger, "again/bag_player/resume").success
+        listener.until(lambda: not alive(launch.process.pid), "the end")
+        assert launch.wait() == 0, launch.text
+    with BagReader(BAG) as reader:
+        recorded = [message.period for _, message in reader.decoded(["/gait/strides"])]
+    assert [stride.period for stride in heard] == recorded
+
+
+def test_device_is_brought_up_and_its_end_ends_the_launch(tmp_path):
+    with (
+        claimed_domain() as domain,
+        launched(
+            "device_only.launch.py", tmp_path / "out", domain, "driver:=emulated", "side:=left"
+        ) as launch,
+        probe(domain) as listener,
+    ):
+        launch.find_nodes(("perturbator", "gait_analyzer"))
+
+        def state():
+            return listener.call(GetState, "perturbator/get_state").current_state.id
+
+        listener.until(lambda: state() == State.PRIMARY_STATE_ACTIVE, "activation")
+        strides = listener.listen(STRIDES)
+        kind, name, qos = GAIT_EVENTS.type, GAIT_EVENTS.name, GAIT_EVENTS.qos
+        events = listener.node.create_publisher(kind, name, qos)
+        listener.known_to("gait_analyzer")
+        listener.until(events.get_subscription_count, "the analyzer")
+        for step in range(5):
+            event = kind(run=1, kind=0, side=(1 + step) % 2, step=step, source="sensor")
+            event.header.stamp.sec = step + 1
+            events.publish(event)
+        listener.until(lambda: strides, "strides")
+        assert strides[0].period == 2.0
+        launch.process.send_signal(signal.SIGINT)
+        assert launch.wait() == 0, launch.text
+        assert launch.survivors() == []
+
+
+def test_device_that_cannot_be_configured_fails_the_launch(tmp_path):
+    with (
+        claimed_domain() as domain,
+        launched("device_only.launch.py", tmp_path / "out", domain, "driver:=nosuch") as launch,
+    ):
+        launch.find_nodes(("perturbator", "gait_analyzer"))
+        assert launch.wait() == 1, launch.text
+        assert "'nosuch' is unknown" in launch.text
+        assert launch.survivors() == []
