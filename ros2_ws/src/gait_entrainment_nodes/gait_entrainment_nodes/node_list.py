@@ -63,7 +63,6 @@ def parameters(
     *,
     real_time: bool,
     armed: bool = False,
-    record_required: bool = False,
 ) -> dict[str, dict[str, Any]]:
     """
     Return the parameters of every node for one run, by node name.
@@ -80,8 +79,6 @@ def parameters(
         Real time instead of lock-step.
     armed
         Whether a real robot may deliver torque without another word.
-    record_required
-        Whether the run ends where nothing more can be recorded.
 
     """
     side = protocol.side.name.lower()
@@ -108,7 +105,6 @@ def parameters(
         "experiment": experiment,
         "bag_recorder": {
             "output": bag,
-            "required": record_required,
             "publishers": list(PUBLISHERS),
             "custom_data": custom_data,
         },

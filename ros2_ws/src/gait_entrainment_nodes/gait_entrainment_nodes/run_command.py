@@ -190,10 +190,11 @@ def conduct(protocol: Protocol, bag: Path, domain: int, options: argparse.Namesp
         json.dumps(provenance(protocol, real_time=options.real_time)),
         real_time=options.real_time,
         armed=options.arm,
-        record_required=options.require_record,
     )
     if options.sample_rate is not None:
         node_parameters["walker_sim"]["sample_rate"] = options.sample_rate
+    if options.require_record:
+        node_parameters["bag_recorder"]["required"] = True
     if options.no_ground_reaction:
         node_parameters["walker_sim"]["ground_reaction"] = False
     with tempfile.TemporaryDirectory(prefix="entrain_") as folder:

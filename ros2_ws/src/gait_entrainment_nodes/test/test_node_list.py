@@ -109,7 +109,6 @@ def test_parameters_are_given_to_every_node(real_time):
     sides = {given["perturbator"]["side"], given["gait_analyzer"]["side"]}
     assert sides == {"right"} == {walker["first_heel_strike"]}
     assert given["bag_recorder"]["publishers"] == list(PUBLISHERS)
-    assert given["bag_recorder"]["required"] is False
     assert "experiment" not in given["experiment"]["participants"]
 
 
