@@ -20,7 +20,7 @@ import shutil
 import subprocess
 
 import pytest
-from harness import LONG, PATIENCE, QUICK, entrain_run
+from harness import LONG, PATIENCE, QUICK, entrain_run, probe
 
 from gait_entrainment.bags import BagReader
 from gait_entrainment_nodes.domain import claimed_domain
@@ -217,6 +217,31 @@ def test_node_refuses_a_wrong_parameter_in_one_line(node, arguments, named, tmp_
     assert_one_line(done.stderr, named)
     assert done.stderr.startswith(f"{node}: ")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_second_experiment_in_a_domain_is_refused():
+    with claimed_domain() as domain, probe(domain) as listener:
+        environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
+        analyzers = [subprocess.Popen(["gait_analyzer"], env=environment) for _ in range(2)]
+        try:
+            names = listener.node.get_node_names
+            listener.until(lambda: names().count("gait_analyzer") == 2, "the analyzers")
+            protocol = r'protocol:="baseline: 4\n"'
+            words = ["participants:=[gait_analyzer]", "ready_timeout:=3.0", protocol]
+            done = subprocess.run(
+                ["experiment", "--ros-args", *(w for word in words for w in ("-p", word))],
+                env=environment,
+                capture_output=True,
+                text=True,
+                timeout=PATIENCE,
+                check=False,
+            )
+        finally:
+            for analyzer in analyzers:
+                analyzer.terminate()
+                analyzer.wait()
+    assert done.returncode == 1
+    assert "there are two gait_analyzer in /: another experiment runs here" in done.stderr
 
 
 def test_arguments_that_ros_cannot_read_are_refused(tmp_path):
