@@ -15,6 +15,8 @@
 
 """What the launch files share: arguments, nodes in a namespace, and how a launch ends."""
 
+import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +43,10 @@ PARAMETERS_FILE: Argument = (
 RVIZ: Argument = ("rviz", "false", "show the walker in RViz: true or false")
 # Names of the root that are moved into a namespace: each experiment keeps its own time.
 MOVED = ("/clock", "/diagnostics", "/tf", "/tf_static")
+
+
+# How often a service is asked again [s].
+ASKING_PERIOD = 0.25
 
 
 class LaunchError(Exception):
@@ -88,7 +94,6 @@ def make_node(
     name: str,
     namespace: str,
     given: dict[str, Any],
-    kind: type[Node] = Node,
     **options: Any,
 ) -> Node:
     """
@@ -105,7 +110,7 @@ def make_node(
         for key, item in given.items()
     }
     rooted = full_namespace(context, namespace) == "/"
-    return kind(
+    return Node(
         **{"package": PACKAGE, "executable": name, "output": "screen"} | options,
         name=name,
         namespace=namespace,
@@ -130,6 +135,29 @@ def rviz(context: LaunchContext, namespace: str, *, simulated_time: bool) -> lis
             arguments=["-d", str(picture)],
         )
     ]
+
+
+def in_background(context: LaunchContext, work: Callable[[], None]) -> None:
+    """Do work in a thread; an exception in it ends the launch with exit code 1."""
+    context.add_completion_future(context.asyncio_loop.run_in_executor(None, work))
+
+
+def answer_of(context: LaunchContext, client: Any, request: Any, *, again: bool) -> Any:
+    """
+    Wait for the answer of a service; None where the launch ends before it comes.
+
+    ``again``: ask again and again, since an answer is lost where the node does not know the client
+    yet. Whoever has answered once knows all clients that were made before that one.
+    """
+    answered: threading.Event | None = None
+    while not context.is_shutdown:
+        if answered is None or again:
+            answered = threading.Event()
+            future = client.call_async(request)
+            future.add_done_callback(lambda _, answered=answered: answered.set())
+        if answered.wait(ASKING_PERIOD):
+            return future.result()
+    return None
 
 
 def ended_by(nodes: list[Node], last: set[str], over: list[Action]) -> list[Action]:

@@ -21,63 +21,61 @@ promised by `experiment/horizon`, see docs/launch.md. The launch file brings the
 and ends with exit code 1 where that fails or one of the nodes ends.
 """
 
+from functools import partial
+from typing import Any
+
 from launch import Action, LaunchContext, LaunchDescription
-from launch.actions import EmitEvent, OpaqueFunction, RegisterEventHandler
-from launch.event_handlers import OnProcessStart
-from launch.events import matches_action
-from launch_ros.actions import LifecycleNode
-from launch_ros.event_handlers import OnStateTransition
-from launch_ros.events.lifecycle import ChangeState
+from launch.actions import OpaqueFunction
+from launch_ros.ros_adapters import get_ros_node
 from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
 
 from gait_entrainment_nodes.launch_nodes import (
     NAMESPACE,
     PARAMETERS_FILE,
     LaunchError,
+    answer_of,
     declared,
     ended_by,
+    full_namespace,
+    in_background,
     is_true,
     make_node,
     value,
 )
 
+TRANSITIONS = {
+    "be configured": Transition.TRANSITION_CONFIGURE,
+    "be activated": Transition.TRANSITION_ACTIVATE,
+}
+
 
 def nodes(context: LaunchContext) -> list[Action]:
-    """Make the nodes, and what brings the perturbator up."""
+    """Make the nodes, and bring the perturbator up meanwhile."""
     namespace, side = value(context, "namespace"), value(context, "side")
-    perturbator = make_node(
-        context,
-        "perturbator",
-        namespace,
-        {"side": side, "driver": value(context, "driver"), "armed": is_true(context, "arm")},
-        LifecycleNode,
-    )
-    analyzer = make_node(context, "gait_analyzer", namespace, {"side": side})
-
-    def change(transition: int) -> EmitEvent:
-        this = matches_action(perturbator)
-        return EmitEvent(event=ChangeState(lifecycle_node_matcher=this, transition_id=transition))
-
-    def go_on(context: LaunchContext) -> list[Action]:
-        start, goal = context.locals.event.start_state, context.locals.event.goal_state
-        if (start, goal) == ("configuring", "inactive"):
-            return [change(Transition.TRANSITION_ACTIVATE)]
-        if start in ("configuring", "activating") and goal != "active":
-            raise LaunchError(f"perturbator is {goal} again, not active; its log says why")
-        return []
-
-    configure = [change(Transition.TRANSITION_CONFIGURE)]
-    return [
-        *ended_by([perturbator, analyzer], set(), []),
-        RegisterEventHandler(OnProcessStart(target_action=perturbator, on_start=configure)),
-        RegisterEventHandler(
-            OnStateTransition(
-                target_lifecycle_node=perturbator, entities=[OpaqueFunction(function=go_on)]
-            )
-        ),
-        perturbator,
-        analyzer,
+    given = {"side": side, "driver": value(context, "driver"), "armed": is_true(context, "arm")}
+    made = [
+        make_node(context, "perturbator", namespace, given),
+        make_node(context, "gait_analyzer", namespace, {"side": side}),
     ]
+    perturbator = f"{full_namespace(context, namespace).rstrip('/')}/perturbator"
+    node = get_ros_node(context)
+    change = node.create_client(ChangeState, f"{perturbator}/change_state")
+    state = node.create_client(GetState, f"{perturbator}/get_state")
+    in_background(context, partial(bring_up, context, change, state))
+    return [*ended_by(made, set(), []), *made]
+
+
+def bring_up(context: LaunchContext, change: Any, state: Any) -> None:
+    """Configure and activate the perturbator; LaunchError where it refuses."""
+    answer_of(context, state, GetState.Request(), again=True)
+    for name, number in TRANSITIONS.items():
+        request = ChangeState.Request(transition=Transition(id=number))
+        answer = answer_of(context, change, request, again=False)
+        if answer is None:
+            return
+        if not answer.success:
+            raise LaunchError(f"perturbator refused to {name}; its log says why")
 
 
 def generate_launch_description() -> LaunchDescription:

@@ -30,9 +30,11 @@ from std_srvs.srv import Trigger
 from gait_entrainment_nodes.launch_nodes import (
     PARAMETERS_FILE,
     RVIZ,
+    answer_of,
     declared,
     ended_by,
     full_namespace,
+    in_background,
     make_node,
     rviz,
     value,
@@ -51,16 +53,16 @@ def nodes(context: LaunchContext) -> list[Action]:
     made = [make_node(context, name, namespace or "/", given[name]) for name in given]
     analyzer = get_ros_node(context).create_client(Trigger, f"{namespace}/gait_analyzer/finish")
 
-    def finish(context: LaunchContext) -> None:
+    def finish() -> None:
         """Let the analyzer publish its last word, then end the launch."""
         over = Shutdown(reason="the bag is played and analyzed")
-        answer = analyzer.call_async(Trigger.Request())
-        answer.add_done_callback(
-            lambda _: context.asyncio_loop.call_soon_threadsafe(context.emit_event_sync, over)
-        )
+        if answer_of(context, analyzer, Trigger.Request(), again=True):
+            context.asyncio_loop.call_soon_threadsafe(context.emit_event_sync, over)
+
+    last_word = OpaqueFunction(function=in_background, args=[finish])
 
     return [
-        *ended_by(made, {"bag_player"}, [OpaqueFunction(function=finish)]),
+        *ended_by(made, {"bag_player"}, [last_word]),
         *rviz(context, namespace or "/", simulated_time=True),
         *made,
     ]
