@@ -181,7 +181,7 @@ def test_death_of_a_node_fails_the_launch_and_ends_everything(node, tmp_path):
         assert f"{node} ended with exit code -9" in launch.text
         assert launch.survivors() == []
     with BagReader(bag) as reader:
-        assert reader.counts["/gait/strides"] >= 1
+        assert sum(1 for _ in reader.messages()) == reader.message_count > 100
 
 
 def test_experiment_that_fails_fails_the_launch(tmp_path):
