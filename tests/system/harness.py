@@ -35,7 +35,8 @@ from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from gait_entrainment.bags import BagReader
-from gait_entrainment.protocol import Protocol, write_protocol
+from gait_entrainment.protocol import Protocol, read_protocol, write_protocol
+from gait_entrainment.simulation import simulate
 from gait_entrainment_msgs.action import RunProtocol
 from gait_entrainment_nodes.domain import claimed_domain
 from gait_entrainment_nodes.node_list import NODES, STOP_ORDER, parameters
@@ -87,6 +88,21 @@ def payloads(bag: Path, topics: Sequence[str]) -> dict[str, list[tuple[int, byte
         for message in reader.messages([t for t in topics if t in reader.topics]):
             found[message.topic].append((message.log_time, message.data))
         return found
+
+
+def events_since_start(bag: Path) -> list[tuple[int, int, int, int]]:
+    """Return instant, kind, side and step of every recorded gait event."""
+    with BagReader(bag) as reader:
+        events = [message for _, message in reader.decoded(["/gait_events"])]
+    start = stamp_of(events[0].header)
+    return [(stamp_of(e.header) - start, e.kind, e.side, e.step) for e in events]
+
+
+def simulated_events(bag: Path) -> list[tuple[int, int, int, int]]:
+    """Return what ``events_since_start`` should, as one process computes it."""
+    with BagReader(bag) as reader:
+        simulation = simulate(read_protocol(reader.custom_data["protocol"]))
+    return [(e.stamp, int(e.kind), int(e.side), e.step) for e in simulation.events]
 
 
 class Probe:

@@ -22,12 +22,17 @@ import sys
 import time
 
 import pytest
-from harness import PROMISED_TOPICS, entrain_run, payloads, stamp_of
+from harness import (
+    PROMISED_TOPICS,
+    entrain_run,
+    events_since_start,
+    payloads,
+    simulated_events,
+    stamp_of,
+)
 
 from gait_entrainment.bags import BagReader, check
-from gait_entrainment.protocol import read_protocol
 from gait_entrainment.report.recorded_run import read_run
-from gait_entrainment.simulation import simulate
 
 # Pulses later than the strides: the last of them are on, or still to come, when the run ends.
 UNFINISHED = ("--side=left", "--period-offset=0.04", "--washout=0", "--initial-phase=0.9")
@@ -39,20 +44,6 @@ def paper_example(tmp_path_factory):
     bag = tmp_path_factory.mktemp("lock_step") / "undisturbed"
     with entrain_run(bag, "--json") as run:
         return bag, run.outcome()
-
-
-def events_since_start(bag):
-    """Return instant, kind, side and step of every recorded gait event."""
-    with BagReader(bag) as reader:
-        events = [message for _, message in reader.decoded(["/gait_events"])]
-    start = stamp_of(events[0].header)
-    return [(stamp_of(e.header) - start, e.kind, e.side, e.step) for e in events]
-
-
-def simulated_events(bag):
-    with BagReader(bag) as reader:
-        simulation = simulate(read_protocol(reader.custom_data["protocol"]))
-    return [(e.stamp, int(e.kind), int(e.side), e.step) for e in simulation.events]
 
 
 def test_events_are_those_of_the_simulation_to_the_nanosecond(paper_example):

@@ -46,6 +46,8 @@ setup(
         "console_scripts": [f"{node} = {NAME}.{node}:main" for node in NODES],
         "gait_entrainment.commands": [
             f"run = {NAME}.run_command:add_command",
+            f"node = {NAME}.node_command:add_command",
+            f"ready = {NAME}.ready_command:add_command",
             f"replay = {NAME}.replay_command:add_command",
             f"stop = {NAME}.stop_command:add_command",
         ],

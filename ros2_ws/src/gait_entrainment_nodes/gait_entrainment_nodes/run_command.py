@@ -33,6 +33,7 @@ from gait_entrainment_nodes.domain import DomainError, claimed_domain
 from gait_entrainment_nodes.environment import set_environment
 from gait_entrainment_nodes.node_list import (
     NODES,
+    REAL_TIME_LOOKAHEAD,
     STOP_ORDER,
     bag_folder,
     parameter_arguments,
@@ -46,7 +47,13 @@ _EXAMPLES = """examples:
   entrain run --real-time              the same at the pace of the wall clock
   entrain run my_protocol.yaml --out bags/mine
   ROS_DOMAIN_ID=42 entrain run         in a domain of your choice, to listen with other tools
+  ROS_DOMAIN_ID=42 entrain run --elsewhere walker_sim     it runs on another host: docs/hosts.md
 """
+# Nodes that may run on another host. Not those that hold the torque and the record: Ctrl-C must
+# reach them without a network.
+DETACHABLE = ("walker_sim", "gait_analyzer")
+# What the walker counts of the promises that reached it, under these names in its diagnostics.
+PROMISE_KEYS = ("late_stretches", "late_ms", "starved_stretches", "starved_ms")
 # After the experiment has ended, the recorder has this long to close the bag [s].
 CLOSING_TIMEOUT = 15.0
 
@@ -64,9 +71,30 @@ def add_command(commands: Any) -> None:
         epilog=_EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    add_run_options(parser)
+    parser.add_argument(
+        "--elsewhere",
+        action="append",
+        choices=DETACHABLE,
+        default=[],
+        help="do not start this node: it runs on another host (entrain node); repeatable",
+    )
+    parser.add_argument("--no-figures", action="store_true", help="draw no figures")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.set_defaults(run=run)
+
+
+def add_run_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options from which the parameters of the nodes follow."""
     add_protocol_options(parser)
     parser.add_argument(
         "--real-time", action="store_true", help="at the pace of the wall clock, not in lock-step"
+    )
+    parser.add_argument(
+        "--lead-time",
+        type=float,
+        help="real time: how far promised torque leads, 0.05 to 10 s (default "
+        f"{REAL_TIME_LOOKAHEAD:g}); more for a slow network",
     )
     parser.add_argument(
         "--arm", action="store_true", help="let a real ankle robot deliver torque (docs/safety.md)"
@@ -85,19 +113,15 @@ def add_command(commands: Any) -> None:
     parser.add_argument(
         "--no-ground-reaction", action="store_true", help="leave out the ground reaction forces"
     )
-    parser.add_argument("--no-figures", action="store_true", help="draw no figures")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run one experiment; 1 where it failed, 2 for a protocol or an option that is wrong."""
     try:
-        protocol = chosen_protocol(options)
+        protocol = checked_protocol(options)
         check_driver(protocol.driver, options)
-        DeviceLimits().check_pulse(protocol.pulse_torque, protocol.pulses.width)
-        if options.sample_rate is not None and not 0 <= options.sample_rate <= 1000:
-            raise ProtocolError(f"--sample-rate: {options.sample_rate:g}; allowed: 0 to 1000 Hz")
+        if options.elsewhere and "ROS_DOMAIN_ID" not in os.environ:
+            raise ProtocolError("--elsewhere: set ROS_DOMAIN_ID, to the same number on every host")
         bag = options.out or bag_folder(protocol)
         check_output(bag)
     except (ProtocolError, LimitError, DeviceError) as error:
@@ -114,6 +138,25 @@ def run(options: argparse.Namespace) -> int:
     except (RunError, DomainError, BagError) as error:
         print(f"entrain run: {error}", file=sys.stderr)
     return 1
+
+
+def checked_protocol(options: argparse.Namespace) -> Protocol:
+    """
+    Return the protocol that the options name, once it and they are seen to be right.
+
+    Raises
+    ------
+    ProtocolError, LimitError
+        One line: field or option, what is allowed.
+
+    """
+    protocol = chosen_protocol(options)
+    DeviceLimits().check_pulse(protocol.pulse_torque, protocol.pulses.width)
+    if options.sample_rate is not None and not 0 <= options.sample_rate <= 1000:
+        raise ProtocolError(f"--sample-rate: {options.sample_rate:g}; allowed: 0 to 1000 Hz")
+    if options.lead_time is not None and not 0.05 <= options.lead_time <= 10:
+        raise ProtocolError(f"--lead-time: {options.lead_time:g}; allowed: 0.05 to 10 s")
+    return protocol
 
 
 def check_driver(text: str, options: argparse.Namespace) -> None:
@@ -177,14 +220,11 @@ def kept(bag: Path) -> str:
     return f"; the bag of the run so far is {bag}"
 
 
-def conduct(protocol: Protocol, bag: Path, domain: int, options: argparse.Namespace) -> None:
-    """Start the nodes, conduct the protocol, stop the nodes."""
-    # Imported here, so that a mistake in the protocol is answered without waiting for rclpy.
-    from gait_entrainment_nodes.run_client import RunClient
-
-    environment = set_environment(domain)
-    text = write_protocol(protocol)
-    node_parameters = parameters(
+def chosen_parameters(
+    protocol: Protocol, bag: Path, options: argparse.Namespace
+) -> dict[str, dict[str, Any]]:
+    """Return the parameters of every node, by its name, as the options ask for them."""
+    chosen = parameters(
         protocol,
         str(bag.absolute()),
         json.dumps(provenance(protocol, real_time=options.real_time)),
@@ -192,16 +232,29 @@ def conduct(protocol: Protocol, bag: Path, domain: int, options: argparse.Namesp
         armed=options.arm,
     )
     if options.sample_rate is not None:
-        node_parameters["walker_sim"]["sample_rate"] = options.sample_rate
+        chosen["walker_sim"]["sample_rate"] = options.sample_rate
     if options.require_record:
-        node_parameters["bag_recorder"]["required"] = True
+        chosen["bag_recorder"]["required"] = True
     if options.no_ground_reaction:
-        node_parameters["walker_sim"]["ground_reaction"] = False
+        chosen["walker_sim"]["ground_reaction"] = False
+    if options.real_time and options.lead_time is not None:
+        chosen["experiment"]["longest_lookahead"] = options.lead_time
+    return chosen
+
+
+def conduct(protocol: Protocol, bag: Path, domain: int, options: argparse.Namespace) -> None:
+    """Start the nodes, conduct the protocol, stop the nodes."""
+    # Imported here, so that a mistake in the protocol is answered without waiting for rclpy.
+    from gait_entrainment_nodes.run_client import RunClient
+
+    environment = set_environment(domain)
+    text = write_protocol(protocol)
+    node_parameters = chosen_parameters(protocol, bag, options)
     with tempfile.TemporaryDirectory(prefix="entrain_") as folder:
         arguments = parameter_arguments(node_parameters, Path(folder))
         supervisor = Supervisor(Path(folder), environment)
         try:
-            for node in NODES:
+            for node in sorted(set(NODES) - set(options.elsewhere), key=NODES.index):
                 supervisor.start(node, arguments)
             client = RunClient(supervisor, protocol, quiet=options.json)
             try:
@@ -218,19 +271,18 @@ def conduct(protocol: Protocol, bag: Path, domain: int, options: argparse.Namesp
     (bag / "protocol.yaml").write_text(text)
 
 
-def publish_lateness(bag: Path) -> dict[str, float]:
-    """Return how late the walker's samples were [ms] as its last diagnostics say, if they do."""
+def walker_timing(bag: Path) -> dict[str, float]:
+    """Return what the walker's last diagnostics say of its timing, by key; may be empty."""
     from gait_entrainment_nodes.topics import DIAGNOSTICS
 
-    lateness = {}
+    timing: dict[str, float] = {}
     with BagReader(bag) as reader:
         topics = [name for name in reader.topics if name.endswith(DIAGNOSTICS.name)]
         for _, message in reader.decoded(topics):
             for status in message.status:
-                for value in status.values:
-                    if value.key.startswith("publish_late_"):
-                        lateness[value.key.split("_")[2]] = float(value.value)
-    return lateness
+                if status.name == "walker_sim: run":
+                    timing = {value.key: float(value.value) for value in status.values}
+    return timing
 
 
 def report(bag: Path, options: argparse.Namespace) -> int:
@@ -259,9 +311,16 @@ def report(bag: Path, options: argparse.Namespace) -> int:
         "real_time_factor": None if math.isnan(factor) else factor,
         "pulse_timing": timing_outcome(recorded_timings(bag), recorded.measured_period),
     }
-    lateness = publish_lateness(bag)
+    timing = walker_timing(bag)
+    lateness = {
+        name: timing[f"publish_late_{name}_ms"]
+        for name in ("p50", "p99", "worst")
+        if f"publish_late_{name}_ms" in timing
+    }
     if lateness:
         outcome["publish_lateness_ms"] = lateness
+    if "late_stretches" in timing:
+        outcome["promises"] = {key: timing[key] for key in PROMISE_KEYS}
     figures = []
     if not options.no_figures:
         from gait_entrainment.report.figures import draw_figures
@@ -278,6 +337,12 @@ def report(bag: Path, options: argparse.Namespace) -> int:
         print(
             f"real time        samples published {lateness['p50']:.2f} ms after they were due"
             f" (median), {lateness['p99']:.2f} ms (99 %), {lateness['worst']:.2f} ms (worst)"
+        )
+    if timing.get("late_stretches") or timing.get("starved_stretches"):
+        print(
+            f"promises         of perturbator: {timing['late_stretches']:.0f} late by"
+            f" {timing['late_ms']:.1f} ms in all, {timing['starved_stretches']:.0f} stretches of"
+            f" {timing['starved_ms']:.1f} ms walked without torque: not reproducible"
         )
     left_out = f", {recorded.lost} lost"
     if recorded.ended_early:

@@ -123,6 +123,7 @@ class WalkerSim(Participant, Node):
         self.end_of_run: int | None = None  # end of the run [ns since its start], once known
         self.reproducible = True
         self.late = 0  # [ns] of promises that came after their instant
+        self.late_stretches = self.starved_stretches = 0  # how many there were of each
         self.lateness = Lateness()  # real time: of samples, from due to published
         self.next_progress = 0  # [ns since the start]
 
@@ -154,6 +155,7 @@ class WalkerSim(Participant, Node):
             self.start = LOCK_STEP_START * NANOSECONDS_PER_SECOND
         self.grant = self.acknowledged_grants = 0
         self.end_of_run, self.reproducible, self.late, self.next_progress = None, True, 0, 0
+        self.late_stretches = self.starved_stretches = 0
         self.lateness = Lateness()
         response.success, response.start = True, to_time(self.start)
         return response
@@ -194,6 +196,7 @@ class WalkerSim(Participant, Node):
                 return
         if late:
             self.late += late
+            self.late_stretches += 1
             self.reproducible = False
             self.diagnose(
                 self.start + run.reached,
@@ -253,6 +256,7 @@ class WalkerSim(Participant, Node):
         starved = run.starved
         self.send(run.advance(until, last=last))
         if run.starved > starved:
+            self.starved_stretches += 1
             self.reproducible = False
             self.diagnose(
                 self.start + run.reached,
@@ -346,7 +350,9 @@ class WalkerSim(Participant, Node):
                 stamp,
                 DiagnosticStatus.OK if self.reproducible else DiagnosticStatus.WARN,
                 message.message or "finished",
+                late_stretches=self.late_stretches,
                 late_ms=self.late / 1e6,
+                starved_stretches=self.starved_stretches,
                 starved_ms=run.starved / 1e6,
                 **self.publish_lateness(),
             )

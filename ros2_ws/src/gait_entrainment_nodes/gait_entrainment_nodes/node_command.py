@@ -1,0 +1,83 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""entrain node: one node of an experiment, for runs over several hosts or containers."""
+
+import argparse
+import importlib
+import os
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from gait_entrainment.device import DeviceError, LimitError
+from gait_entrainment.protocol import ProtocolError, write_protocol
+from gait_entrainment_nodes.environment import set_environment
+from gait_entrainment_nodes.node_list import NODES, bag_folder, parameter_arguments
+from gait_entrainment_nodes.run_command import (
+    add_run_options,
+    check_driver,
+    check_output,
+    checked_protocol,
+    chosen_parameters,
+)
+from gait_entrainment_nodes.supervisor import PACKAGE
+
+_EXAMPLES = """examples:
+  ROS_DOMAIN_ID=42 entrain node walker_sim               here, the rest on another host, which has
+  ROS_DOMAIN_ID=42 entrain run --elsewhere walker_sim
+  entrain node experiment protocol.yaml                  conducts it, and ends with it
+
+Each node is given what entrain run would give it: give every one the same protocol and options.
+"""
+
+
+def add_command(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser = commands.add_parser(
+        "node",
+        help="one node of an experiment, where others run on other hosts or in other containers",
+        description=(
+            "Run one node with the parameters that follow from the protocol and the options. "
+            "The experiment conducts the protocol at once; bag_recorder ends by itself once the "
+            "record is complete; the others run until they are stopped."
+        ),
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("node", choices=NODES, metavar="NODE", help=", ".join(NODES))
+    add_run_options(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the node to its end; 1 where it failed, 2 for a protocol or an option that is wrong."""
+    try:
+        protocol = checked_protocol(options)
+        bag = options.out or bag_folder(protocol)
+        if options.node == "perturbator":
+            check_driver(protocol.driver, options)
+        if options.node == "bag_recorder":
+            check_output(bag)
+    except (ProtocolError, LimitError, DeviceError) as error:
+        print(f"entrain node: {error}", file=sys.stderr)
+        return 1 if isinstance(error, DeviceError) else 2
+    set_environment(int(os.environ.get("ROS_DOMAIN_ID", "0")))
+    parameters = chosen_parameters(protocol, bag, options)
+    parameters["experiment"]["protocol"] = write_protocol(protocol)
+    with tempfile.TemporaryDirectory(prefix="entrain_") as folder:
+        arguments = parameter_arguments({options.node: parameters[options.node]}, Path(folder))
+        sys.argv = [options.node, *arguments]
+        return int(importlib.import_module(f"{PACKAGE}.{options.node}").main())

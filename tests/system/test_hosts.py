@@ -1,0 +1,125 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Nodes of one experiment on two hosts, joined by a link that delays and loses frames."""
+
+import json
+import os
+import subprocess
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from harness import PATIENCE, QUICK, events_since_start, simulated_events
+from slow_link import SlowLink, obstacle
+
+from gait_entrainment.bags import BagReader
+
+pytestmark = pytest.mark.skipif(bool(obstacle()), reason=obstacle() or "two hosts can be had")
+
+# From which topics the walker's host alone can have it.
+WALKERS = ("/joint_states", "/gait_events", "/ankle_torque", "/ground_reaction/left")
+WALKER_HOST, ROBOT_HOST = 0, 1
+
+
+@pytest.fixture(scope="module")
+def link():
+    with SlowLink(delay=0.005, jitter=0.002, loss=0.01) as joined:
+        yield joined
+
+
+def environment(**more: str) -> dict[str, str]:
+    return {**os.environ, "ROS_DOMAIN_ID": "7", **more}
+
+
+@contextmanager
+def started(command: Sequence[str], variables: dict[str, str]) -> Iterator[Any]:
+    """Start a process; see that nothing of it stays."""
+    process = subprocess.Popen(command, env=variables, text=True, stdout=subprocess.PIPE)
+    try:
+        yield process
+    finally:
+        process.terminate()
+        process.wait(PATIENCE)
+
+
+def wait_for_frames(link: SlowLink, number: int, run: Any) -> None:
+    """Wait until so many more frames have come from the walker's host."""
+    until = link.carried[WALKER_HOST] + number
+    while link.carried[WALKER_HOST] < until:
+        assert run.poll() is None, run.stdout.read()
+        time.sleep(0.02)
+
+
+def run_command(bag: Path, *options: str) -> list[str]:
+    return ["entrain", "run", "--elsewhere=walker_sim", "--no-figures", f"--out={bag}", *options]
+
+
+def test_lock_step_is_the_simulation_to_the_nanosecond(link, tmp_path):
+    bag, options = tmp_path / "bag", ("--baseline=3", "--pulses=5", "--washout=1")
+    before, lost = link.octets[WALKER_HOST], sum(link.lost)
+    subnet = environment(ROS_AUTOMATIC_DISCOVERY_RANGE="SUBNET")
+    alone = environment(ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST")
+    node = link.on(WALKER_HOST, ["entrain", "node", "walker_sim", *options])
+    ask = link.on(ROBOT_HOST, ["entrain", "ready", "walker_sim", "--timeout=6"])
+    with (
+        started(node, subnet),
+        started(ask, alone) as stranger,
+        started(ask, subnet) as friend,
+        started(link.on(ROBOT_HOST, run_command(bag, "--json", *options)), subnet) as run,
+    ):
+        text, _ = run.communicate(timeout=PATIENCE)
+        assert run.returncode == 0
+        # Who keeps to its own host finds nobody elsewhere.
+        assert (friend.wait(PATIENCE), stranger.wait(PATIENCE)) == (0, 1)
+    assert json.loads(text)["lost"] == 0
+    events = events_since_start(bag)
+    assert len(events) > 4 * 8
+    assert events == simulated_events(bag)
+    with BagReader(bag) as reader:
+        sent = sum(len(message.data) for message in reader.messages(WALKERS))
+    assert link.octets[WALKER_HOST] - before > sent
+    assert sum(link.lost) > lost
+
+
+def test_real_time_counts_what_a_slow_network_makes_late(link, tmp_path):
+    bag = tmp_path / "bag"
+    options = (*QUICK, "--real-time", "--baseline=2", "--pulses=5", "--washout=1")
+    # Heard by this host and the one named, by nobody else.
+    here, there = (environment(ROS_STATIC_PEERS=peer) for peer in link.addresses)
+    with (
+        started(link.on(WALKER_HOST, ["entrain", "node", "walker_sim", *options]), there),
+        started(link.on(ROBOT_HOST, run_command(bag, *options)), here) as run,
+    ):
+        wait_for_frames(link, 2000, run)
+        usual, link.delay = link.delay, 0.25  # there and back: longer than the promises lead
+        wait_for_frames(link, 1500, run)
+        link.delay = usual
+        text, _ = run.communicate(timeout=PATIENCE)
+    assert run.returncode == 0, text
+    with BagReader(bag) as reader:
+        stretches = {
+            value.key: float(value.value)
+            for _, message in reader.decoded(["/diagnostics"])
+            for status in message.status
+            for value in status.values
+            if value.key.endswith("_stretches")
+        }
+    assert stretches["late_stretches"] > 0
+    assert stretches["starved_stretches"] > 0
+    assert f"of perturbator: {stretches['late_stretches']:.0f} late" in text
+    assert "not reproducible" in text
