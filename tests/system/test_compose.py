@@ -1,0 +1,89 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The services of docker/compose.yaml, run without containers: their commands as processes."""
+
+import os
+import re
+import shlex
+import subprocess
+from contextlib import ExitStack
+from pathlib import Path
+
+import yaml
+from harness import PATIENCE
+
+from gait_entrainment_nodes.domain import claimed_domain
+from gait_entrainment_nodes.node_list import NODES, PUBLISHERS
+
+ROOT = Path(__file__).resolve().parents[2]
+INSIDE = "/home/walker/gait_entrainment"
+ENTRYPOINT = str(ROOT / "docker" / "entrypoint.bash")
+
+
+def services(**variables):
+    """Return the services, with variables put in as Docker Compose does."""
+
+    def value(match):
+        return variables.get(match[1], match[2])
+
+    text = (ROOT / "docker" / "compose.yaml").read_text()
+    return yaml.safe_load(re.sub(r"\$\{(\w+):-(.*?)\}", value, text))["services"]
+
+
+def test_services_conduct_and_record_one_experiment(tmp_path):
+    defined = services(OPTIONS="--baseline=3 --pulses=5 --washout=1 --sample-rate=50")
+    assert set(NODES) < set(defined)
+    (tmp_path / "bags").mkdir()
+    with claimed_domain() as domain, ExitStack() as stack:
+        environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
+
+        def run(words):
+            # Nothing is inherited but what the image has, too.
+            process = subprocess.Popen(
+                words, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, text=True
+            )
+            stack.callback(process.wait, PATIENCE)
+            stack.callback(process.terminate)
+            return process
+
+        def start(service):
+            return run([ENTRYPOINT, *shlex.split(defined[service]["command"])])
+
+        def healthy(name):
+            kind, program, *words = defined[name]["healthcheck"]["test"]
+            assert (kind, words) == ("CMD", ["entrain", "ready", name])
+            check = [program.replace(INSIDE, str(ROOT)), *words, "--timeout=30"]
+            return run(check).wait(PATIENCE) == 0
+
+        awaited = defined["experiment"]["depends_on"]
+        assert set(awaited) == set(NODES) - {"experiment"}
+        running = {name: start(name) for name in awaited}
+        assert healthy("perturbator")  # the others' commands differ in the name alone
+        running["experiment"] = start("experiment")
+        for name in defined["outcome"]["depends_on"]:
+            assert running[name].wait(PATIENCE) == 0, name
+        text, _ = start("outcome").communicate(timeout=PATIENCE)
+        assert "strides          9, pulses placed in them: 5" in text
+        for name in set(PUBLISHERS) - {"experiment"}:
+            running[name].terminate()
+            assert running[name].wait(PATIENCE) == 0, name
+
+
+def test_every_service_drops_its_privileges_and_hears_no_network():
+    for name, service in services().items():
+        assert service["cap_drop"] == ["ALL"], name
+        assert service["security_opt"] == ["no-new-privileges:true"], name
+        shares_loopback = service["network_mode"] == "service:walker_sim"
+        assert shares_loopback or service["network_mode"] == "none", name
+        assert shares_loopback == (service.get("ipc") == "service:walker_sim"), name
