@@ -36,6 +36,8 @@ WRONG_USAGE = {
     "no baseline": (["--baseline=1"], ["baseline", "1", "at least 2"]),
     "sample rate": (["--sample-rate=1001"], ["--sample-rate", "1001", "0 to 1000"]),
     "sample rate NaN": (["--sample-rate=nan"], ["--sample-rate", "nan", "0 to 1000"]),
+    "lead time": (["--lead-time=20"], ["--lead-time", "20", "0.05 to 10 s"]),
+    "another host, no domain": (["--elsewhere=walker_sim"], ["--elsewhere", "ROS_DOMAIN_ID"]),
     "unknown driver": (["--driver=magic"], ["driver", "magic", "ideal"]),
     "unreadable file": (["nowhere.yaml"], ["nowhere.yaml", "cannot be read"]),
     "a folder as file": (["."], [".", "cannot be read"]),

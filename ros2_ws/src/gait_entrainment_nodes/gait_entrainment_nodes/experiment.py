@@ -227,11 +227,12 @@ class Experiment(Participant, Node):
         """
         Say that the run is over at the end of what was promised, and wait until that is heard.
 
-        After that nobody has torque left to stop, and deactivation says nothing new.
+        After that nobody has torque left to stop, and deactivation says nothing new. In real time
+        the walker may be past that end already, where the last promise came late.
         """
-        self.known_until = self.promised_until
+        end = self.known_until = max(self.promised_until, self.known_until)
         self.closed = Future()
-        self.send_horizon(self.promised_until, last=True)
+        self.send_horizon(end, last=True)
         await self.within(self.closed, "perturbator does not answer", timeout)
 
     async def give_up(self, reason: str) -> None:

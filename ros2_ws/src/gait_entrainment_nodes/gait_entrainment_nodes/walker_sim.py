@@ -124,6 +124,7 @@ class WalkerSim(Participant, Node):
         self.reproducible = True
         self.late = 0  # [ns] of promises that came after their instant
         self.late_stretches = self.starved_stretches = 0  # how many there were of each
+        self.starving = False  # the stretch walked last had no promise
         self.lateness = Lateness()  # real time: of samples, from due to published
         self.next_progress = 0  # [ns since the start]
 
@@ -156,6 +157,7 @@ class WalkerSim(Participant, Node):
         self.grant = self.acknowledged_grants = 0
         self.end_of_run, self.reproducible, self.late, self.next_progress = None, True, 0, 0
         self.late_stretches = self.starved_stretches = 0
+        self.starving = False
         self.lateness = Lateness()
         response.success, response.start = True, to_time(self.start)
         return response
@@ -205,7 +207,8 @@ class WalkerSim(Participant, Node):
                 late_ms=late / 1e6,
             )
         if self.real_time:
-            self.end_of_run = until if message.last else None
+            # Where the last promise comes late, its end is already past.
+            self.end_of_run = max(until, run.reached) if message.last else None
         else:
             self.granted.append((until, message.last))
             self.walk_granted()
@@ -255,13 +258,14 @@ class WalkerSim(Participant, Node):
         until = now if end is None else min(now, end)
         starved = run.starved
         self.send(run.advance(until, last=last))
-        if run.starved > starved:
+        starving, self.starving = self.starving, run.starved > starved
+        if self.starving and not starving:
             self.starved_stretches += 1
             self.reproducible = False
             self.diagnose(
                 self.start + run.reached,
                 DiagnosticStatus.WARN,
-                "no torque profile for a stretch in time: it was walked without torque",
+                "no torque profile in time: from here to the next one it is walked without torque",
                 starved_ms=(run.starved - starved) / 1e6,
             )
         if now >= self.next_progress or run.ended:
