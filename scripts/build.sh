@@ -8,7 +8,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 fingerprint=$({
     cat .venv/complete scripts/build.sh
-    find ros2_ws/src -type f \( -not -name '*.py' -o -name setup.py \) -not -name '*.pyc' \
+    find ros2_ws/src ros2_ws/wheels -type f \( -not -name '*.py' -o -name setup.py \) -not -name '*.pyc' \
         -not -path '*/__pycache__/*' -not -path '*/.*' -not -path '*.egg-info/*' -print0 |
         sort -z | xargs -0 sha256sum
 } | sha256sum)
@@ -31,7 +31,10 @@ if [ "$(cat ros2_ws/install/complete 2> /dev/null)" != "$fingerprint" ]; then
         root=$PWD
         source scripts/underlay.bash
         cd ros2_ws
-        colcon --log-level error --log-base log build --symlink-install --event-handlers console_direct- \
+        # What a full ROS 2 has and its wheels lack.
+        base_paths=(src)
+        if [ "$(< ../.venv/ros)" = wheels ]; then base_paths+=(wheels); fi
+        colcon --log-level error --log-base log build --base-paths "${base_paths[@]}" --symlink-install --event-handlers console_direct- \
             --cmake-args -DPython3_EXECUTABLE="$(command -v python)" \
             -DPython3_FIND_VIRTUALENV=ONLY -DCMAKE_BUILD_TYPE=Release -DBUILD_TESTING=OFF --no-warn-unused-cli
     )

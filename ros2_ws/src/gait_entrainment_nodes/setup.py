@@ -24,6 +24,7 @@ NODES = [
     "experiment",
     "bag_recorder",
     "bag_player",
+    "walker_display",
 ]
 
 setup(
@@ -39,6 +40,8 @@ setup(
         ("share/" + NAME + "/config", glob("config/*")),
         ("share/" + NAME + "/launch", glob("launch/*.py")),
         ("share/" + NAME + "/rviz", glob("rviz/*")),
+        ("share/" + NAME + "/urdf", glob("urdf/*")),
+        ("share/" + NAME + "/layouts", glob("layouts/*")),
     ],
     install_requires=["setuptools"],
     zip_safe=False,

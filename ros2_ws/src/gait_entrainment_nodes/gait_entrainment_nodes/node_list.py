@@ -32,8 +32,10 @@ from gait_entrainment_nodes.environment import config_file
 
 # In the order in which they are started. Executable and node have the same name.
 NODES = ("bag_recorder", "walker_sim", "perturbator", "gait_analyzer", "experiment")
+# Only looks on: started where somebody wants to see the walk, waited for by nobody.
+DISPLAY = "walker_display"
 # In the order in which they are stopped: torque first, the record last.
-STOP_ORDER = ("perturbator", "experiment", "walker_sim", "gait_analyzer", "bag_recorder")
+STOP_ORDER = ("perturbator", "experiment", "walker_sim", "gait_analyzer", DISPLAY, "bag_recorder")
 # Nodes that publish what is counted at the end of a run.
 PUBLISHERS = ("walker_sim", "perturbator", "gait_analyzer", "experiment")
 # In real time promises are short, so that more can be decided late, but longer than a hiccup.
@@ -108,8 +110,9 @@ def parameters(
             "publishers": list(PUBLISHERS),
             "custom_data": custom_data,
         },
+        DISPLAY: {name: walker[name] for name in ("leg_length", "foot_length")},
     }
-    return {name: given[name] | {"use_sim_time": not real_time} for name in NODES}
+    return {name: given[name] | {"use_sim_time": not real_time} for name in given}
 
 
 def replay_parameters(

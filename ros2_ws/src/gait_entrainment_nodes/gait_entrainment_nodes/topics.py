@@ -28,6 +28,9 @@ from geometry_msgs.msg import WrenchStamped
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import MarkerArray
 
 from gait_entrainment_msgs import msg
 
@@ -46,6 +49,20 @@ LATEST_STATE = QoSProfile(
 # What rqt and the aggregator expect of /diagnostics.
 DIAGNOSTICS_QOS = QoSProfile(
     history=HistoryPolicy.KEEP_LAST, depth=100, reliability=ReliabilityPolicy.RELIABLE
+)
+# What tf2, robot_state_publisher and RViz expect of what is drawn. Nobody waits for a viewer.
+DRAWING = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST, depth=100, reliability=ReliabilityPolicy.RELIABLE
+)
+LATEST_DESCRIPTION = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST,
+    depth=1,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+# For who only looks on: the writer never waits for it. It holds a stretch of a lock-step run.
+LOOKING_ON = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST, depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT
 )
 
 
@@ -81,3 +98,8 @@ ENTRAINMENT = Topic("gait/entrainment", msg.Entrainment, LATEST_STATE)
 RECORDER_PROGRESS = Topic("bag_recorder/progress", msg.Progress)
 PUBLISHED_COUNTS = Topic("published_counts", msg.PublishedCounts)
 DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, DIAGNOSTICS_QOS)
+
+# tf2 has one topic for a whole system; instances differ in their frames.
+TF = Topic("/tf", TFMessage, DRAWING)
+ROBOT_DESCRIPTION = Topic("robot_description", String, LATEST_DESCRIPTION)
+MARKERS = Topic("walker_display/markers", MarkerArray, DRAWING)

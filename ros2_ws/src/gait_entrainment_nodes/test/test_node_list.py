@@ -27,6 +27,7 @@ from gait_entrainment_nodes.environment import config_file
 from gait_entrainment_nodes.experiment import Experiment
 from gait_entrainment_nodes.gait_analyzer import GaitAnalyzerNode
 from gait_entrainment_nodes.node_list import (
+    DISPLAY,
     NODES,
     PUBLISHERS,
     STOP_ORDER,
@@ -35,14 +36,23 @@ from gait_entrainment_nodes.node_list import (
     replay_parameters,
 )
 from gait_entrainment_nodes.perturbator import Perturbator
+from gait_entrainment_nodes.walker_display import WalkerDisplay
 from gait_entrainment_nodes.walker_sim import WalkerSim
 
 BAG = Path(__file__).parents[4] / "bags" / "paper_example"
-CLASSES = (WalkerSim, Perturbator, GaitAnalyzerNode, Experiment, BagRecorder, BagPlayer)
+CLASSES = (
+    WalkerSim,
+    Perturbator,
+    GaitAnalyzerNode,
+    Experiment,
+    BagRecorder,
+    BagPlayer,
+    WalkerDisplay,
+)
 # Not for the file: of ROS itself, of the mode or the launch file, of a node started by hand.
 ELSEWHERE = {
     *(f"{name}.use_sim_time" for name in (*NODES, "bag_player")),
-    *(f"{name}.start_type_description_service" for name in (*NODES, "bag_player")),
+    *(f"{name}.start_type_description_service" for name in (*NODES, "bag_player", DISPLAY)),
     "experiment.longest_lookahead",
     "experiment.protocol",
     "bag_recorder.topics",
@@ -99,7 +109,7 @@ def test_file_lists_what_a_user_may_set_at_its_default(tmp_path):
 @pytest.mark.parametrize("real_time", [False, True])
 def test_parameters_are_given_to_every_node(real_time):
     given = parameters(DEFAULT_PROTOCOL, "/bag", "{}", real_time=real_time)
-    assert set(given) == set(NODES)
+    assert set(given) == {*NODES, DISPLAY}
     walker = given["walker_sim"]
     assert walker["ankle_stiffness"] == 87.3
     assert walker["real_time"] is real_time
@@ -113,7 +123,7 @@ def test_parameters_are_given_to_every_node(real_time):
 
 
 def test_torque_is_stopped_first_and_the_record_last():
-    assert sorted(STOP_ORDER) == sorted(NODES)
+    assert sorted(STOP_ORDER) == sorted([*NODES, DISPLAY])
     assert STOP_ORDER[0] == "perturbator"
     assert STOP_ORDER[-1] == "bag_recorder"
     assert set(PUBLISHERS) == set(NODES) - {"bag_recorder"}
