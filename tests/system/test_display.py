@@ -14,9 +14,11 @@
 
 """walker_display: what it draws is the walker at that instant, and nobody waits for it."""
 
+import cmath
 import math
 import signal
 import xml.etree.ElementTree as ElementTree
+from itertools import pairwise
 
 import pytest
 from harness import QUICK, protocol_of, session, stamp_of
@@ -36,7 +38,7 @@ from gait_entrainment_nodes.topics import (
 )
 
 WALK = (*QUICK, "--baseline=2", "--pulses=2", "--washout=0", "--initial-phase=0.6")
-SCALE = 0.018
+SCALE = 0.035
 
 
 def turned(transform):
@@ -47,10 +49,9 @@ def turned(transform):
 
 
 def arc_angle(marker):
-    """Return the angle from begin to tip of an arc around the ankle, leg length 1."""
-    begin, tip = marker.points[0], marker.points[-2]
-    angles = [math.atan2(p.x, p.z + 1.0) for p in (begin, tip)]
-    return angles[1] - angles[0]
+    """Return the angle from begin to tip of an arc around the ankle."""
+    directions = [complex(p.z, p.x) for p in marker.points[:-3]]
+    return sum(cmath.phase(after / before) for before, after in pairwise(directions))
 
 
 def test_pictures_agree_with_the_samples_of_the_same_instant(tmp_path):
@@ -96,13 +97,13 @@ def test_pictures_agree_with_the_samples_of_the_same_instant(tmp_path):
         lean = [position["l_hip"], position["r_hip"]]
         assert min(abs(x + math.sin(hip) - heel) for hip in lean) < 1e-6
 
-    drawn = [m.markers for m in heard[MARKERS.name] if m.markers[0].ns != "ground"]
     pulses = 0
-    for markers in drawn:
-        stamp = stamp_of(markers[0].header)
+    for drawn in heard[MARKERS.name]:
+        stamp = stamp_of(drawn.markers[0].header)
         assert stamp in bodies
-        for marker in markers:
+        for marker in drawn.markers:
             assert marker.header.frame_id == ("l_leg", "r_leg")[marker.id]
+            assert marker.pose.position.z == -1.0  # the leg's length: at the ankle
             torque = torques[stamp].delivered[marker.id]
             if marker.ns == "ankle_spring":
                 torque = torques[stamp].intrinsic[marker.id]

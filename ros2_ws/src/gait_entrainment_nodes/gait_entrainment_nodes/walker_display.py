@@ -17,8 +17,8 @@ walker_display: the walker as RViz and Foxglove show it.
 
 A node of its own that only looks on: it draws a simulated walk, a replayed one or a person's in
 the same way, and nothing waits for it. The body is the robot description moved by transforms;
-markers show the torque at each ankle, the pulse while it lasts, and the ground. Where it is in
-the world follows from the joint angles.
+markers show the torque at each ankle, and the pulse while it lasts. Where the body is in the
+world follows from the joint angles.
 
 An arc at the ankle is a torque, plantarflexion clockwise seen from the right: the inner one is
 the leg's own spring, the outer one, from the tip of the inner one on, is the ankle robot. The
@@ -61,15 +61,12 @@ PREFIXES = ("l_", "r_")  # of joints and frames, by side
 HIP_WIDTH = 0.2  # so that both legs are seen; the model has none [m]
 # Behind four bytes that name the encoding every sampled message begins with its stamp.
 _STAMP = struct.Struct("<4xiI")
-# Inner and outer arc [m], and how finely a full turn is drawn.
-SPRING_RADIUS, ROBOT_RADIUS = 0.16, 0.22
-ARC_STEP = math.pi / 30
+# Inner and outer arc, and how far outside of the leg they are drawn [m].
+SPRING_RADIUS, ROBOT_RADIUS, OUTSIDE = 0.18, 0.26, 0.06
+ARC_STEP = math.pi / 30  # of the lines that make an arc
 SPRING = ColorRGBA(r=0.1, g=0.6, b=0.2, a=1.0)
 ACTING = ColorRGBA(r=0.9, g=0.1, b=0.1, a=1.0)
 WITHOUT_EFFECT = ColorRGBA(r=0.5, g=0.5, b=0.5, a=1.0)
-GROUND = ColorRGBA(r=0.5, g=0.5, b=0.5, a=0.6)
-# The ground is drawn so far ahead and behind [m], with a line across it every half metre.
-GROUND_REACH = 4
 
 
 class WalkerDisplay(Participant, Node):
@@ -89,7 +86,7 @@ class WalkerDisplay(Participant, Node):
         self.scale = declare(
             self,
             "torque_scale",
-            0.018,
+            0.035,
             "angle of an arc per torque",
             unit="rad/(N m)",
             minimum=0.0,
@@ -109,7 +106,6 @@ class WalkerDisplay(Participant, Node):
         self.leg_length = leg_length
         self.period = round(NANOSECONDS_PER_SECOND / rate)
         self.footing = Footing(leg_length, foot_length)
-        self.ground_at = math.nan  # whole metre around which the ground was drawn
 
         self.transforms = self.publisher(TF)
         self.markers = self.publisher(MARKERS)
@@ -165,9 +161,6 @@ class WalkerDisplay(Participant, Node):
         self.transforms.publish(
             TFMessage(transforms=[self.transform(message, *place) for place in places])
         )
-        if math.floor(x) != self.ground_at:
-            self.ground_at = math.floor(x)
-            self.markers.publish(MarkerArray(markers=[self.ground(message)]))
 
     def transform(
         self,
@@ -192,39 +185,22 @@ class WalkerDisplay(Participant, Node):
             intrinsic, delivered = message.intrinsic[side], message.delivered[side]
             color = ACTING if message.effective_perturbation[side] else WITHOUT_EFFECT
             spring = self.marker(message, side, "ankle_spring", SPRING)
-            draw_arc(spring, self.ankle, SPRING_RADIUS, 0.0, self.scale * intrinsic)
-            robot = self.marker(message, side, "ankle_robot", color)
             tip = self.scale * intrinsic
-            draw_arc(robot, self.ankle, ROBOT_RADIUS, tip, tip + self.scale * delivered)
+            draw_arc(spring, SPRING_RADIUS, 0.0, tip)
+            robot = self.marker(message, side, "ankle_robot", color)
+            draw_arc(robot, ROBOT_RADIUS, tip, tip + self.scale * delivered)
             pulse = self.marker(message, side, "pulse", color)
             pulse.type, pulse.scale = Marker.SPHERE, Vector3(x=0.13, y=0.13, z=0.13)
-            pulse.pose.position = self.ankle
             pulse.action = Marker.ADD if delivered else Marker.DELETE
             markers += [spring, robot, pulse]
         self.markers.publish(MarkerArray(markers=markers))
 
-    def ground(self, message: JointState) -> Marker:
-        """Return the ground around the walker, marked so that the walk is seen to advance."""
-        marker = self.marker(message, None, "ground", GROUND)
-        marker.type, marker.scale.x = Marker.LINE_LIST, 0.01
-        begin, end = self.ground_at - GROUND_REACH, self.ground_at + GROUND_REACH + 1
-        across = [begin + i / 2 for i in range(int(2 * (end - begin)) + 1)]
-        lines = [(x, y, x, -y) for x in across for y in (0.4,)]
-        lines += [(begin, y, end, y) for y in (-0.4, 0.4)]
-        for x1, y1, x2, y2 in lines:
-            marker.points += [Point(x=float(x1), y=y1), Point(x=float(x2), y=y2)]
-        return marker
-
-    @property
-    def ankle(self) -> Point:
-        """The ankle in the frame of the leg."""
-        return Point(z=-self.leg_length)
-
-    def marker(self, message: Any, side: Side | None, name: str, color: ColorRGBA) -> Marker:
-        """Return a marker of a leg, or of the world where there is no side."""
-        marker = Marker(ns=name, id=0 if side is None else side, color=color)
+    def marker(self, message: AnkleTorque, side: Side, name: str, color: ColorRGBA) -> Marker:
+        """Return a marker at an ankle, as its leg is turned."""
+        marker = Marker(ns=name, id=side, color=color)
         marker.header.stamp = message.header.stamp
-        marker.header.frame_id = WORLD if side is None else self.frame(PREFIXES[side] + "leg")
+        marker.header.frame_id = self.frame(PREFIXES[side] + "leg")
+        marker.pose.position = Point(y=-OUTSIDE if side else OUTSIDE, z=-self.leg_length)
         marker.pose.orientation.w = 1.0
         return marker
 
@@ -233,7 +209,7 @@ class WalkerDisplay(Participant, Node):
         return name if name == WORLD else self.frame_prefix + name
 
 
-def draw_arc(marker: Marker, center: Point, radius: float, begin: float, end: float) -> None:
+def draw_arc(marker: Marker, radius: float, begin: float, end: float) -> None:
     """
     Make a marker an arc with an arrowhead, or nothing where it has no length.
 
@@ -245,9 +221,7 @@ def draw_arc(marker: Marker, center: Point, radius: float, begin: float, end: fl
         return
 
     def point(angle: float, distance: float) -> Point:
-        return Point(
-            x=center.x + distance * math.sin(angle), z=center.z + distance * math.cos(angle)
-        )
+        return Point(x=distance * math.sin(angle), z=distance * math.cos(angle))
 
     steps = math.ceil(abs(end - begin) / ARC_STEP)
     marker.points = [point(begin + (end - begin) * i / steps, radius) for i in range(steps + 1)]
