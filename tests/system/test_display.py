@@ -89,7 +89,7 @@ def test_pictures_agree_with_the_samples_of_the_same_instant(tmp_path):
             assert -turned(by_child[f"{side}_leg"]) == pytest.approx(
                 position[f"{side}_hip"], abs=1e-12
             )
-            assert turned(by_child[f"{side}_foot"]) == pytest.approx(
+            assert turned(by_child[f"{side}_sole"]) == pytest.approx(
                 position[f"{side}_ankle"], abs=1e-12
             )
         # One of the feet stands where the last heel strike was.

@@ -156,7 +156,7 @@ class WalkerDisplay(Participant, Node):
                 ankle = (0.0, 0.0, -self.leg_length)
                 places += [
                     ("base_link", prefix + "leg", hip, -hips[side]),
-                    (prefix + "leg", prefix + "foot", ankle, ankles[side]),
+                    (prefix + "leg", prefix + "sole", ankle, ankles[side]),
                 ]
         self.transforms.publish(
             TFMessage(transforms=[self.transform(message, *place) for place in places])

@@ -30,7 +30,7 @@ TYPES = {
     for topic in vars(topics).values()
     if isinstance(topic, Topic)
 }
-FRAMES = {"world", "base_footprint", "base_link", "l_leg", "r_leg", "l_foot", "r_foot"}
+FRAMES = {"world", "base_footprint", "base_link", "l_leg", "r_leg", "l_sole", "r_sole"}
 DRAWN = {f"/{ROBOT_DESCRIPTION.name}", f"/{MARKERS.name}"}
 
 

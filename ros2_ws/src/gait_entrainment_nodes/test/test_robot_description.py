@@ -81,8 +81,8 @@ def test_feet_are_where_the_walker_has_them(parameters):
         heel = parameters.step_length * (np.searchsorted(strikes, instant, side="right") - 1)
         leading, trailing = ("l", "r") if samples.leading[i] == Side.LEFT else ("r", "l")
         toe = [parameters.foot_length, 0.0, 0.0]
-        at_heel = place(f"{leading}_foot", [0.0, 0.0, 0.0])[[0, 2]]
-        at_toe = place(f"{leading}_foot", toe)[[0, 2]]
+        at_heel = place(f"{leading}_sole", [0.0, 0.0, 0.0])[[0, 2]]
+        at_toe = place(f"{leading}_sole", toe)[[0, 2]]
         assert at_heel == pytest.approx([heel, 0.0], abs=1e-9)
         assert at_toe == pytest.approx([heel + parameters.foot_length, 0.0], abs=1e-9)
         # The mass in the middle stands on that leg, leaning by theta.
@@ -92,7 +92,7 @@ def test_feet_are_where_the_walker_has_them(parameters):
             parameters.leg_length * np.array([-np.sin(lean), 0.0, np.cos(lean)]), abs=1e-9
         )
         if samples.double_stance[i]:
-            rear = place(f"{trailing}_foot", toe)[[0, 2]]
+            rear = place(f"{trailing}_sole", toe)[[0, 2]]
             assert rear == pytest.approx([heel - parameters.toe_separation, 0.0], abs=1e-9)
     assert 0 < samples.double_stance.sum() < instants.size
 
@@ -104,7 +104,7 @@ def test_what_is_drawn_lies_along_leg_and_foot():
         leg = links[f"{prefix}_leg"].find("visual")
         assert float(leg.find("geometry/cylinder").get("length")) == 0.8
         assert numbers(leg.find("origin"), "xyz") == [0.0, 0.0, -0.4]
-        foot = links[f"{prefix}_foot"].find("visual")
+        foot = links[f"{prefix}_sole"].find("visual")
         length, _, height = numbers(foot.find("geometry/box"), "size")
         assert length == 0.2
         # From the heel, under the ankle, to the toe; the sole at the height of the ankle.
