@@ -123,7 +123,10 @@ def test_a_display_that_hangs_holds_up_nobody(tmp_path):
     walk = ("--baseline=20", "--pulses=2", "--washout=0")
     with session(tmp_path, *walk, nodes=(*NODES, DISPLAY), real_time=False) as nodes:
         progress = nodes.probe.listen(WALKER_PROGRESS)
+        goal = nodes.conduct()
+        nodes.probe.until(lambda: progress, "the first grant")
         nodes.signal(DISPLAY, signal.SIGSTOP)
-        result = nodes.probe.result(nodes.conduct()).result
+        assert progress[-1].samples < 3000
+        result = nodes.probe.result(goal).result
         assert result.outcome == RunProtocol.Result.FINISHED, result.message
         nodes.probe.until(lambda: progress[-1].samples > 8000, "all samples")

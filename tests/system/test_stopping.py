@@ -22,9 +22,10 @@ from harness import QUICK, cpu_seconds, session, stamp_of
 
 from gait_entrainment.bags import BagReader
 from gait_entrainment_msgs.action import RunProtocol
-from gait_entrainment_nodes.node_list import NODES
+from gait_entrainment_nodes.node_list import DISPLAY, NODES
 from gait_entrainment_nodes.topics import ANKLE_TORQUE, PULSES, TORQUE_PROFILE
 
+EACH = (*NODES, DISPLAY)
 # From the signal to the end of the process [s], on a machine that does other things too.
 PROMPTLY = 5.0
 # Pulses that are on nearly all the time.
@@ -33,11 +34,11 @@ BROAD = (*QUICK, "--pulses=100000", "--width=0.4", "--baseline=2")
 
 def assert_idle(nodes):
     """Check that waiting costs little processor time."""
-    before = {node: cpu_seconds(nodes.pid(node)) for node in NODES}
+    before = {node: cpu_seconds(nodes.pid(node)) for node in EACH}
     begin = time.monotonic()
     nodes.probe.until(lambda: time.monotonic() - begin > 2.0, "the end of a long wait")
     waited = time.monotonic() - begin
-    used = {n: (cpu_seconds(nodes.pid(n)) - before[n]) / waited for n in NODES}
+    used = {n: (cpu_seconds(nodes.pid(n)) - before[n]) / waited for n in EACH}
     print({node: f"{share:.1%}" for node, share in used.items()})
     # A loop without a wait would use all of a core, or what the others leave of it.
     assert max(used.values()) < 0.15, used
@@ -45,10 +46,15 @@ def assert_idle(nodes):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_each_idle_node_hardly_works_and_stops_cleanly(number, tmp_path):
-    with session(tmp_path) as nodes:
+    with session(tmp_path, nodes=EACH) as nodes:
+        listeners = nodes.probe.node.get_subscriptions_info_by_topic
+        nodes.probe.until(
+            lambda: any(i.node_name == "bag_recorder" for i in listeners("/gait_events")),
+            "the recorder's subscription",
+        )
         if number == signal.SIGINT:
             assert_idle(nodes)
-        for node in NODES:
+        for node in EACH:
             told = time.monotonic()
             nodes.signal(node, number)
             assert nodes.supervisor.wait(node, 10) == 0, nodes.supervisor.last_lines(node)
