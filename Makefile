@@ -18,7 +18,7 @@ demo: build ## set up, build, then simulate a walk and entrain it: entrain run
 test: build ## set up, build, then run every test (PYTEST_ARGS="-k name" for some)
 	@$(in_env) scripts/test.sh $(PYTEST_ARGS)
 
-lint: build ## ruff, mypy, import-linter, licence headers
+lint: build ## ruff, mypy, import-linter, licence headers, ament linters
 	@$(in_env) scripts/lint.sh
 
 format: setup ## let ruff rewrite the sources

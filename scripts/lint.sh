@@ -14,4 +14,5 @@ check ruff format --check --output-format concise .
 check mypy
 check lint-imports --no-logo --no-cache
 check python scripts/check_licence_headers.py
+check pytest -q -m linter ros2_ws/src/*/test/test_linters.py
 exit $failed

@@ -28,6 +28,7 @@ setup(
         ("share/" + NAME, ["package.xml"]),
     ],
     install_requires=["setuptools"],
+    extras_require={"test": ["pytest"]},  # so that colcon test runs pytest
     zip_safe=False,
     # This line is all that gait_entrainment needs to find the driver.
     entry_points={

@@ -29,6 +29,7 @@ setup(
         ("share/" + NAME, ["package.xml"]),
     ],
     install_requires=["setuptools"],
+    extras_require={"test": ["pytest"]},  # so that colcon test runs pytest
     zip_safe=False,
     entry_points={
         "console_scripts": [

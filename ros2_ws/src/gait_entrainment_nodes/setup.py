@@ -44,6 +44,7 @@ setup(
         ("share/" + NAME + "/layouts", glob("layouts/*")),
     ],
     install_requires=["setuptools"],
+    extras_require={"test": ["pytest"]},  # so that colcon test runs pytest
     zip_safe=False,
     entry_points={
         "console_scripts": [f"{node} = {NAME}.{node}:main" for node in NODES],

@@ -34,8 +34,10 @@ class ParameterError(ValueError):
     """A value is out of its range; the message is one line: field, value, range, what to do."""
 
 
-def _parameter(default: float, meaning: str, unit: str, symbol: str) -> Any:
-    return field(default=default, metadata={"meaning": meaning, "unit": unit, "symbol": symbol})
+def _parameter(default: float, meaning: str, unit: str, symbol: str, most: float) -> Any:
+    # The range is what a front end offers; construction says what of it makes a walker.
+    metadata = {"meaning": meaning, "unit": unit, "symbol": symbol, "range": (0.0, most)}
+    return field(default=default, metadata=metadata)
 
 
 # Points of the search over double stance. The functions searched are smooth on that scale, and
@@ -70,15 +72,17 @@ class WalkerParameters:
     the walker has no period-one gait.
     """
 
-    mass: float = _parameter(80.0, "mass", "kg", "m")
-    leg_length: float = _parameter(1.0, "leg length", "m", "L")
-    foot_length: float = _parameter(0.2, "foot length", "m", "l")
-    gravity: float = _parameter(9.81, "gravitational acceleration", "m/s^2", "g")
-    leg_angle: float = _parameter(math.pi / 6, "angle of the leg at heel strike", "rad", "alpha")
-    max_plantarflexion: float = _parameter(
-        2.576, "maximal plantarflexion of the ankle, where toe-off is", "rad", "mu"
+    mass: float = _parameter(80.0, "mass", "kg", "m", 1e4)
+    leg_length: float = _parameter(1.0, "leg length", "m", "L", 100.0)
+    foot_length: float = _parameter(0.2, "foot length", "m", "l", 100.0)
+    gravity: float = _parameter(9.81, "gravitational acceleration", "m/s^2", "g", 1e4)
+    leg_angle: float = _parameter(
+        math.pi / 6, "angle of the leg at heel strike", "rad", "alpha", math.pi / 4
     )
-    ankle_stiffness: float = _parameter(87.3, "ankle actuation constant", "N m/rad", "k")
+    max_plantarflexion: float = _parameter(
+        2.576, "maximal plantarflexion of the ankle, where toe-off is", "rad", "mu", math.pi
+    )
+    ankle_stiffness: float = _parameter(87.3, "ankle actuation constant", "N m/rad", "k", 1e7)
 
     def __post_init__(self) -> None:
         """Check every field, the linkage, and that the period-one gait exists."""

@@ -135,5 +135,5 @@ def test_scaling_lengths_masses_and_gravity_scales_the_limits(scale, weight, pul
 
 def test_every_field_says_what_it_means():
     for item in fields(WalkerParameters):
-        assert set(item.metadata) == {"meaning", "unit", "symbol"}
+        assert set(item.metadata) == {"meaning", "unit", "symbol", "range"}
         assert item.default > 0

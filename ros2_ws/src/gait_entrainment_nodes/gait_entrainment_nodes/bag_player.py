@@ -25,9 +25,12 @@ import math
 import struct
 import sys
 import time
+from collections.abc import Callable
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Trigger
 
@@ -68,13 +71,20 @@ class BagPlayer(Participant, Node):
         bag = declare(self, "bag", "", "bag to play: a folder or an .mcap file")
         if not bag:
             raise ValueError("bag: is empty; give the folder of the bag to play")
-        rate = declare(
-            self, "rate", 1.0, "seconds of the bag per second, above 0; 0 for as fast as it goes"
+        declare(
+            self,
+            "rate",
+            1.0,
+            "seconds of the bag per second; 0 for as fast as it goes",
+            unit="1",
+            minimum=0.0,
+            maximum=1e6,
+            read_only=False,
         )
         loop = declare(self, "loop", False, "begin again at the end")
         paused = declare(self, "start_paused", False, "start paused")
-        start_offset = declare(self, "start_offset", 0.0, "where in the bag to start", unit="s")
-        duration = declare(self, "duration", 0.0, "how much of it to play; 0: all", unit="s")
+        start_offset = _seconds(self, "start_offset", 0.0, "where in the bag to start")
+        duration = _seconds(self, "duration", 0.0, "how much of it to play; 0: all")
         topics = _texts(self, "topics", "topics to play, * for any text; empty plays all")
         excluded = _texts(self, "exclude", "topics to leave out, * for any text")
         remaps = _texts(self, "remap", "other names for topics: /from:=/to")
@@ -93,10 +103,11 @@ class BagPlayer(Participant, Node):
             "topics that must have a subscription before the first message; one that must have "
             "two is named twice",
         )
-        self.patience = declare(
-            self, "expect_timeout", 30.0, "how long to wait for them; 0: for ever", unit="s"
+        self.patience = _seconds(
+            self, "expect_timeout", 30.0, "how long to wait for them; 0: for ever"
         )
         self.stay = declare(self, "stay", False, "stay at the end, for ~/play and ~/seek")
+        self.playback: Playback | None = None
         self.begin_participation()
         try:
             self.bag = BagReader(bag)
@@ -105,7 +116,7 @@ class BagPlayer(Participant, Node):
                 self.playable(choose_topics(self.bag, topics, excluded), bool(clock_rate)),
                 start_offset=start_offset,
                 duration=duration or math.inf,
-                rate=rate or FASTEST,
+                rate=self.rate,
                 loop=loop,
                 paused=paused,
                 clock_period=1 / clock_rate if clock_rate else 0.0,
@@ -130,6 +141,7 @@ class BagPlayer(Participant, Node):
         played = {p.topic_name for p in self.players.values()}
         if missing := sorted(set(self.expected) - played):
             raise ValueError(f"expect: {missing[0]} is not played")
+        self.note_state(DiagnosticStatus.OK, "plays")
         self.begun = False
         self.look_at = time.monotonic()  # when matching is looked after next
         self.give_up_at = time.monotonic() + (self.patience or math.inf)
@@ -148,6 +160,13 @@ class BagPlayer(Participant, Node):
             ("play", Play, self.on_play),
         ):
             self.create_service(service, f"~/{name}", answer)
+
+    def take_parameters(self, value: Callable[[str], Any]) -> None:
+        """Play at another rate from now on."""
+        rate = value("rate") or FASTEST
+        if self.playback is not None:
+            self.playback.set_rate(rate, time.monotonic_ns())
+        self.rate = rate
 
     def playable(self, topics: list[str], own_clock: bool) -> list[str]:
         """Return those topics whose type is installed here as it was recorded."""
@@ -293,12 +312,13 @@ class BagPlayer(Participant, Node):
         return response
 
     def on_set_rate(self, request: SetRate.Request, response: SetRate.Response) -> Any:
-        """Play at another rate from now on."""
-        try:
-            self.playback.set_rate(request.rate, time.monotonic_ns())
-            response.success = True
-        except BagError as error:
-            response.message = str(error)
+        """Change the parameter, which plays at that rate from now on."""
+        if not request.rate > 0:
+            response.message = f"rate: {request.rate:g}; allowed: above 0"
+            return response
+        rate = 0.0 if math.isinf(request.rate) else request.rate
+        (result,) = self.set_parameters([Parameter("rate", value=rate)])
+        response.success, response.message = result.successful, result.reason
         return response
 
     def on_seek(self, request: Seek.Request, response: Seek.Response) -> Any:
@@ -371,6 +391,11 @@ def clock_message(instant: int) -> bytes:
 def _texts(node: Node, name: str, description: str) -> list[str]:
     """Declare a parameter that holds texts; ROS cannot tell the type of an empty list."""
     return [text for text in declare(node, name, [""], description) if text]
+
+
+def _seconds(node: Node, name: str, default: float, description: str) -> float:
+    """Declare a parameter that holds a length of time."""
+    return float(declare(node, name, default, description, unit="s", minimum=0.0, maximum=1e9))
 
 
 def _split_remap(remap: str) -> tuple[str, str]:

@@ -101,7 +101,13 @@ class BagRecorder(Participant, Node):
             self, "custom_data", "{}", "what else belongs to the record: a JSON object of texts"
         )
         max_bytes = declare(
-            self, "max_bytes", 0, "begin a new file once one is so large; 0: never", unit="byte"
+            self,
+            "max_bytes",
+            0,
+            "begin a new file once one is so large; 0: never",
+            unit="byte",
+            minimum=0,
+            maximum=2**62,
         )
         max_duration = declare(
             self,
@@ -109,6 +115,8 @@ class BagRecorder(Participant, Node):
             0.0,
             "begin a new file once one spans so much ROS time; 0: never",
             unit="s",
+            minimum=0.0,
+            maximum=1e9,
         )
         self.required = declare(
             self, "required", False, "end, and with it the run, where nothing more can be written"
@@ -142,6 +150,7 @@ class BagRecorder(Participant, Node):
         if self.chosen and self.expected:
             # What tells of the end is heard in any case.
             self.chosen |= {self.resolved[t.name] for t in (PUBLISHED_COUNTS, WALKER_PROGRESS)}
+        self.note_state(DiagnosticStatus.OK, "records", output=output)
         self.broken_off = False  # the recording has ended before its time
         self.reason = ""  # why it was broken off
         # Messages that came before ROS time began: topic, bytes, time of reception [ns].

@@ -25,6 +25,7 @@ import contextlib
 import json
 import sys
 import time
+from collections.abc import Callable
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -84,9 +85,9 @@ class Experiment(Participant, Node):
             self,
             "participants",
             ["walker_sim", "perturbator", "gait_analyzer"],
-            "nodes that must be ready before a run starts",
+            "names of the nodes that must be ready before a run starts",
         )
-        self.lookahead = declare(
+        declare(
             self,
             "longest_lookahead",
             10.0,
@@ -95,8 +96,9 @@ class Experiment(Participant, Node):
             unit="s",
             minimum=0.05,
             maximum=10.0,
+            read_only=False,
         )
-        self.silence_timeout = declare(
+        declare(
             self,
             "silence_timeout",
             3.0,
@@ -104,8 +106,9 @@ class Experiment(Participant, Node):
             unit="s",
             minimum=0.1,
             maximum=60.0,
+            read_only=False,
         )
-        self.ready_timeout = declare(
+        declare(
             self,
             "ready_timeout",
             30.0,
@@ -113,6 +116,7 @@ class Experiment(Participant, Node):
             unit="s",
             minimum=1.0,
             maximum=600.0,
+            read_only=False,
         )
         self.protocol = declare(
             self,
@@ -154,6 +158,19 @@ class Experiment(Participant, Node):
             cancel_callback=lambda _: CancelResponse.ACCEPT,
         )
 
+    # Parameters
+
+    def why_fixed(self, name: str) -> str:
+        """Return why a parameter cannot change now; timeouts always can."""
+        fixed = self.busy and name == "longest_lookahead"
+        return f"run {self.run_number} goes on; change it between runs" if fixed else ""
+
+    def take_parameters(self, value: Callable[[str], Any]) -> None:
+        """Take the next run's lookahead; timeouts count from now on."""
+        self.lookahead = value("longest_lookahead")
+        self.silence_timeout = value("silence_timeout")
+        self.ready_timeout = value("ready_timeout")
+
     # The run
 
     def on_goal(self, _: RunProtocol.Goal) -> GoalResponse:
@@ -188,6 +205,7 @@ class Experiment(Participant, Node):
         """Conduct a protocol, a file or its text; the result says how it ended."""
         self.run_number += 1
         self.begin_run()
+        self.note_state(DiagnosticStatus.OK, f"run {self.run_number} goes on")
         result = RunProtocol.Result(run=self.run_number, outcome=RunProtocol.Result.FAILED)
         try:
             final = await self.conduct(read_protocol(protocol))
@@ -195,6 +213,7 @@ class Experiment(Participant, Node):
             result.reproducible = final.reproducible
             result.message = final.message or "every stride of the protocol was walked"
             self.publish_state(Phase.FINISHED, result.message)
+            self.note_state(DiagnosticStatus.OK, f"run {self.run_number} finished")
             await self.transition(Transition.TRANSITION_DEACTIVATE)
         except (ExperimentError, ProtocolError) as failure:
             result.message = str(failure)

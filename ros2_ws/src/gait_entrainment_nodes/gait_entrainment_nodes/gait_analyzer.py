@@ -20,6 +20,8 @@ promised onsets, however their messages interleave.
 """
 
 import sys
+from collections.abc import Callable
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
@@ -30,7 +32,14 @@ from gait_entrainment.analysis.analyzer import Result
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.events import GaitEvent, Stride
 from gait_entrainment_msgs import msg
-from gait_entrainment_nodes.node import Participant, declare, declare_fields, run_node
+from gait_entrainment_nodes.node import (
+    Participant,
+    declare_fields,
+    declare_side,
+    fields_of,
+    run_node,
+    side_of,
+)
 from gait_entrainment_nodes.stamps import header, to_nanoseconds, to_time
 from gait_entrainment_nodes.topics import (
     ENTRAINMENT,
@@ -47,11 +56,8 @@ class GaitAnalyzerNode(Participant, Node):
 
     def __init__(self) -> None:
         super().__init__("gait_analyzer")
-        side = declare(self, "side", "right", "the perturbed leg: left or right")
-        if side not in ("left", "right"):
-            raise ValueError(f"side: {side!r}; allowed: left, right")
-        self.side = Side[side.upper()]
-        self.settings = declare_fields(self, VerdictSettings, "verdict")
+        declare_side(self, "side", "the perturbed leg: left or right")
+        declare_fields(self, VerdictSettings, "verdict.")
         self.begin_participation()
         self.strides = self.publisher(STRIDES)
         self.pulse_phases = self.publisher(PULSE_PHASES)
@@ -62,6 +68,17 @@ class GaitAnalyzerNode(Participant, Node):
         self.subscription(WALKER_PROGRESS, self.on_progress)
         self.create_service(Trigger, "~/finish", self.on_finish)
 
+    def why_fixed(self, name: str) -> str:
+        """Return why a parameter cannot change now: a run is analyzed with it."""
+        del name
+        going_on = self.run_number and not self.finished_run
+        return f"run {self.run_number} goes on; change it between runs" if going_on else ""
+
+    def take_parameters(self, value: Callable[[str], Any]) -> None:
+        """Take what the next run is analyzed with."""
+        self.settings = fields_of(VerdictSettings, value, "verdict.")
+        self.side = side_of("side", value)
+
     def begin_run(self, run: int) -> None:
         """Forget the run before: every message carries the number of its run."""
         self.run_number = run
@@ -71,6 +88,8 @@ class GaitAnalyzerNode(Participant, Node):
         self.final: msg.Progress | None = None
         self.finished_run = False
         self.doubts: dict[str, int] = {}  # counts of suspicious events, as reported last
+        if run:
+            self.note_state(DiagnosticStatus.OK, f"run {run} goes on")
 
     def of_this_run(self, run: int) -> bool:
         """Whether a message belongs to the run that is analyzed; a newer run begins anew."""

@@ -32,7 +32,12 @@ from typing import Any
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
 from rclpy.duration import Duration
 from rclpy.exceptions import (
     InvalidParameterTypeException,
@@ -46,13 +51,17 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 from std_srvs.srv import Trigger
 
+from gait_entrainment.conventions import Side
 from gait_entrainment_msgs.msg import PublishedCounts
 from gait_entrainment_nodes.raw_messages import serialize
 from gait_entrainment_nodes.stamps import header
 from gait_entrainment_nodes.topics import DIAGNOSTICS, PUBLISHED_COUNTS, Topic
 
+SIDES = ("left", "right")
 # The longest time [s] that the loop sleeps in the executor, so that a signal is soon obeyed.
 LONGEST_SLEEP = 0.1
+# How often a node's state goes to /diagnostics [s]; after 5 s of silence rqt calls it stale.
+STATE_PERIOD = 1.0
 # How often a full writer is tried again [s], while its slowest reader catches up.
 RETRY_PERIOD = 0.002
 # A writer that waits for a reader says so in the log after so long, and again [s].
@@ -134,17 +143,59 @@ class Participant:
     """
 
     get_logger: Callable[[], RcutilsLogger]
+    hardware_id = "none"  # of the hardware that diagnostics speak of
     stopping = False  # set from outside: the node is to end
 
     def begin_participation(self) -> None:
         """Set up what every participant has: behind its parameters, before its publishers."""
         refuse_unknown_parameters(self)
+        self.take_parameters(self.parameter)
+        self.add_on_set_parameters_callback(self._on_set_parameters)
         self.failure: str | None = None  # why the node must end with exit code 1
         self.finished = False  # set to end the loop with exit code 0
         self._publishers_counted: list[CountedPublisher] = []
         self._diagnostics = self.publisher(DIAGNOSTICS)
+        self.note_state(DiagnosticStatus.OK, "ready")
+        self._state_due = 0.0  # steady time [s]
         # Not counted itself: its message says what the others published.
         self._counts = CountedPublisher(self, PUBLISHED_COUNTS)
+
+    def parameter(self, name: str) -> Any:
+        """Return the value of a parameter."""
+        return self.get_parameter(name).value
+
+    def why_fixed(self, name: str) -> str:
+        """Return why a parameter that is not read-only cannot change now, or an empty text."""
+        del name
+        return ""
+
+    def take_parameters(self, value: Callable[[str], Any]) -> None:
+        """
+        Take the values of all parameters that may change, at the start and at each change.
+
+        Raises
+        ------
+        ValueError
+            where they cannot be; nothing has been taken then.
+
+        """
+
+    def _on_set_parameters(self, changes: Sequence[Any]) -> SetParametersResult:
+        """Take a change, or refuse it with the reason; types and ranges have been checked."""
+        values = {change.name: change.value for change in changes}
+        try:
+            for name, value in values.items():
+                reason = self.why_fixed(name)
+                if name == "use_sim_time":
+                    reason = "which clock counts is decided when the node starts"
+                if isinstance(value, float) and not math.isfinite(value):
+                    reason = "is not a finite number"
+                if reason:
+                    raise ValueError(f"{name}: {value!r} is refused: {reason}")
+            self.take_parameters(lambda n: values[n] if n in values else self.parameter(n))
+        except ValueError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
 
     def offer_ready(self) -> None:
         """
@@ -218,14 +269,28 @@ class Participant:
         )
 
     def diagnose(self, stamp: int, level: bytes, message: str, **values: object) -> None:
-        """Publish one diagnostic status of this node."""
-        status = DiagnosticStatus(
+        """Publish what has happened in a run; it is this node's state until the next is noted."""
+        self.note_state(level, message, **values)
+        self._publish_status("run", stamp)
+
+    def note_state(self, level: bytes, message: str, **values: object) -> None:
+        """Note how this node is: ``tell_state`` publishes it."""
+        self._status = DiagnosticStatus(
             level=level,
-            name=f"{self.get_name()}: run",
             message=message,
-            hardware_id="",
             values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
         )
+
+    def tell_state(self) -> None:
+        """Publish the state where it is due, so that who looks knows that this node is there."""
+        if time.monotonic() >= self._state_due:
+            self._state_due = time.monotonic() + STATE_PERIOD
+            self._publish_status("state", self.get_clock().now().nanoseconds)
+
+    def _publish_status(self, what: str, stamp: int) -> None:
+        status = self._status
+        status.name = f"{self.get_fully_qualified_name().lstrip('/')}: {what}"
+        status.hardware_id = self.hardware_id
         self._diagnostics.publish(DiagnosticArray(header=header(stamp), status=[status]))
 
     def next_deadline(self) -> float | None:
@@ -259,6 +324,7 @@ def declare(
     unit: str = "",
     minimum: float | None = None,
     maximum: float | None = None,
+    choices: Sequence[str] = (),
     read_only: bool = True,
 ) -> Any:
     """
@@ -273,6 +339,8 @@ def declare(
     text = f"{description} [{unit}]" if unit else description
     descriptor = ParameterDescriptor(description=text, read_only=read_only)
     allowed = f"a value like {default!r}"
+    if choices:
+        allowed = descriptor.additional_constraints = ", ".join(choices)
     if minimum is not None and maximum is not None:
         allowed = f"{minimum:g} to {maximum:g}" + (f" {unit}" if unit else "")
         if isinstance(default, int):
@@ -295,26 +363,41 @@ def declare(
     return value
 
 
-def declare_fields(node: Node, dataclass_type: Any, prefix: str = "") -> Any:
-    """
-    Declare every field of a dataclass as a parameter and return an instance of it.
+def declare_side(node: Node, name: str, description: str) -> None:
+    """Declare a parameter that names a leg and may change."""
+    declare(node, name, "right", description, choices=SIDES, read_only=False)
 
-    The fields' metadata say meaning, unit and, where it is fixed, the range. The dataclass checks
-    the rest when it is made.
+
+def side_of(name: str, value: Callable[[str], Any]) -> Side:
+    """Return the side that a parameter names; ValueError where it names none."""
+    if value(name) not in SIDES:
+        raise ValueError(f"{name}: {value(name)!r}; allowed: {', '.join(SIDES)}")
+    return Side[value(name).upper()]
+
+
+def declare_fields(node: Node, dataclass_type: Any, prefix: str = "") -> None:
     """
-    values = {}
+    Declare every field of a dataclass as a parameter that may change.
+
+    The fields' metadata say meaning, unit and range.
+    """
     for f in fields(dataclass_type):
-        low, high = f.metadata.get("range", (None, None))
-        values[f.name] = declare(
+        low, high = f.metadata["range"]
+        declare(
             node,
-            f"{prefix}.{f.name}" if prefix else f.name,
+            prefix + f.name,
             f.default,
             f.metadata["meaning"],
             unit=f.metadata["unit"],
             minimum=low,
             maximum=high,
+            read_only=False,
         )
-    return dataclass_type(**values)
+
+
+def fields_of(dataclass_type: Any, value: Callable[[str], Any], prefix: str = "") -> Any:
+    """Return a dataclass made of its parameters; it raises ValueError where they do not fit."""
+    return dataclass_type(**{f.name: value(prefix + f.name) for f in fields(dataclass_type)})
 
 
 def refuse_unknown_parameters(node: Any) -> None:
@@ -377,6 +460,7 @@ def run_node(make_node: Callable[[], Any], arguments: Sequence[str]) -> int:
                 if deadline is not None:
                     sleep = min(max(deadline - time.monotonic(), 0.0), LONGEST_SLEEP)
                 executor.spin_once(timeout_sec=sleep)
+                node.tell_state()
                 deadline = node.next_deadline()
                 if deadline is not None and time.monotonic() >= deadline:
                     node.on_deadline()

@@ -29,6 +29,7 @@ horizon.
 
 import sys
 import time
+from collections.abc import Callable
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -53,7 +54,15 @@ from gait_entrainment.device import TorqueProfile as CoreProfile
 from gait_entrainment.device.faults import STOPPED
 from gait_entrainment_msgs.action import DeliverPulseTrain
 from gait_entrainment_msgs.msg import AnkleRobotState, Horizon, TorqueProfile, TorquePulse
-from gait_entrainment_nodes.node import Participant, declare, declare_fields, run_node
+from gait_entrainment_nodes.node import (
+    Participant,
+    declare,
+    declare_fields,
+    declare_side,
+    fields_of,
+    run_node,
+    side_of,
+)
 from gait_entrainment_nodes.stamps import header, to_nanoseconds, to_time
 from gait_entrainment_nodes.topics import HORIZON, PULSES, ROBOT_STATE, TORQUE_PROFILE
 
@@ -66,28 +75,39 @@ class Perturbator(Participant, LifecycleNode):
 
     def __init__(self) -> None:
         super().__init__("perturbator")
-        side = declare(self, "side", "right", "ankle on which the robot sits: left or right")
-        if side not in ("left", "right"):
-            raise ValueError(f"side: {side!r}; allowed: left, right")
-        self.side = Side[side.upper()]
-        self.driver = declare(
-            self, "driver", "ideal", "ankle robot driver: NAME or NAME:OPTION=VALUE,..."
+        declare_side(self, "side", "ankle on which the robot sits: left or right")
+        declare(
+            self,
+            "driver",
+            "ideal",
+            "name of the ankle robot driver: NAME or NAME:OPTION=VALUE,...",
+            read_only=False,
         )
-        self.seed = declare(self, "seed", 0, "seed of a driver that draws random numbers")
-        self.armed = declare(
+        declare(
+            self,
+            "seed",
+            0,
+            "seed of a driver that draws random numbers",
+            unit="1",
+            minimum=0,
+            maximum=2**32 - 1,
+            read_only=False,
+        )
+        declare(
             self,
             "armed",
             False,
             "arm a real robot on activation; else a person does it by the service ~/arm",
+            read_only=False,
         )
-        self.limits = declare_fields(self, DeviceLimits, "limits")
+        declare_fields(self, DeviceLimits, "limits.")
+        self.robot: GuardedRobot | None = None  # from configuring to cleaning up
         self.begin_participation()
 
         self.profiles = self.publisher(TORQUE_PROFILE)
         self.pulses = self.publisher(PULSES)
         self.states = self.publisher(ROBOT_STATE)
 
-        self.robot: GuardedRobot | None = None  # from configuring to cleaning up
         self.open = False  # a run goes on whose closing horizon has not come
         self.committed = False  # torque may still come, of a train that was accepted
         self.reported: tuple[Fault, ...] = ()  # faults that /diagnostics has been told of
@@ -111,6 +131,22 @@ class Perturbator(Participant, LifecycleNode):
             goal_callback=self.on_goal,
             cancel_callback=self.guarded(self.on_cancel),
         )
+
+    # Parameters: the robot is configured with them
+
+    def why_fixed(self, name: str) -> str:
+        """Return why a parameter cannot change now: the robot has been made with it."""
+        del name
+        return "the robot is configured; clean it up first" if self.robot is not None else ""
+
+    def take_parameters(self, value: Callable[[str], Any]) -> None:
+        """Take what the next robot is made with."""
+        side = side_of("side", value)
+        find_driver(value("driver"))
+        self.limits = fields_of(DeviceLimits, value, "limits.")
+        self.side, self.driver = side, value("driver")
+        self.hardware_id = self.driver
+        self.seed, self.armed = value("seed"), value("armed")
 
     # Lifecycle
 
@@ -138,6 +174,7 @@ class Perturbator(Participant, LifecycleNode):
         except (LimitError, DeviceError) as error:
             return self.refuse(error)
         self.robot, self.reported = robot, ()
+        self.note_state(DiagnosticStatus.OK, "configured")
         return TransitionCallbackReturn.SUCCESS
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -151,6 +188,7 @@ class Perturbator(Participant, LifecycleNode):
             return self.refuse(error)
         if not self.robot.capabilities.simulated:
             self.look_at = time.monotonic()
+        self.note_state(DiagnosticStatus.OK, "active")
         return super().on_activate(state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -158,11 +196,14 @@ class Perturbator(Participant, LifecycleNode):
         self.end_torque(DeliverPulseTrain.Result.STOPPED, "the perturbator was deactivated")
         if self.robot is not None:
             self.robot.deactivate()
+            if not self.robot.faults:
+                self.note_state(DiagnosticStatus.OK, "inactive")
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Release the robot."""
         self.release()
+        self.note_state(DiagnosticStatus.OK, "unconfigured")
         return super().on_cleanup(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:

@@ -23,6 +23,7 @@ delay, and a stretch for which no promise came in time is walked without torque 
 import sys
 import time
 from collections import deque
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -41,7 +42,15 @@ from gait_entrainment_msgs.msg import AnkleTorque, GaitEvent, Progress
 from gait_entrainment_msgs.msg import TorqueProfile as TorqueProfileMessage
 from gait_entrainment_msgs.srv import StartRun
 from gait_entrainment_nodes.lateness import Lateness
-from gait_entrainment_nodes.node import Participant, declare, declare_fields, run_node
+from gait_entrainment_nodes.node import (
+    Participant,
+    declare,
+    declare_fields,
+    declare_side,
+    fields_of,
+    run_node,
+    side_of,
+)
 from gait_entrainment_nodes.raw_messages import MessageTemplate, mark
 from gait_entrainment_nodes.stamps import header, to_nanoseconds, to_time
 from gait_entrainment_nodes.topics import (
@@ -72,12 +81,9 @@ class WalkerSim(Participant, Node):
 
     def __init__(self) -> None:
         super().__init__("walker_sim")
-        self.parameters = declare_fields(self, WalkerParameters)
-        side = declare(self, "first_heel_strike", "right", "leg of heel strike 0: left or right")
-        if side not in ("left", "right"):
-            raise ValueError(f"first_heel_strike: {side!r}; allowed: left, right")
-        self.first_heel_strike = Side[side.upper()]
-        self.sample_rate = declare(
+        declare_fields(self, WalkerParameters)
+        declare_side(self, "first_heel_strike", "leg of heel strike 0: left or right")
+        declare(
             self,
             "sample_rate",
             200.0,
@@ -85,9 +91,10 @@ class WalkerSim(Participant, Node):
             unit="Hz",
             minimum=0.0,
             maximum=1000.0,
+            read_only=False,
         )
         self.real_time = declare(self, "real_time", False, "pace by the wall clock")
-        self.presentation_delay = declare(
+        declare(
             self,
             "presentation_delay",
             0.0,
@@ -95,11 +102,13 @@ class WalkerSim(Participant, Node):
             unit="s",
             minimum=0.0,
             maximum=1.0,
+            read_only=False,
         )
         self.acknowledged = declare(
             self, "acknowledged", False, "lock-step: keep to what a recorder has acknowledged"
         )
         with_forces = declare(self, "ground_reaction", True, "publish the ground reaction forces")
+        self.run: WalkerRun | None = None
         self.begin_participation()
 
         self.events = self.publisher(GAIT_EVENTS)
@@ -113,7 +122,6 @@ class WalkerSim(Participant, Node):
         # for.
         WalkerRun(self.parameters, self.first_heel_strike, 100.0).advance(NANOSECONDS_PER_SECOND)
 
-        self.run: WalkerRun | None = None
         self.run_number = 0
         self.start = 0  # instant of heel strike 0 [ns since 1970]
         self.steady_offset = 0  # steady time at which instant 0 is due [ns]
@@ -133,6 +141,22 @@ class WalkerSim(Participant, Node):
             self.subscription(RECORDER_PROGRESS, self.on_acknowledgement)
         self.create_service(StartRun, "~/start", self.on_start)
         self.create_service(Trigger, "~/reset", self.on_reset)
+
+    # Parameters: the next run begins with them
+
+    def why_fixed(self, name: str) -> str:
+        """Return why a parameter cannot change now: a run goes on."""
+        del name
+        going_on = self.run is not None and not self.run.ended
+        return f"run {self.run_number} goes on; change it between runs" if going_on else ""
+
+    def take_parameters(self, value: Callable[[str], Any]) -> None:
+        """Take the walker and how it is sampled."""
+        parameters = fields_of(WalkerParameters, value)
+        self.first_heel_strike = side_of("first_heel_strike", value)
+        self.parameters = parameters
+        self.sample_rate = value("sample_rate")
+        self.presentation_delay = value("presentation_delay")
 
     # Start, reset
 
@@ -159,6 +183,7 @@ class WalkerSim(Participant, Node):
         self.late_stretches = self.starved_stretches = 0
         self.starving = False
         self.lateness = Lateness()
+        self.note_state(DiagnosticStatus.OK, f"run {request.run} goes on")
         response.success, response.start = True, to_time(self.start)
         return response
 

@@ -1,0 +1,110 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Each package.xml says what the package needs: valid by REP 149, no dependency missing or idle.
+
+Whether rosdep knows a key cannot be asked without a network; docs/installation.md says when and
+against what the keys were looked up.
+"""
+
+import ast
+import re
+import sys
+from pathlib import Path
+
+import pytest
+from catkin_pkg.package import parse_package
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = [
+    *sorted((ROOT / "ros2_ws/src").glob("*/package.xml")),
+    *sorted((ROOT / "examples").glob("*/package.xml")),
+]
+# Modules whose key is not their own name; of most others it is python3-NAME or NAME.
+KEYS = {
+    "lz4": "mcap-ros2-support",
+    "mcap": "mcap-ros2-support",
+    "mcap_ros2": "mcap-ros2-support",
+    "mpmath": "python3-sympy",
+    "rosbags": "python3-rosbags-pip",
+    "zstandard": "mcap-ros2-support",
+}
+# rosdep knows no key for them; what needs them says so, or its tests are skipped.
+WITHOUT_KEY = {"distributed", "pyarrow"}
+# What is needed and not imported, and by what.
+NOT_IMPORTED = {
+    "python3-msgpack": "python-can, for the bus of processes on one host",
+    "rosgraph_msgs": "message definitions for the tests of bags",
+    "sensor_msgs": "message definitions for the tests of bags",
+    "std_msgs": "message definitions for the tests of bags",
+    "python3-pytest": "what runs the tests",
+    "ament_copyright": "test_linters.py",
+    "ament_flake8": "test_linters.py",
+    "ament_pep257": "test_linters.py",
+    "ament_xmllint": "test_linters.py",
+}
+
+
+def imported(folders):
+    """Return the outside modules that Python files import, by their first name."""
+    files = [file for folder in folders for file in folder.rglob("*.py")]
+    names = set()
+    for file in files:
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.Import):
+                names |= {alias.name.partition(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                names.add((node.module or "").partition(".")[0])
+    own = {file.stem for file in files} | {folder.name for folder in folders}
+    return names - own - set(sys.stdlib_module_names) - WITHOUT_KEY
+
+
+@pytest.fixture(params=PACKAGES, ids=lambda path: path.parent.name)
+def package(request):
+    warnings = []
+    package = parse_package(str(request.param), warnings=warnings)
+    package.validate(warnings=warnings)
+    assert warnings == []
+    return package
+
+
+def test_package_is_valid_and_named_by_rep_144(package):
+    assert package.package_format == 3
+    assert re.fullmatch(r"[a-z](_?[a-z0-9]+)+", package.name)
+    assert Path(package.filename).parent.name == package.name
+    assert package.licenses == ["Apache-2.0"]
+
+
+def test_dependencies_are_what_is_imported(package):
+    folder = Path(package.filename).parent
+    if package.get_build_type() == "ament_cmake":
+        found = re.findall(
+            r"find_package\((\w+) REQUIRED\)", (folder / "CMakeLists.txt").read_text()
+        )
+        declared = {d.name for d in package.build_depends + package.buildtool_depends}
+        assert set(found) == declared
+        return
+    at_run_time = {d.name for d in package.exec_depends}
+    in_tests = at_run_time | {d.name for d in package.test_depends}
+
+    def keys(modules):
+        return {KEYS.get(m, f"python3-{m}" if f"python3-{m}" in in_tests else m) for m in modules}
+
+    # pytest is what loads the plugin that imports it.
+    installed = keys(imported([folder / package.name, folder / "launch"]) - {"pytest"})
+    assert installed - at_run_time == set()
+    tested = keys(imported([folder / "test"]) - {package.name})
+    assert tested - in_tests == set()
+    assert in_tests - installed - tested - set(NOT_IMPORTED) == set()
