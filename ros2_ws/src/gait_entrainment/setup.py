@@ -33,7 +33,7 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": [
-            "entrain = gait_entrainment.commands:main",
+            "entrain = gait_entrainment.__main__:main",
             "ak_motor_emulator = gait_entrainment.device.ak_motor_emulator:main",
         ],
         "pytest11": ["ankle_robots = gait_entrainment.device.pytest_plugin"],

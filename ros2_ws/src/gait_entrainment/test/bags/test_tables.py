@@ -18,7 +18,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import pyarrow.parquet as parquet
 import pytest
 
 from gait_entrainment.bags import BagError, BagExistsError, BagWriter, TopicInfo, export
@@ -116,6 +115,7 @@ def test_every_kind_of_field_in_csv(bag: Path, tmp_path: Path) -> None:
 
 
 def test_every_kind_of_field_in_parquet(bag: Path, tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
     files = export(bag, tmp_path / "out", "parquet")
     table = parquet.read_table(files["/gait/all"])
     (row,) = table.to_pylist()

@@ -23,6 +23,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[5]
 EXAMPLE = ROOT / "examples" / "pneumatic_ankle_robot"
+pytestmark = pytest.mark.skipif(not EXAMPLE.exists(), reason="the repository is not here")
 
 
 @pytest.fixture(scope="module")

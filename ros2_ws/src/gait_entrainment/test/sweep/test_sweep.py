@@ -38,6 +38,8 @@ from gait_entrainment.sweep import (
     sweep_row,
 )
 
+pytest.importorskip("pyarrow", reason="a sweep is kept as Parquet: pip install pyarrow")
+
 TABLE_1 = WalkerParameters()
 
 

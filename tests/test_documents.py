@@ -1,0 +1,63 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The tables of topics in docs/architecture.md say what topics.py says."""
+
+import re
+from pathlib import Path
+
+from gait_entrainment_nodes import topics
+
+PAGE = (Path(__file__).parents[1] / "docs/architecture.md").read_text()
+QUALITIES = {
+    "every message": topics.EVERY_MESSAGE,
+    "latest state": topics.LATEST_STATE,
+    "diagnostics": topics.DIAGNOSTICS_QOS,
+    "drawing": topics.DRAWING,
+    "latest description": topics.LATEST_DESCRIPTION,
+    "looking on": topics.LOOKING_ON,
+}
+
+
+def rows(first_column):
+    """Return the rows of the table whose head begins with a word, cell by cell."""
+    table = re.search(rf"^\| {first_column} \|.*\n\|.*\n((?:\|.*\n)+)", PAGE, re.MULTILINE)[1]
+    return [[cell.strip(" `") for cell in line.split("|")[1:-1]] for line in table.splitlines()]
+
+
+def type_name(message_type):
+    package = message_type.__module__.partition(".")[0]
+    own = package == "gait_entrainment_msgs"
+    return message_type.__name__ if own else f"{package}/{message_type.__name__}"
+
+
+def test_topics_have_the_type_and_quality_that_the_page_says():
+    named = [t if type(t) is tuple else (t,) for t in vars(topics).values()]
+    actual = {
+        topic.name: (type_name(topic.type), topic.qos)
+        for group in named
+        for topic in group
+        if isinstance(topic, topics.Topic)
+    }
+    assert {row[0]: (row[1], QUALITIES[row[3]]) for row in rows("topic")} == actual
+
+
+def test_qualities_are_what_the_page_says():
+    said = {row[0]: " ".join(row[1:4]) for row in rows("quality")}
+    for name, qos in QUALITIES.items():
+        history = qos.history.name.lower() + (f" {qos.depth}" if qos.depth else "")
+        words = (history, qos.reliability.name.lower(), qos.durability.name.lower())
+        durability = "volatile" if words[2] == "system_default" else words[2]
+        assert said.pop(name) == f"{words[0]} {words[1]} {durability}".replace("_", " ")
+    assert said == {}
