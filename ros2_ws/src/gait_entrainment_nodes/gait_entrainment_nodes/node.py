@@ -21,7 +21,6 @@ default executor, and between two calls the node meets its own deadlines on stea
 
 import functools
 import json
-import math
 import signal
 import sys
 import time
@@ -188,8 +187,6 @@ class Participant:
                 reason = self.why_fixed(name)
                 if name == "use_sim_time":
                     reason = "which clock counts is decided when the node starts"
-                if isinstance(value, float) and not math.isfinite(value):
-                    reason = "is not a finite number"
                 if reason:
                     raise ValueError(f"{name}: {value!r} is refused: {reason}")
             self.take_parameters(lambda n: values[n] if n in values else self.parameter(n))
@@ -342,7 +339,7 @@ def declare(
     if choices:
         allowed = descriptor.additional_constraints = ", ".join(choices)
     if minimum is not None and maximum is not None:
-        allowed = f"{minimum:g} to {maximum:g}" + (f" {unit}" if unit else "")
+        allowed = f"{minimum:g} to {maximum:g}" + (f" {unit}" if unit not in ("", "1") else "")
         if isinstance(default, int):
             descriptor.integer_range = [
                 IntegerRange(from_value=int(minimum), to_value=int(maximum))
@@ -352,15 +349,12 @@ def declare(
                 FloatingPointRange(from_value=float(minimum), to_value=float(maximum))
             ]
     try:
-        value = node.declare_parameter(name, default, descriptor).value
+        return node.declare_parameter(name, default, descriptor).value
     except (InvalidParameterValueException, InvalidParameterTypeException):
         given = node._parameter_overrides[name].value
         if isinstance(default, float) and type(given) is int:
             allowed = f"a number with a decimal point, such as {float(given)!r}"
         raise ValueError(f"{name}: {given!r}; allowed: {allowed}") from None
-    if isinstance(value, float) and not math.isfinite(value):
-        raise ValueError(f"{name}: {value!r}; allowed: {allowed}")
-    return value
 
 
 def declare_side(node: Node, name: str, description: str) -> None:
