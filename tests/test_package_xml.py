@@ -46,6 +46,8 @@ WITHOUT_KEY = {"distributed", "pyarrow"}
 # What is needed and not imported, and by what.
 NOT_IMPORTED = {
     "python3-msgpack": "python-can, for the bus of processes on one host",
+    "diagnostic_msgs": "message definitions for the tests of bags",
+    "geometry_msgs": "message definitions for the tests of bags",
     "rosgraph_msgs": "message definitions for the tests of bags",
     "sensor_msgs": "message definitions for the tests of bags",
     "std_msgs": "message definitions for the tests of bags",

@@ -76,8 +76,9 @@ class GaitAnalyzerNode(Participant, Node):
 
     def take_parameters(self, value: Callable[[str], Any]) -> None:
         """Take what the next run is analyzed with."""
+        side = side_of("side", value)
         self.settings = fields_of(VerdictSettings, value, "verdict.")
-        self.side = side_of("side", value)
+        self.side = side
 
     def begin_run(self, run: int) -> None:
         """Forget the run before: every message carries the number of its run."""

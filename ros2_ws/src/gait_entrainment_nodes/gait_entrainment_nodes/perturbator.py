@@ -142,7 +142,10 @@ class Perturbator(Participant, LifecycleNode):
     def take_parameters(self, value: Callable[[str], Any]) -> None:
         """Take what the next robot is made with."""
         side = side_of("side", value)
-        find_driver(value("driver"))
+        try:
+            find_driver(value("driver"))
+        except DeviceError as error:
+            raise ValueError(str(error)) from None
         self.limits = fields_of(DeviceLimits, value, "limits.")
         self.side, self.driver = side, value("driver")
         self.hardware_id = self.driver
