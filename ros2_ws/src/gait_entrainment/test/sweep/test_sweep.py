@@ -18,6 +18,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 
 import numpy as np
 import pytest
@@ -170,7 +171,13 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path, capsys):
         "import sys; from gait_entrainment.commands import main; sys.exit(main())",
         *("sweep", "--out", str(out), "--strides", "400", "--jobs", "1", *OPTIONS),
     ]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, env=dict(os.environ))
+    process = subprocess.Popen(
+        command,
+        stderr=subprocess.PIPE,
+        env=dict(os.environ),
+        # A shell's background job, such as this test's own process, ignores the interrupt.
+        preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
+    )
     parts = out / "parts"
     # Until the first parts are there; a sweep that makes none ends by itself and fails below.
     while process.poll() is None and not (parts.exists() and len(list(parts.iterdir())) > 2):
