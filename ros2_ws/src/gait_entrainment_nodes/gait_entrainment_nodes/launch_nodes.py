@@ -30,6 +30,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.utilities import make_namespace_absolute, prefix_namespace
 
 from gait_entrainment_nodes.environment import config_file
+from gait_entrainment_nodes.node_list import DISPLAY
 from gait_entrainment_nodes.supervisor import PACKAGE
 
 # Argument of a launch file: name, default (None where it must be given), what --show-args tells.
@@ -42,7 +43,15 @@ PARAMETERS_FILE: Argument = (
 )
 RVIZ: Argument = ("rviz", "false", "show the walker in RViz: true or false")
 # Names of the root that are moved into a namespace: each experiment keeps its own time.
-MOVED = ("/clock", "/diagnostics", "/tf", "/tf_static")
+MOVED = (
+    "/clock",
+    "/diagnostics",
+    "/tf",
+    "/tf_static",
+    # Absolute in RViz's configuration alone.
+    "/robot_description",
+    "/walker_display/markers",
+)
 
 
 # How often a service is asked again [s].
@@ -119,22 +128,27 @@ def make_node(
     )
 
 
-def rviz(context: LaunchContext, namespace: str, *, simulated_time: bool) -> list[Action]:
-    """Return RViz with the picture of the walker, where it is wanted."""
+def rviz(context: LaunchContext, namespace: str, given: dict[str, Any]) -> list[Action]:
+    """
+    Return RViz, where it is wanted, and the node that draws the walker.
+
+    ``given`` holds parameters by node name; without those of the display, something else draws.
+    """
     if not is_true(context, "rviz"):
         return []
     picture = config_file("").parent / "rviz" / "walker.rviz"
-    return [
-        make_node(
-            context,
-            "rviz",
-            namespace,
-            {"use_sim_time": simulated_time},
-            package="rviz2",
-            executable="rviz2",
-            arguments=["-d", str(picture)],
-        )
-    ]
+    viewer = make_node(
+        context,
+        "rviz",
+        namespace,
+        {"use_sim_time": given["gait_analyzer"]["use_sim_time"]},
+        package="rviz2",
+        executable="rviz2",
+        arguments=["-d", str(picture)],
+    )
+    if DISPLAY not in given:
+        return [viewer]
+    return [make_node(context, DISPLAY, namespace, given[DISPLAY]), viewer]
 
 
 def in_background(context: LaunchContext, work: Callable[[], None]) -> None:

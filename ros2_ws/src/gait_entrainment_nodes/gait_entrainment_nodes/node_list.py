@@ -44,6 +44,8 @@ REAL_TIME_LOOKAHEAD = 0.3
 # the wall clock [s] the walker shows what it felt.
 MEASURED_DELAY = 0.1
 
+# Nodes of a replay; where it is recorded, the recorder comes last.
+REPLAY_NODES = ("bag_player", "gait_analyzer")
 # In a replay made anew, or of the processes that were recorded.
 NOT_REPLAYED = (
     "*/gait/strides",
@@ -110,9 +112,14 @@ def parameters(
             "publishers": list(PUBLISHERS),
             "custom_data": custom_data,
         },
-        DISPLAY: {name: walker[name] for name in ("leg_length", "foot_length")},
+        DISPLAY: _drawn(protocol),
     }
     return {name: given[name] | {"use_sim_time": not real_time} for name in given}
+
+
+def _drawn(protocol: Protocol) -> dict[str, Any]:
+    """Return what the display must know of the walker."""
+    return {"leg_length": protocol.walker.leg_length, "foot_length": protocol.walker.foot_length}
 
 
 def replay_parameters(
@@ -135,7 +142,7 @@ def replay_parameters(
     namespace
         Of the replay, without a slash at its end; "" for the root.
     parameters
-        By node name.
+        By node name; of the display only where the bag holds no picture of its own.
 
     Raises
     ------
@@ -148,12 +155,12 @@ def replay_parameters(
         recorded = next((name for name in topics if name.endswith("/gait_events")), None)
         if recorded is None or "protocol" not in bag.custom_data:
             raise BagError(f"{path}: not a run of this project: no protocol or no gait events")
-        side = read_protocol(bag.custom_data["protocol"]).side
+        protocol = read_protocol(bag.custom_data["protocol"])
     recorded = recorded.removesuffix("/gait_events")
     namespace = recorded if namespace is None else namespace.rstrip("/")
     moved = [name for name in topics if namespace != recorded and name.startswith(f"{recorded}/")]
     expected = [f"{namespace}/{n}" for n in ANALYZED if f"{recorded}/{n}" in topics]
-    return namespace, {
+    given = {
         "bag_player": {
             "bag": str(path.absolute()),
             "exclude": list(NOT_REPLAYED),
@@ -162,8 +169,11 @@ def replay_parameters(
             "expect": expected * listeners,
             "use_sim_time": False,
         },
-        "gait_analyzer": {"side": side.name.lower(), "use_sim_time": True},
+        "gait_analyzer": {"side": protocol.side.name.lower(), "use_sim_time": True},
     }
+    if f"{recorded}/robot_description" not in topics:
+        given[DISPLAY] = _drawn(protocol) | {"use_sim_time": True}
+    return namespace, given
 
 
 def bag_folder(protocol: Protocol) -> Path:

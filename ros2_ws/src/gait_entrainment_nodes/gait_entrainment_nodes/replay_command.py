@@ -27,7 +27,11 @@ from gait_entrainment.report.recorded_run import RecordedRun, read_run
 from gait_entrainment.report.summary import outcome_of, summary
 from gait_entrainment_nodes.domain import DomainError, claimed_domain
 from gait_entrainment_nodes.environment import set_environment
-from gait_entrainment_nodes.node_list import parameter_arguments, replay_parameters
+from gait_entrainment_nodes.node_list import (
+    REPLAY_NODES,
+    parameter_arguments,
+    replay_parameters,
+)
 from gait_entrainment_nodes.supervisor import Supervisor
 
 _EXAMPLES = """examples:
@@ -113,7 +117,7 @@ def replay(options: argparse.Namespace, domain: int) -> dict[str, list[bytes]]:
         supervisor = Supervisor(Path(folder), environment)
         client: ReplayClient | None = None
         try:
-            for node in parameters:
+            for node in (*REPLAY_NODES, *(["bag_recorder"] if recorder else [])):
                 moved = namespace and node != "bag_player"
                 supervisor.start(node, [*common, *(["-r", f"__ns:={namespace}"] if moved else [])])
             client = ReplayClient(supervisor, namespace, listeners=listeners)

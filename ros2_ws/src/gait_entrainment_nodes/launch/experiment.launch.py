@@ -59,7 +59,7 @@ def nodes(context: LaunchContext) -> list[Action]:
     over = [EmitEvent(event=Shutdown(reason="the experiment is over and recorded"))]
     return [
         *ended_by(made, {"experiment", "bag_recorder"}, over),
-        *rviz(context, namespace, simulated_time=not real_time),
+        *rviz(context, namespace, given),
         *made,
     ]
 

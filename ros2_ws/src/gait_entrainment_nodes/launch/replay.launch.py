@@ -39,7 +39,7 @@ from gait_entrainment_nodes.launch_nodes import (
     rviz,
     value,
 )
-from gait_entrainment_nodes.node_list import replay_parameters
+from gait_entrainment_nodes.node_list import REPLAY_NODES, replay_parameters
 
 
 def nodes(context: LaunchContext) -> list[Action]:
@@ -50,7 +50,7 @@ def nodes(context: LaunchContext) -> list[Action]:
     )
     if value(context, "rate"):
         given["bag_player"]["rate"] = float(value(context, "rate"))
-    made = [make_node(context, name, namespace or "/", given[name]) for name in given]
+    made = [make_node(context, name, namespace or "/", given[name]) for name in REPLAY_NODES]
     analyzer = get_ros_node(context).create_client(Trigger, f"{namespace}/gait_analyzer/finish")
 
     def finish() -> None:
@@ -63,7 +63,7 @@ def nodes(context: LaunchContext) -> list[Action]:
 
     return [
         *ended_by(made, {"bag_player"}, [last_word]),
-        *rviz(context, namespace or "/", simulated_time=True),
+        *rviz(context, namespace or "/", given),
         *made,
     ]
 
