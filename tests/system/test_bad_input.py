@@ -29,7 +29,6 @@ from gait_entrainment_nodes.domain import claimed_domain
 WRONG_USAGE = {
     "negative width": (["--width=-0.1"], ["width", "-0.1", "above 0"]),
     "overlapping pulses": (["--width=0.4", "--period=0.3"], ["width", "0.3", "below the period"]),
-    "torque above the limit": (["--torque=31"], ["torque", "31", "-30 to 30 N m"]),
     "weak spring": (["--ankle-stiffness=60"], ["ankle_stiffness", "60", "allowed:"]),
     "NaN": (["--mass=nan"], ["mass", "nan", "finite number"]),
     "infinite": (["--period-offset=inf"], ["period_offset", "inf", "-100"]),
@@ -38,7 +37,6 @@ WRONG_USAGE = {
     "sample rate NaN": (["--sample-rate=nan"], ["--sample-rate", "nan", "0 to 1000"]),
     "lead time": (["--lead-time=20"], ["--lead-time", "20", "0.05 to 10 s"]),
     "another host, no domain": (["--elsewhere=walker_sim"], ["--elsewhere", "ROS_DOMAIN_ID"]),
-    "unknown driver": (["--driver=magic"], ["driver", "magic", "ideal"]),
     "unreadable file": (["nowhere.yaml"], ["nowhere.yaml", "cannot be read"]),
     "a folder as file": (["."], [".", "cannot be read"]),
 }
@@ -71,6 +69,24 @@ def test_wrong_usage_is_one_line_and_leaves_nothing(case, tmp_path):
     options, named = WRONG_USAGE[case]
     code, text = entrain(tmp_path, *options)
     assert code == 2
+    assert_one_line(text, named)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (["--torque=31"], ["torque", "31", "-30 to 30 N m"]),
+        (["--driver=magic"], ["driver", "magic", "ideal"]),
+        (["--driver=emulated:delay=2"], ["delay: '2'", "0 to 0.5 s"]),
+        (["--driver=ak_mit_can:motor=AK1"], ["motor: 'AK1'", "AK80-9"]),
+        (["--driver=ak_mit_can"], ["runs in real time only", "add --real-time"]),
+        (["--driver=ak_mit_can", "--real-time"], ["applies real torque", "--arm"]),
+    ],
+)
+def test_what_the_robot_cannot_do_is_one_line_and_leaves_nothing(options, named, tmp_path):
+    code, text = entrain(tmp_path, *options)
+    assert code == 1
     assert_one_line(text, named)
     assert list(tmp_path.iterdir()) == []
 

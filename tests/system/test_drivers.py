@@ -20,18 +20,36 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 
 import pytest
-from harness import PROMISED_TOPICS, entrain_run, payloads, probe, session, stamp_of
+from harness import (
+    PROMISED_TOPICS,
+    QUICK,
+    Session,
+    entrain_run,
+    payloads,
+    probe,
+    session,
+    stamp_of,
+)
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from std_srvs.srv import Trigger
 
 from gait_entrainment.bags import BagReader
+from gait_entrainment.experiment import Phase
 from gait_entrainment.protocol import read_protocol
 from gait_entrainment.report.pulse_timing import recorded_timings
 from gait_entrainment.simulation import simulate
+from gait_entrainment_msgs.msg import AnkleRobotState
 from gait_entrainment_nodes.domain import claimed_domain
-from gait_entrainment_nodes.topics import ROBOT_STATE
+from gait_entrainment_nodes.node_list import STOP_ORDER
+from gait_entrainment_nodes.topics import DIAGNOSTICS, EXPERIMENT_STATE, ROBOT_STATE
 
 SHORT = ("--baseline=2", "--pulses=3", "--washout=1")
+WASHED_OUT = (*QUICK, "--baseline=2", "--pulses=2", "--washout=100000")
+CONFIGURE = Transition.TRANSITION_CONFIGURE
 CHANNEL = "239.74.163.2"
 
 
@@ -45,26 +63,35 @@ def entrain(domain, *arguments):
     return done.returncode, done.stdout, done.stderr
 
 
-@pytest.fixture
-def motor(tmp_path):
+@contextmanager
+def emulated_motor(tmp_path, *options):
     """Run the emulated motor, its own watchdog on; gives the driver's text and the trace."""
     port = 20_000 + os.getpid() % 20_000
     trace = tmp_path / "trace"
     process = subprocess.Popen(
-        ["ak_motor_emulator", "--port", str(port), "--timeout", "0.1", "--trace", str(trace)],
+        ["ak_motor_emulator", f"--port={port}", "--timeout=0.1", f"--trace={trace}", *options],
         stdout=subprocess.PIPE,
         text=True,
     )
     assert "ready" in process.stdout.readline()
-    # Patience for a machine that others share.
-    yield (
-        f"ak_mit_can:interface=udp_multicast,channel={CHANNEL},port={port},"
-        "rate=200,silence=0.9,lateness=0.9",
-        trace,
-    )
-    process.terminate()
-    process.wait(10)
-    process.stdout.close()
+    try:
+        # Patience for a machine that others share.
+        yield (
+            f"ak_mit_can:interface=udp_multicast,channel={CHANNEL},port={port},"
+            "rate=200,silence=0.9,lateness=0.9",
+            trace,
+        )
+    finally:
+        process.terminate()
+        process.wait(10)
+        process.stdout.close()
+
+
+@pytest.fixture
+def motor(tmp_path):
+    """Give what emulated_motor gives, as a fixture."""
+    with emulated_motor(tmp_path) as given:
+        yield given
 
 
 def torques_of(trace):
@@ -134,20 +161,71 @@ def test_killed_perturbator_leaves_zero_torque_by_the_motors_own_watchdog(tmp_pa
 
 
 @pytest.mark.parametrize(
-    ("options", "code", "words"),
+    ("options", "words"),
     [
-        ([], 2, "runs in real time only; add --real-time"),
-        (["--real-time"], 2, "applies real torque.*--arm"),
-        (["--real-time", "--arm"], 1, "perturbator refused to be configured"),
+        (
+            ["--driver=ak_mit_can:interface=virtual,channel=nobody", "--real-time", "--arm"],
+            "perturbator refused to be configured: motor 1 does not answer .* check its power",
+        ),
+        (
+            ["--driver=emulated:peak_torque=5", *SHORT],
+            "perturbator: pulse train rejected: torque: 13.* more than the .*; allowed: -5 to 5",
+        ),
     ],
 )
-def test_real_robot_is_not_started_by_mistake(tmp_path, options, code, words):
-    driver = "ak_mit_can:interface=virtual,channel=nobody"
-    with entrain_run(tmp_path / "bag", f"--driver={driver}", *options) as run:
-        assert run.wait() == code
-        assert re.search(words, run.text)
-        if code == 1:
-            assert "motor 1 does not answer" in run.text
+def test_what_a_robot_refuses_in_a_run_is_one_line(tmp_path, options, words):
+    with entrain_run(tmp_path / "bag", *options) as run:
+        assert run.wait() == 1
+        assert re.fullmatch(f"entrain run: {words}.*; the bag .*\n", run.text)
+    with BagReader(run.bag) as reader:
+        torques = [m.commanded_torque for _, m in reader.decoded(["/perturbator/state"])]
+    assert not any(torques)
+
+
+def test_node_refuses_a_real_robot_in_simulated_time(tmp_path):
+    with claimed_domain() as domain:
+        nodes = Session(tmp_path, domain, ["--driver=ak_mit_can"], real_time=True)
+        nodes.arguments += ["-p", "use_sim_time:=true"]
+        try:
+            nodes.start("perturbator")
+            heard = nodes.probe.listen(DIAGNOSTICS)
+            request = ChangeState.Request(transition=Transition(id=CONFIGURE))
+            assert not nodes.probe.call(ChangeState, "perturbator/change_state", request).success
+            status = nodes.probe.until(lambda: heard and heard[-1].status[0], "a reason")
+        finally:
+            nodes.probe.close()
+            nodes.supervisor.stop(STOP_ORDER)
+    assert status.message == "driver: ak_mit_can runs in real time only: use_sim_time must be off"
+
+
+def assert_failed_in_washout(run, words, status):
+    """Check that a run ended with one line; its bag is readable and shows stop and status."""
+    assert run.wait() == 1
+    assert re.fullmatch(f"entrain run: .*{words}.*; the bag .*\n", run.text)
+    topics = ["/experiment/state", "/perturbator/state", "/perturbation/torque_profile"]
+    with BagReader(run.bag) as reader:
+        phases, states, profiles = ([m for _, m in reader.decoded([topic])] for topic in topics)
+    assert [state.phase for state in phases[-2:]] == [Phase.WASHOUT, Phase.FAILED]
+    assert states[-1].status == status
+    assert sum(profile.stop for profile in profiles) == 1
+
+
+def test_stop_in_the_washout_fails_the_run(tmp_path):
+    with entrain_run(tmp_path / "bag", "--real-time", *WASHED_OUT) as run:
+        with probe(run.domain()) as listener:
+            states = listener.listen(EXPERIMENT_STATE)
+            listener.until(lambda: states and states[-1].phase == Phase.WASHOUT, "washout")
+            assert listener.call(Trigger, "perturbator/stop").success
+        words = "perturbator: latched: stopped: the stop service was called"
+        assert_failed_in_washout(run, words, AnkleRobotState.STOPPED)
+
+
+def test_fault_of_the_device_in_the_washout_fails_the_run(tmp_path):
+    with emulated_motor(tmp_path, "--error=2", "--error-after=2.5") as (driver, _):
+        options = (f"--driver={driver}", "--real-time", "--arm", *WASHED_OUT)
+        with entrain_run(tmp_path / "bag", *options) as run:
+            words = "perturbator: latched: over_current: The motor reports over-current."
+            assert_failed_in_washout(run, words, AnkleRobotState.FAULT)
 
 
 @pytest.mark.parametrize("driver", ["ideal", "emulated:state_rate=100"])

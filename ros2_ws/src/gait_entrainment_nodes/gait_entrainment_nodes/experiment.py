@@ -47,6 +47,7 @@ from gait_entrainment_msgs.srv import StartRun
 from gait_entrainment_nodes.node import Participant, declare, run_node
 from gait_entrainment_nodes.stamps import header, to_nanoseconds, to_time
 from gait_entrainment_nodes.topics import (
+    DIAGNOSTICS,
     EXPERIMENT_STATE,
     GAIT_EVENTS,
     HORIZON,
@@ -61,9 +62,10 @@ TICK = 0.02
 HELD_UP = 1.0
 # After so long [s] a participant is asked anew whether it is ready.
 ASK_AGAIN = 0.5
-# How long each step of ending a failed run may take [s]: who fails may not answer any more.
+# How long each step of ending a failed run may take [s]: who fails may not answer any more. And
+# how long its reason may come after its effect, which is on another topic.
 FAREWELL = 0.5
-
+NO_REASON = "it ended the torque or refused it, and gave no reason"
 
 _TRANSITIONS = {
     Transition.TRANSITION_CONFIGURE: "be configured",
@@ -130,10 +132,12 @@ class Experiment(Participant, Node):
         self.states = self.publisher(EXPERIMENT_STATE)
 
         self.run_number = 0
+        self.begin_run()
         self.busy = bool(self.protocol)  # a protocol has been accepted and has not ended yet
         self.own_begun = False  # the protocol of the parameter is conducted
         self.conductor: Conductor | None = None  # of the run that goes on
         self._goal: Any = None
+        self.perturbator = f"{self.get_namespace()}/perturbator".lstrip("/")
         self._tick_at = time.monotonic() + TICK
         self._waits: list[tuple[Future, float, str]] = []  # what, until when, why it matters
         self._ticks: list[Future] = []
@@ -142,6 +146,7 @@ class Experiment(Participant, Node):
         self.subscription(WALKER_PROGRESS, self.on_progress)
         self.subscription(TORQUE_PROFILE, self.on_profile)
         self.subscription(RECORDER_PROGRESS, self.on_recorder_progress)
+        self.subscription(DIAGNOSTICS, self.on_diagnostics)
         self._start = self.create_client(StartRun, "walker_sim/start")
         self._change_state = self.create_client(ChangeState, "perturbator/change_state")
         self._get_state = self.create_client(GetState, "perturbator/get_state")
@@ -209,12 +214,13 @@ class Experiment(Participant, Node):
         result = RunProtocol.Result(run=self.run_number, outcome=RunProtocol.Result.FAILED)
         try:
             final = await self.conduct(read_protocol(protocol))
-            result.outcome = RunProtocol.Result.FINISHED
             result.reproducible = final.reproducible
             result.message = final.message or "every stride of the protocol was walked"
+            await self.transition(Transition.TRANSITION_DEACTIVATE)
+            self.fail_if_troubled()
+            result.outcome = RunProtocol.Result.FINISHED
             self.publish_state(Phase.FINISHED, result.message)
             self.note_state(DiagnosticStatus.OK, f"run {self.run_number} finished")
-            await self.transition(Transition.TRANSITION_DEACTIVATE)
         except (ExperimentError, ProtocolError) as failure:
             result.message = str(failure)
             await self.give_up(result.message)
@@ -235,9 +241,14 @@ class Experiment(Participant, Node):
         conductor = Conductor(protocol, self.lookahead)
         start = await self.start_walker()
         self.conductor = conductor
+        self.fail_if_troubled()
         self.publish_horizon(start)
         final = await self.ended
         await self.close_run(self.silence_timeout)
+        # The answer came behind every stop: a walk to its end without torque is no success.
+        if self.stopped_at:
+            self.trouble = await self.reason()
+        self.fail_if_troubled()
         if final.state != msg.Progress.FINISHED:
             raise ExperimentError(final.message or "the walker ended the run")
         return final
@@ -280,6 +291,8 @@ class Experiment(Participant, Node):
         self.activated = False  # the perturbator is, for this run
         self.closed: Future | None = None  # the horizon that closes the run has been answered
         self.shown: tuple[Phase, int] | None = None
+        self.trouble = ""  # what the perturbator reports as an error
+        self.stopped_at = 0.0  # it has ended the torque or rejected the pulses, steady time [s]
 
     # Bringing the participants together
 
@@ -378,7 +391,7 @@ class Experiment(Participant, Node):
         )
         if not response.success:
             name = _TRANSITIONS[number]
-            raise ExperimentError(f"perturbator refused to {name}; its log says why")
+            raise ExperimentError(f"perturbator refused to {name}: {await self.reason()}")
 
     async def start_walker(self) -> int:
         """Start the walker; return the instant of heel strike 0 [ns since 1970]."""
@@ -484,8 +497,9 @@ class Experiment(Participant, Node):
         """Go on once the perturbator has accepted the pulses."""
         train_goal = future.result()
         if not train_goal.accepted:
-            self.fail("perturbator rejected the pulse train; its reason is in /diagnostics")
+            self.stopped_at = time.monotonic()
             return
+        self.trouble = ""  # of somebody else's train
         # Asked for at once: results expire.
         ended = train_goal.get_result_async()
         ended.add_done_callback(self.guarded(self.on_pulses_ended))
@@ -503,12 +517,39 @@ class Experiment(Participant, Node):
 
     def on_profile(self, profile: msg.TorqueProfile) -> None:
         """Note that the perturbator has answered a horizon."""
-        if profile.run == self.run_number and not profile.stop:
+        if profile.run != self.run_number:
+            return
+        if profile.stop:
+            self.stopped_at = self.stopped_at or time.monotonic()
+        else:
             self.profiles_received += 1
             self.profile_at = time.monotonic()
             closed = self.closed
             if closed is not None and not closed.done():
                 closed.set_result(None)
+
+    def on_diagnostics(self, message: Any) -> None:
+        """Note an error of the perturbator, and why it rejects pulses; the run ends with it."""
+        for status in message.status:
+            if status.name != f"{self.perturbator}: run":
+                continue
+            error = status.level == DiagnosticStatus.ERROR
+            if error or self.planning:
+                self.trouble = status.message
+            if error and self.conductor is not None:
+                self.fail(f"perturbator: {status.message}")
+
+    async def reason(self) -> str:
+        """Return why the perturbator did what it did; it may come later, on another topic."""
+        deadline = time.monotonic() + FAREWELL
+        while not self.trouble and time.monotonic() < deadline:
+            await self.tick()
+        return self.trouble or NO_REASON
+
+    def fail_if_troubled(self) -> None:
+        """Raise where the perturbator has reported an error."""
+        if self.trouble:
+            raise ExperimentError(f"perturbator: {self.trouble}")
 
     def on_recorder_progress(self, progress: msg.Progress) -> None:
         """Note how far the recorder is, to name it where it is what the walker waits for."""
@@ -545,6 +586,8 @@ class Experiment(Participant, Node):
             silent = self.silent_participant(now)
             if self.cancelled:
                 self.fail("cancelled by the client")
+            elif self.stopped_at and (self.trouble or now > self.stopped_at + FAREWELL):
+                self.fail(f"perturbator: {self.trouble or NO_REASON}")
             elif silent:
                 self.fail(f"{silent} has been silent for {self.silence_timeout:g} s")
 

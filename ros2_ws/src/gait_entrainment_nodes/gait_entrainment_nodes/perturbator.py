@@ -171,7 +171,9 @@ class Perturbator(Participant, LifecycleNode):
         try:
             driver = find_driver(self.driver)
             if self.get_parameter("use_sim_time").value and not driver.simulated:
-                raise DeviceError(f"driver: {driver.name} runs in real time only")
+                raise DeviceError(
+                    f"driver: {driver.name} runs in real time only: use_sim_time must be off"
+                )
             robot = driver.make(self.side, self.limits, self.seed)
             robot.configure()
         except (LimitError, DeviceError) as error:
@@ -199,6 +201,7 @@ class Perturbator(Participant, LifecycleNode):
         self.end_torque(DeliverPulseTrain.Result.STOPPED, "the perturbator was deactivated")
         if self.robot is not None:
             self.robot.deactivate()
+            self.report_faults()
             if not self.robot.faults:
                 self.note_state(DiagnosticStatus.OK, "inactive")
         return super().on_deactivate(state)
@@ -291,10 +294,11 @@ class Perturbator(Participant, LifecycleNode):
         new = [fault for fault in robot.faults if fault not in self.reported]
         self.reported = robot.faults
         for fault in new:
-            self.diagnose(
-                self.now, DiagnosticStatus.ERROR, f"latched: {fault.name}: {fault.meaning}"
-            )
+            told = f"latched: {fault.name}: {reason or fault.meaning}"
+            self.get_logger().error(told)
+            self.diagnose(self.now, DiagnosticStatus.ERROR, told)
         reason = reason or "; ".join(f"{fault.name}: {fault.meaning}" for fault in new)
+        self.committed |= self.open  # in a run the stop is told also where no torque was due
         self.end_torque(DeliverPulseTrain.Result.STOPPED, reason)
 
     # The action

@@ -116,7 +116,7 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run one experiment; 1 where it failed, 2 for a protocol or an option that is wrong."""
+    """Run one experiment; 1 where it or the robot failed, 2 for a wrong protocol or option."""
     try:
         protocol = checked_protocol(options)
         check_driver(protocol.driver, options)
@@ -126,7 +126,7 @@ def run(options: argparse.Namespace) -> int:
         check_output(bag)
     except (ProtocolError, LimitError, DeviceError) as error:
         print(f"entrain run: {error}", file=sys.stderr)
-        return 1 if isinstance(error, DeviceError) else 2
+        return 2 if isinstance(error, ProtocolError) else 1
     # Stopping from outside takes the same path as Ctrl-C: torque first, then the rest.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:

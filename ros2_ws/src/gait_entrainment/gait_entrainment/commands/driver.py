@@ -89,7 +89,7 @@ def list_drivers(options: argparse.Namespace) -> int:
 
 
 def check_driver(options: argparse.Namespace) -> int:
-    """Run the conformance kit; 1 where a promise is broken, 2 for a driver that is not there."""
+    """Run the conformance kit; 1 where a promise is broken or there is no such driver."""
     from gait_entrainment.device.conformance import Tolerances, run_checks
 
     if options.node is not None:
@@ -99,20 +99,13 @@ def check_driver(options: argparse.Namespace) -> int:
         refuse_unarmed(driver, options.arm)
         if not 0 < options.torque <= 30:
             raise LimitError(f"--torque: {options.torque:g} N m; allowed: above 0 and at most 30")
-    except LimitError as error:
-        print(f"entrain driver: {error}", file=sys.stderr)
-        return 2
-    except DeviceError as error:
-        print(f"entrain driver: {error}", file=sys.stderr)
-        return 1
-    if not driver.simulated:
-        # Without this, a device that is not there would break every promise in the same words.
-        try:
+        if not driver.simulated:
+            # Without this, a device that is not there would break every promise alike.
             with driver.make(Side.RIGHT) as robot:
                 robot.configure()
-        except DeviceError as error:
-            print(f"entrain driver: {error}", file=sys.stderr)
-            return 1
+    except (LimitError, DeviceError) as error:
+        print(f"entrain driver: {error}", file=sys.stderr)
+        return 1
     results = run_checks(driver, Tolerances(torque=options.torque))
     return report(options.driver, results, options.json)
 

@@ -49,7 +49,7 @@ def add_command(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Simulate and print; 1 where the walker falls or flies off, 2 for a wrong protocol."""
+    """Simulate and print; 1 where walker or robot cannot do it, 2 for a wrong protocol."""
     # Imported here: the compiled walker takes a while, and other commands do without it.
     from gait_entrainment.simulation import simulate
 
@@ -58,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
         simulation = simulate(protocol, measured_onsets=options.onset == "measured")
     except (ProtocolError, LimitError, DeviceError) as error:
         print(f"entrain simulate: {error}", file=sys.stderr)
-        return 2
+        return 2 if isinstance(error, ProtocolError) else 1
     outcome = outcome_of(
         protocol,
         simulation.analysis,

@@ -91,18 +91,34 @@ def test_options_reach_the_walker(capsys):
     [
         (["--width", "-0.1"], ["--width", "pulses.width", "above 0"]),
         (["--width", "nan"], ["--width", "nan"]),
-        (["--torque", "45"], ["torque: 45 N m", "-30 to 30"]),
         (["--ankle-stiffness", "60"], ["--ankle-stiffness", "67.48 to 111.9"]),
         (["--period", "0.05"], ["overlap"]),
         (["--period-offset", "-1.9"], ["overlap"]),
         (["--baseline", "1"], ["--baseline", "at least 2"]),
         (["no_such_file.yaml"], ["no_such_file.yaml", "cannot be read"]),
-        (["--driver", "unheard_of"], ["driver", "unheard_of", "ideal"]),
     ],
 )
 def test_a_mistake_gives_one_line_and_exit_code_2(capsys, options, words):
     code, out, err = simulate(capsys, *options)
     assert (code, out) == (2, "")
+    assert err.count("\n") == 1
+    for word in words:
+        assert word in err
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--torque", "45"], ["torque: 45 N m", "-30 to 30"]),
+        (["--driver", "unheard_of"], ["driver", "unheard_of", "ideal"]),
+        (["--driver", "emulated:delay=2"], ["delay: '2'", "0 to 0.5 s"]),
+        (["--driver", "emulated:peak_torque=5"], ["13.3464 N m is more than", "-5 to 5 N m"]),
+        (["--driver", "ak_mit_can:channel=none"], ["real time only", "entrain run --real-time"]),
+    ],
+)
+def test_what_the_robot_cannot_do_gives_one_line_and_exit_code_1(capsys, options, words):
+    code, out, err = simulate(capsys, *options)
+    assert (code, out) == (1, "")
     assert err.count("\n") == 1
     for word in words:
         assert word in err
