@@ -208,6 +208,7 @@ WRONG_PARAMETERS = [
     ("perturbator", ["-p", "side:=up"], ["side", "'up'", "left, right"]),
     ("perturbator", ["-p", "limits.torque:=1000.0"], ["limits.torque", "1000.0", "0 to 200"]),
     ("gait_analyzer", ["-p", "side:=3"], ["side", "3"]),
+    ("gait_analyzer", ["-p", "onset:=felt"], ["onset", "'felt'", "commanded, measured"]),
     ("experiment", ["-p", "silence_timeout:=0.0"], ["silence_timeout", "0.1 to 60 s"]),
     ("bag_recorder", [], ["output", "folder"]),
     ("bag_recorder", ["-p", "output:=/proc/bag"], ["output", "/proc/bag"]),

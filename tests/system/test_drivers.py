@@ -41,6 +41,7 @@ from gait_entrainment.bags import BagReader
 from gait_entrainment.experiment import Phase
 from gait_entrainment.protocol import read_protocol
 from gait_entrainment.report.pulse_timing import recorded_timings
+from gait_entrainment.report.recorded_run import read_run
 from gait_entrainment.simulation import simulate
 from gait_entrainment_msgs.msg import AnkleRobotState
 from gait_entrainment_nodes.domain import claimed_domain
@@ -54,11 +55,12 @@ CHANNEL = "239.74.163.2"
 
 
 def entrain(domain, *arguments):
-    """Run one command in a domain; return exit code, standard output and error."""
+    """Run one command, in a domain or its own; return exit code, standard output and error."""
+    chosen = {} if domain is None else {"ROS_DOMAIN_ID": str(domain)}
     done = subprocess.run(
         ["entrain", *arguments],
         capture_output=True, text=True, check=False,
-        env={**os.environ, "ROS_DOMAIN_ID": str(domain)},
+        env={**os.environ, **chosen},
     )  # fmt: skip
     return done.returncode, done.stdout, done.stderr
 
@@ -100,14 +102,16 @@ def torques_of(trace):
 
 
 def test_emulated_robot_walks_as_in_the_simulation_and_twice_the_same(tmp_path):
-    options = ("--driver=emulated:state_rate=250", "--seed=5", "--json", *SHORT)
+    driver = "--driver=emulated:state_rate=250"
+    options = (driver, "--seed=5", "--onset=measured", "--json", *SHORT)
     bags = [tmp_path / "first", tmp_path / "second"]
     for bag in bags:
         with entrain_run(bag, *options) as run:
             outcome = run.outcome()
     with BagReader(bags[0]) as reader:
         events = [message for _, message in reader.decoded(["/gait_events"])]
-        simulation = simulate(read_protocol(reader.custom_data["protocol"]))
+        protocol = read_protocol(reader.custom_data["protocol"])
+    simulation = simulate(protocol, measured_onsets=True)
     walked = [stamp_of(event.header) - stamp_of(events[0].header) for event in events]
     assert walked == [event.stamp for event in simulation.events]
     # Commanded, sent and measured onset of each pulse are in the bag.
@@ -123,6 +127,21 @@ def test_emulated_robot_walks_as_in_the_simulation_and_twice_the_same(tmp_path):
     timing = outcome["pulse_timing"]
     assert timing["measured"]["pulses"] == 3
     assert 5 < timing["measured"]["median_ms"] < 20
+    # Onsets as measured: online, offline and simulated alike, and not those of the commands.
+    offline = read_run(bags[0], torques=False)
+    assert (offline.onset, offline.differences) == ("measured", ())
+    lags = [pulse.phase_lag for pulse in simulation.analysis.pulses]
+    assert [pulse["phase_lag"] for pulse in outcome["pulses"]] == lags
+    assert [pulse.phase_lag for pulse in offline.analysis.pulses] == lags
+    commanded = read_run(bags[0], torques=False, onset="commanded")
+    assert all(
+        measured - pulse.phase_lag > 0.005
+        for measured, pulse in zip(lags, commanded.analysis.pulses, strict=True)
+    )
+    assert commanded.differences == ()
+    code, out, err = entrain(None, "replay", str(bags[0]))
+    assert (code, err) == (0, ""), out
+    assert "the same, byte for byte" in out
 
 
 def test_motor_on_a_bus_delivers_the_experiment_in_real_time(tmp_path, motor):

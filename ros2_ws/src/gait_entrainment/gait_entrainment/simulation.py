@@ -102,7 +102,7 @@ def simulate(
                 robot.schedule(train)
     timings += audit.finish()
     if measured_onsets:
-        onsets = [t.commanded if t.measured is None else t.measured for t in timings]
+        onsets = [timing.onset for timing in timings]
     return Simulation(
         protocol=protocol,
         events=tuple(events),

@@ -16,7 +16,7 @@
 gait_analyzer: stride periods, pulse phases and the entrainment verdict, online, from stamps.
 
 A listener: nothing waits for it. What it publishes is a pure function of the events and the
-promised onsets, however their messages interleave.
+onsets, promised or measured, however their messages interleave.
 """
 
 import sys
@@ -30,10 +30,12 @@ from std_srvs.srv import Trigger
 from gait_entrainment.analysis import Entrainment, GaitAnalyzer, PulsePhase, VerdictSettings
 from gait_entrainment.analysis.analyzer import Result
 from gait_entrainment.conventions import EventKind, Side
+from gait_entrainment.device import MeasuredOnsets, RobotState
 from gait_entrainment.events import GaitEvent, Stride
 from gait_entrainment_msgs import msg
 from gait_entrainment_nodes.node import (
     Participant,
+    declare,
     declare_fields,
     declare_side,
     fields_of,
@@ -45,10 +47,14 @@ from gait_entrainment_nodes.topics import (
     ENTRAINMENT,
     GAIT_EVENTS,
     PULSE_PHASES,
+    PULSES,
+    ROBOT_STATE,
     STRIDES,
     TORQUE_PROFILE,
     WALKER_PROGRESS,
 )
+
+ONSETS = ("commanded", "measured")
 
 
 class GaitAnalyzerNode(Participant, Node):
@@ -57,6 +63,15 @@ class GaitAnalyzerNode(Participant, Node):
     def __init__(self) -> None:
         super().__init__("gait_analyzer")
         declare_side(self, "side", "the perturbed leg: left or right")
+        self.onset = declare(
+            self,
+            "onset",
+            ONSETS[0],
+            "where a pulse begins: commanded, or measured where the robot's torque rises",
+            choices=ONSETS,
+        )
+        if self.onset not in ONSETS:
+            raise ValueError(f"onset: {self.onset!r}; allowed: {', '.join(ONSETS)}")
         declare_fields(self, VerdictSettings, "verdict.")
         self.begin_participation()
         self.strides = self.publisher(STRIDES)
@@ -66,6 +81,9 @@ class GaitAnalyzerNode(Participant, Node):
         self.subscription(GAIT_EVENTS, self.on_event)
         self.subscription(TORQUE_PROFILE, self.on_profile)
         self.subscription(WALKER_PROGRESS, self.on_progress)
+        if self.onset == "measured":
+            self.subscription(PULSES, self.on_pulse)
+            self.subscription(ROBOT_STATE, self.on_state)
         self.create_service(Trigger, "~/finish", self.on_finish)
 
     def why_fixed(self, name: str) -> str:
@@ -85,7 +103,9 @@ class GaitAnalyzerNode(Participant, Node):
         self.run_number = run
         self.analyzer = GaitAnalyzer(self.side, self.settings)
         self.events = 0
+        self.measured = MeasuredOnsets()
         self.promised_until = 0  # all pulses up to this instant are known [ns since 1970]
+        self.closed = False  # nothing will be promised any more
         self.final: msg.Progress | None = None
         self.finished_run = False
         self.doubts: dict[str, int] = {}  # counts of suspicious events, as reported last
@@ -116,11 +136,36 @@ class GaitAnalyzerNode(Participant, Node):
         if not self.of_this_run(profile.run):
             return
         if profile.stop:
-            self.analyzer.stop(to_nanoseconds(profile.header.stamp))
+            stamp = to_nanoseconds(profile.header.stamp)
+            self.analyzer.stop(stamp)
+            self.measured.stop(stamp)
             return
         onsets = [to_nanoseconds(onset) for onset in profile.onsets]
         self.promised_until = to_nanoseconds(profile.valid_until)
-        self.publish(self.analyzer.add_promise(onsets, self.promised_until))
+        self.closed = self.promised_until == to_nanoseconds(profile.header.stamp)
+        known = onsets, self.promised_until
+        if self.onset == "measured":
+            known = self.measured.add_promise(*known)
+        self.take_onsets(*known)
+
+    def on_pulse(self, pulse: msg.TorquePulse) -> None:
+        """Take height and width of a pulse, to know its measured onset by."""
+        if self.of_this_run(pulse.run):
+            onset = to_nanoseconds(pulse.header.stamp)
+            self.take_onsets(*self.measured.add_pulse(onset, pulse.torque, pulse.duration))
+
+    def on_state(self, state: msg.AnkleRobotState) -> None:
+        """Take the torque that the robot measured."""
+        if self.of_this_run(state.run):
+            torques = state.commanded_torque, state.measured_torque
+            sampled = RobotState(to_nanoseconds(state.header.stamp), *torques, state.angle)
+            self.take_onsets(*self.measured.add_state(sampled))
+
+    def take_onsets(self, onsets: list[int], until: int) -> None:
+        """Hand onsets to the analyzer, with the promise that none before an instant follow."""
+        if self.finished_run:
+            return
+        self.publish(self.analyzer.add_promise(onsets, until))
         self.finish_if_complete()
 
     def on_progress(self, progress: msg.Progress) -> None:
@@ -137,12 +182,18 @@ class GaitAnalyzerNode(Participant, Node):
         end = to_nanoseconds(final.header.stamp)
         if self.promised_until < end:
             return
+        if self.onset == "measured" and not (
+            self.closed and self.measured.states_until >= self.promised_until
+        ):
+            return  # the state at the closing instant is the last one
         self.finish(end)
 
     def finish(self, end: int) -> None:
         """Publish what was waiting: nothing more of this run will come."""
         self.final = None
         self.finished_run = True
+        if self.onset == "measured":
+            self.publish(self.analyzer.add_promise(self.measured.finish(), end))
         self.publish(self.analyzer.finish())
         self.publish_counts(self.run_number, end)
 

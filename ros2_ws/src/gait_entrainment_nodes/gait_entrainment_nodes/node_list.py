@@ -58,6 +58,7 @@ NOT_REPLAYED = (
     "/parameter_events",
 )
 ANALYZED = ("gait_events", "perturbation/torque_profile", "walker_sim/progress")
+MEASURED = ("perturbation/pulses", "perturbator/state")  # where onsets are those measured
 
 
 def parameters(
@@ -67,6 +68,7 @@ def parameters(
     *,
     real_time: bool,
     armed: bool = False,
+    onset: str = "commanded",
 ) -> dict[str, dict[str, Any]]:
     """
     Return the parameters of every node for one run, by node name.
@@ -83,6 +85,8 @@ def parameters(
         Real time instead of lock-step.
     armed
         Whether a real robot may deliver torque without another word.
+    onset
+        Where the analyzer lets a pulse begin: "commanded" or "measured".
 
     """
     side = protocol.side.name.lower()
@@ -105,7 +109,7 @@ def parameters(
             "seed": protocol.seed,
             "armed": armed,
         },
-        "gait_analyzer": {"side": side},
+        "gait_analyzer": {"side": side, "onset": onset},
         "experiment": experiment,
         "bag_recorder": {
             "output": bag,
@@ -156,10 +160,12 @@ def replay_parameters(
         if recorded is None or "protocol" not in bag.custom_data:
             raise BagError(f"{path}: not a run of this project: no protocol or no gait events")
         protocol = read_protocol(bag.custom_data["protocol"])
+        onset = bag.custom_data.get("onset", "commanded")
     recorded = recorded.removesuffix("/gait_events")
     namespace = recorded if namespace is None else namespace.rstrip("/")
     moved = [name for name in topics if namespace != recorded and name.startswith(f"{recorded}/")]
-    expected = [f"{namespace}/{n}" for n in ANALYZED if f"{recorded}/{n}" in topics]
+    analyzed = (*ANALYZED, *MEASURED) if onset == "measured" else ANALYZED
+    expected = [f"{namespace}/{n}" for n in analyzed if f"{recorded}/{n}" in topics]
     given = {
         "bag_player": {
             "bag": str(path.absolute()),
@@ -169,7 +175,11 @@ def replay_parameters(
             "expect": expected * listeners,
             "use_sim_time": False,
         },
-        "gait_analyzer": {"side": protocol.side.name.lower(), "use_sim_time": True},
+        "gait_analyzer": {
+            "side": protocol.side.name.lower(),
+            "onset": onset,
+            "use_sim_time": True,
+        },
     }
     if f"{recorded}/robot_description" not in topics:
         given[DISPLAY] = _drawn(protocol) | {"use_sim_time": True}

@@ -22,7 +22,7 @@ from pathlib import Path
 from gait_entrainment.protocol import Protocol, write_protocol
 
 
-def provenance(protocol: Protocol, *, real_time: bool) -> dict[str, str]:
+def provenance(protocol: Protocol, *, real_time: bool, onset: str = "commanded") -> dict[str, str]:
     """Return what the bag keeps of how it came about."""
     packages = ("gait_entrainment", "numpy", "mcap")
     return {
@@ -30,6 +30,7 @@ def provenance(protocol: Protocol, *, real_time: bool) -> dict[str, str]:
         "driver": protocol.driver,
         "seed": str(protocol.seed),
         "mode": "real time" if real_time else "lock-step",
+        "onset": onset,
         "versions": json.dumps({package: version(package) for package in packages}),
         "commit": commit(),
     }

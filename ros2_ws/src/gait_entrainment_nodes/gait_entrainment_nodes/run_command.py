@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from gait_entrainment.bags import BagError, BagReader, UnreadableBagError, recover
+from gait_entrainment.commands.outcome_options import add_onset_option
 from gait_entrainment.commands.protocol_options import add_protocol_options, chosen_protocol
 from gait_entrainment.device import DeviceError, DeviceLimits, LimitError, find_driver
 from gait_entrainment.protocol import Protocol, ProtocolError, write_protocol
@@ -113,6 +114,7 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-ground-reaction", action="store_true", help="leave out the ground reaction forces"
     )
+    add_onset_option(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -227,9 +229,10 @@ def chosen_parameters(
     chosen = parameters(
         protocol,
         str(bag.absolute()),
-        json.dumps(provenance(protocol, real_time=options.real_time)),
+        json.dumps(provenance(protocol, real_time=options.real_time, onset=options.onset)),
         real_time=options.real_time,
         armed=options.arm,
+        onset=options.onset,
     )
     if options.sample_rate is not None:
         chosen["walker_sim"]["sample_rate"] = options.sample_rate
@@ -287,11 +290,7 @@ def walker_timing(bag: Path) -> dict[str, float]:
 
 def report(bag: Path, options: argparse.Namespace) -> int:
     """Print the outcome from the bag and draw its figures."""
-    from gait_entrainment.report.pulse_timing import (
-        recorded_timings,
-        timing_outcome,
-        timing_summary,
-    )
+    from gait_entrainment.report.pulse_timing import timing_outcome, timing_summary
     from gait_entrainment.report.recorded_run import read_run
     from gait_entrainment.report.summary import outcome_of, summary
 
@@ -309,7 +308,7 @@ def report(bag: Path, options: argparse.Namespace) -> int:
         "messages": recorded.messages,
         "lost": recorded.lost,
         "real_time_factor": None if math.isnan(factor) else factor,
-        "pulse_timing": timing_outcome(recorded_timings(bag), recorded.measured_period),
+        "pulse_timing": timing_outcome(recorded.timings, recorded.measured_period),
     }
     timing = walker_timing(bag)
     lateness = {

@@ -45,13 +45,14 @@ from gait_entrainment_nodes.provenance import provenance
 def nodes(context: LaunchContext) -> list[Action]:
     """Make the nodes once the arguments are known: the protocol says what they are given."""
     protocol = read_protocol(value(context, "protocol") or None)
-    real_time = is_true(context, "real_time")
+    real_time, onset = is_true(context, "real_time"), value(context, "onset")
     given = parameters(
         protocol,
         value(context, "bag") or str(bag_folder(protocol).absolute()),
-        json.dumps(provenance(protocol, real_time=real_time)),
+        json.dumps(provenance(protocol, real_time=real_time, onset=onset)),
         real_time=real_time,
         armed=is_true(context, "arm"),
+        onset=onset,
     )
     given["experiment"]["protocol"] = write_protocol(protocol)
     namespace = value(context, "namespace")
@@ -72,6 +73,7 @@ def generate_launch_description() -> LaunchDescription:
                 ("protocol", "", "protocol file (YAML); empty: the paper's example"),
                 ("real_time", "false", "at the pace of the wall clock, not in lock-step"),
                 ("arm", "false", "let a real ankle robot deliver torque at once: see safety.md"),
+                ("onset", "commanded", "where the analyzer lets a pulse begin: or measured"),
                 ("bag", "", "folder of the bag; empty: bags/<time>_<name>"),
                 NAMESPACE,
                 PARAMETERS_FILE,

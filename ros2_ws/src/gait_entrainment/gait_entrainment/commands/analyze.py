@@ -18,7 +18,6 @@ import argparse
 import json
 import math
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -43,20 +42,15 @@ def add_command(commands: Any) -> None:
     )
     parser.add_argument("bag", type=Path, metavar="BAG", help="folder or .mcap file")
     parser.add_argument("--figures", type=Path, metavar="FOLDER", help="draw figures into it")
-    add_outcome_options(parser)
+    add_outcome_options(parser, onset=None)
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Analyze and print; 1 where the bag cannot be analyzed, 2 where there is none."""
     # Imported here: other commands do without the readers.
-    from gait_entrainment.analysis import analyze
     from gait_entrainment.bags import BagError
-    from gait_entrainment.report.pulse_timing import (
-        recorded_timings,
-        timing_outcome,
-        timing_summary,
-    )
+    from gait_entrainment.report.pulse_timing import timing_outcome, timing_summary
     from gait_entrainment.report.recorded_run import read_run
     from gait_entrainment.report.summary import outcome_of, summary
 
@@ -65,14 +59,10 @@ def run(options: argparse.Namespace) -> int:
         return 2
     figures: list[Path] = []
     try:
-        recorded = read_run(options.bag, torques=options.figures is not None)
-        timings = recorded_timings(options.bag)
-        timing = timing_outcome(timings, recorded.measured_period)
-        if options.onset == "measured":
-            onsets = [t.commanded if t.measured is None else t.measured for t in timings]
-            analysis = analyze(recorded.events, onsets, recorded.protocol.side)
-            recorded = replace(recorded, analysis=analysis)
-        if options.figures is not None:
+        drawn = options.figures is not None
+        recorded = read_run(options.bag, torques=drawn, onset=options.onset)
+        timing = timing_outcome(recorded.timings, recorded.measured_period)
+        if drawn:
             from gait_entrainment.report.figures import draw_figures
 
             options.figures.mkdir(parents=True, exist_ok=True)

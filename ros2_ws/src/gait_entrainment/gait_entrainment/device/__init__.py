@@ -18,6 +18,7 @@ from gait_entrainment.device.drivers import Driver, driver_names, find_driver
 from gait_entrainment.device.faults import DeviceError, Fault, LimitError
 from gait_entrainment.device.guard import GuardedRobot
 from gait_entrainment.device.limits import DeviceLimits
+from gait_entrainment.device.measured_onsets import MeasuredOnsets
 from gait_entrainment.device.profile import TorqueProfile
 from gait_entrainment.device.pulse_train import PulseTrain
 from gait_entrainment.device.robot import AnkleRobot, Capabilities, RobotState
@@ -32,6 +33,7 @@ __all__ = [
     "Fault",
     "GuardedRobot",
     "LimitError",
+    "MeasuredOnsets",
     "PulseTiming",
     "PulseTrain",
     "RobotState",

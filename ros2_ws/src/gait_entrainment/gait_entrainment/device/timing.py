@@ -25,7 +25,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, nanoseconds
+from gait_entrainment.conventions import nanoseconds
 from gait_entrainment.device.robot import RobotState
 
 # Half the height: noise has to reach that far to be mistaken, and the instant does not depend on
@@ -35,7 +35,7 @@ CROSSING = 0.5
 LATEST = 0.2
 # States further apart [ns] are those of a torque that jumped at the later one: there is nothing
 # to interpolate over.
-_LONGEST_GAP = 20_000_000
+LONGEST_GAP = 20_000_000
 
 
 def measured_onset(
@@ -77,7 +77,7 @@ def _crossing(
             continue
         if level >= fraction and before is not None and before[1] < fraction:
             earlier, lower = before
-            if stamp - earlier > _LONGEST_GAP:
+            if stamp - earlier > LONGEST_GAP:
                 return index, stamp
             share = (fraction - lower) / (level - lower)
             return index, earlier + round((stamp - earlier) * share)
@@ -92,6 +92,11 @@ class PulseTiming:
     commanded: int
     sent: int | None
     measured: int | None
+
+    @property
+    def onset(self) -> int:
+        """The measured onset; the commanded one where no torque shows it."""
+        return self.commanded if self.measured is None else self.measured
 
 
 @dataclass(frozen=True)
@@ -115,6 +120,10 @@ class TimingAudit:
     def add_pulse(self, onset: int, height: float, duration: float) -> None:
         """Note a pulse: commanded onset [ns], height [N m], width [s]."""
         self._pulses.append(_Pulse(onset, height, duration))
+
+    def stop(self, stamp: int) -> None:
+        """Forget the pulses that would have begun from an instant [ns] on."""
+        self._pulses = [pulse for pulse in self._pulses if pulse.onset < stamp]
 
     def add_states(self, states: Sequence[RobotState]) -> list[PulseTiming]:
         """Note states, and return the timing of the pulses about which all is known now."""
@@ -155,6 +164,15 @@ class TimingAudit:
         return PulseTiming(pulse.onset, sent, measured)
 
 
+def lateness_ms(timings: Sequence[PulseTiming], kind: str) -> list[float]:
+    """Return by how many ms pulses were "sent" or "measured" after their command, ascending."""
+    return sorted(
+        (onset - timing.commanded) / 1e6
+        for timing in timings
+        if (onset := getattr(timing, kind)) is not None
+    )
+
+
 def distribution(
     timings: Sequence[PulseTiming], kind: str, stride: float
 ) -> dict[str, Any] | None:
@@ -171,19 +189,15 @@ def distribution(
         Stride period [s]; percentages are of it.
 
     """
-    late = sorted(
-        (onset - timing.commanded) / NANOSECONDS_PER_SECOND
-        for timing in timings
-        if (onset := getattr(timing, kind)) is not None
-    )
+    late = lateness_ms(timings, kind)
     if not late:
         return None
     figures = {"median": quantile(late, 0.5), "p99": quantile(late, 0.99), "worst": late[-1]}
     return {
         "pulses": len(late),
         "missing": len(timings) - len(late),
-        **{f"{name}_ms": value * 1e3 for name, value in figures.items()},
-        **{f"{name}_percent": value / stride * 100 for name, value in figures.items()},
+        **{f"{name}_ms": value for name, value in figures.items()},
+        **{f"{name}_percent": value / stride / 10 for name, value in figures.items()},
     }
 
 

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Figures of one run: stride period, phase lag, and ankle torque stride by stride.
+Figures of one run: stride period, phase lag, timing of the pulses, ankle torque by stride.
 
 matplotlib is imported only when a figure is drawn: it takes longer than a whole simulation.
 """
@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
+from gait_entrainment.device.timing import distribution, lateness_ms
 from gait_entrainment.report.recorded_run import RecordedRun, drawn_strides
 
 # Colours that stay apart for colour-blind readers and in print (Okabe and Ito 2008).
@@ -38,6 +39,7 @@ def draw_figures(run: RecordedRun, folder: Path) -> list[Path]:
     figures = {
         "stride_period.png": _stride_period(run),
         "phase_lag.png": _phase_lag(run),
+        "pulse_timing.png": _pulse_timing(run),
         "ankle_torque.png": _ankle_torque(run),
     }
     for name, figure in figures.items():
@@ -103,6 +105,39 @@ def _phase_lag(run: RecordedRun) -> Any:
         )
     axes.set(xlabel="stride", ylabel="onset minus toe-off [ms]", title="Phase lag of the pulses")
     axes.legend(frameon=False)
+    return figure
+
+
+def _pulse_timing(run: RecordedRun) -> Any:
+    """Draw which share of the pulses was sent, and was measured, at most so late."""
+    figure, axes = _axes()
+    for kind, colour, style in (("sent", ORANGE, "--"), ("measured", BLUE, "-")):
+        late = distribution(run.timings, kind, run.measured_period)
+        if late is None:
+            continue
+        figures = f"median {late['median_ms']:.1f}, 99 % {late['p99_ms']:.1f}"
+        missing = f"; {late['missing']} never seen" if late["missing"] else ""
+        axes.ecdf(
+            lateness_ms(run.timings, kind),
+            color=colour,
+            ls=style,
+            label=f"{kind}: {figures}, worst {late['worst_ms']:.1f} ms{missing}",
+        )
+    axes.set(
+        xlabel="onset after its command [ms]",
+        ylabel="share of the pulses",
+        ylim=(0, 1.02),
+        title=f"Timing of {len(run.timings)} pulses",
+    )
+    if np.isfinite(run.measured_period):
+        percent = 10 * run.measured_period  # [ms]
+        above = axes.secondary_xaxis(
+            "top", functions=(lambda ms: ms / percent, lambda share: share * percent)
+        )
+        above.set_xlabel("[% of the unperturbed stride]")
+    if axes.get_legend_handles_labels()[0]:
+        axes.axvline(0, color=GREY, lw=1.2)  # so that the command is in view
+        figure.legend(loc="outside lower center", frameon=False)
     return figure
 
 

@@ -19,15 +19,18 @@ from pathlib import Path
 from typing import Any
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
-from gait_entrainment.device import PulseTiming, RobotState, TimingAudit
+from gait_entrainment.device import MeasuredOnsets, PulseTiming, RobotState
 from gait_entrainment.device.timing import distribution
 
-_STATES, _PULSES = "perturbator/state", "perturbation/pulses"
+_PROFILES, _PULSES = "perturbation/torque_profile", "perturbation/pulses"
+_STATES = "perturbator/state"
 
 
 def recorded_timings(path: Path | str) -> list[PulseTiming]:
     """
-    Return the timing of every pulse that a bag announces, from the states of the robot.
+    Return the timing of every pulse that was promised and not withdrawn by a stop.
+
+    What the states do not show, or are not in the bag to show, stays unknown.
 
     Raises
     ------
@@ -38,23 +41,27 @@ def recorded_timings(path: Path | str) -> list[PulseTiming]:
     # Imported here: a simulation has no bag, and does without the readers.
     from gait_entrainment.bags import BagReader
 
-    audit = TimingAudit()
-    states: list[RobotState] = []
+    onsets = MeasuredOnsets()
     with BagReader(path) as bag:
-        names = [name for name in bag.topics if name.endswith((f"/{_STATES}", f"/{_PULSES}"))]
-        for raw, message in bag.decoded(names) if names else ():
-            stamp = message.header.stamp
-            instant = int(stamp.sec) * NANOSECONDS_PER_SECOND + int(stamp.nanosec)
-            if raw.topic.endswith(_PULSES):
-                audit.add_pulse(instant, message.torque, message.duration)
-            else:
-                states.append(
-                    RobotState(
-                        instant, message.commanded_torque, message.measured_torque, message.angle
-                    )
-                )
-    states.sort(key=lambda state: state.stamp)
-    return [*audit.add_states(states), *audit.finish()]
+        for suffix in (_PROFILES, _PULSES, _STATES):
+            names = [name for name in bag.topics if name.endswith(f"/{suffix}")]
+            # In the order of reception: a stop voids only what was promised before it.
+            found = sorted(bag.messages(names), key=lambda m: m.place) if names else []
+            for raw in found:
+                message = bag.decoder(raw.topic)(raw.data)
+                instant = _nanoseconds(message.header.stamp)
+                if suffix == _PULSES:
+                    onsets.add_pulse(instant, message.torque, message.duration)
+                elif suffix == _STATES:
+                    torques = message.commanded_torque, message.measured_torque
+                    onsets.add_state(RobotState(instant, *torques, message.angle))
+                elif message.stop:
+                    onsets.stop(instant)
+                else:
+                    named = [_nanoseconds(onset) for onset in message.onsets]
+                    onsets.add_promise(named, _nanoseconds(message.valid_until))
+    onsets.finish()
+    return onsets.timings
 
 
 def timing_outcome(timings: Sequence[PulseTiming], stride: float) -> dict[str, Any]:
@@ -93,6 +100,10 @@ def timing_summary(outcome: dict[str, Any]) -> list[str]:
             f"{figures['worst_percent']:.2f} % of a stride){missing}"
         )
     return lines
+
+
+def _nanoseconds(stamp: Any) -> int:
+    return int(stamp.sec) * NANOSECONDS_PER_SECOND + int(stamp.nanosec)
 
 
 def _late(commanded: int, onset: int | None) -> float | None:

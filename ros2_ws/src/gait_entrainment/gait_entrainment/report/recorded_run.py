@@ -33,9 +33,11 @@ from numpy.typing import NDArray
 from gait_entrainment.analysis import Analysis, Entrainment, PulsePhase, VerdictSettings, analyze
 from gait_entrainment.bags import ENDED_EARLY, BagError, BagMessage, BagReader
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
+from gait_entrainment.device import PulseTiming
 from gait_entrainment.events import GaitEvent, Stride
 from gait_entrainment.experiment import Conductor
 from gait_entrainment.protocol import Protocol, ProtocolError, read_protocol
+from gait_entrainment.report.pulse_timing import recorded_timings
 
 # Strides of which the ankle torque is read: more would not be told apart in a figure.
 STRIDES_DRAWN = 24
@@ -72,18 +74,24 @@ class RecordedRun:
     measured_period: float  # mean stride period over the baseline [s]; NaN without a plan
     pulse_period: float  # as planned from it [s]; NaN without a plan
     analysis: Analysis
+    timings: tuple[PulseTiming, ...]  # commanded, sent and measured onset of each pulse
     torques: AnkleTorques  # of the strides that figures show; empty unless asked for
     messages: int  # in the bag, on all topics
     lost: int | None  # published but not recorded; None where no publisher gave a count
     real_time_factor: float  # walked time over wall time, first to last /clock; NaN without
+    onset: str = "commanded"  # what the live analysis took pulses to begin with, or "measured"
     ended_early: str = ""  # why the recording ended before the run did
     differences: tuple[str, ...] | None = None
-    """How what the analyzer published live differs from `analysis`, a line per topic; () where
-    they are equal to the last bit, None where nothing was recorded."""
+    """How what the analyzer published live differs from an analysis anew of the same onsets, a
+    line per topic; () where they are equal to the last bit, None where nothing was recorded."""
 
 
 def read_run(
-    path: Path | str, settings: VerdictSettings | None = None, *, torques: bool = True
+    path: Path | str,
+    settings: VerdictSettings | None = None,
+    *,
+    torques: bool = True,
+    onset: str | None = None,
 ) -> RecordedRun:
     """
     Read a bag of this project and analyze it anew.
@@ -96,6 +104,8 @@ def read_run(
         The numbers in the verdict.
     torques
         Read the ankle torque of the strides that figures show.
+    onset
+        Where a pulse begins: "commanded" or "measured"; by default as the live analysis took it.
 
     Raises
     ------
@@ -111,7 +121,13 @@ def read_run(
         except ProtocolError as error:
             raise BagError(f"{path}: its protocol cannot be read: {error}") from None
         record = _Record(bag, path)
-        analysis = analyze(record.events, record.onsets, protocol.side, settings)
+        timings = tuple(recorded_timings(path))
+        onsets = {"commanded": record.onsets, "measured": [t.onset for t in timings]}
+        live_onset = bag.custom_data.get("onset", "commanded")
+        live, analysis = (
+            analyze(record.events, onsets[kind], protocol.side, settings)
+            for kind in (live_onset, onset or live_onset)
+        )
         conductor = Conductor(protocol)
         try:
             for event in record.events:
@@ -126,7 +142,9 @@ def read_run(
             measured_period=conductor.measured_period,
             pulse_period=conductor.train.period if conductor.train else math.nan,
             analysis=analysis,
-            differences=record.differences_from(analysis, protocol.side),
+            timings=timings,
+            onset=live_onset,
+            differences=record.differences_from(live, protocol.side),
             torques=_read_torques(
                 bag,
                 protocol.side,

@@ -112,7 +112,7 @@ def test_torque_is_read_where_figures_need_it(tmp_path, capsys):
     assert torques.effective.max() == pytest.approx(13.35, abs=0.01)
     code, out, _ = entrain(capsys, "analyze", BAG, "--figures", tmp_path / "figures")
     assert code == 0
-    assert out.count(".png") == 3
+    assert out.count(".png") == 4
 
 
 def test_the_bag_follows_every_rule_and_opens_without_ros_and_message_packages():

@@ -76,13 +76,15 @@ def test_the_figures_are_drawn(simulation, tmp_path):
         measured_period=simulation.measured_period,
         pulse_period=simulation.train.period,
         analysis=simulation.analysis,
+        timings=simulation.timings,
         torques=AnkleTorques(stamps, zeros + 50, zeros, zeros),
         messages=0,
         lost=None,
         real_time_factor=math.nan,
     )
     paths = draw_figures(run, tmp_path)
-    assert [p.name for p in paths] == ["stride_period.png", "phase_lag.png", "ankle_torque.png"]
+    names = ("stride_period", "phase_lag", "pulse_timing", "ankle_torque")
+    assert [p.stem for p in paths] == list(names)
     for path in paths:
         content = path.read_bytes()
         assert content.startswith(b"\x89PNG")
@@ -100,9 +102,10 @@ def test_a_run_without_pulses_or_strides_can_be_drawn_too(tmp_path):
         measured_period=math.nan,
         pulse_period=math.nan,
         analysis=analyze([], [], Side.RIGHT),
+        timings=(),
         torques=AnkleTorques(empty.astype(np.int64), empty, empty, empty),
         messages=0,
         lost=None,
         real_time_factor=math.nan,
     )
-    assert len(draw_figures(run, tmp_path)) == 3
+    assert len(draw_figures(run, tmp_path)) == 4
