@@ -16,8 +16,9 @@
 The conformance kit from outside: any node that speaks the perturbator's topics, in any language.
 
 The node is started by whoever wants it checked, in the same ROS domain, unconfigured. It is
-taken through its lifecycle, and the stamps of the horizons that it is sent are simulated: a node
-that holds a real robot in real time is checked by ``entrain driver check`` of its driver.
+taken through its lifecycle. The stamps of the horizons that it is sent are simulated, or, for a
+node that holds a real robot, those of the wall clock: the torque up to a horizon is then promised
+piece by piece, once it was measured.
 """
 
 import math
@@ -46,16 +47,21 @@ from gait_entrainment_nodes.topics import HORIZON, PULSES, ROBOT_STATE, TORQUE_P
 # How long an answer may take, and how long to wait for one that must not come [s].
 PATIENCE = 5.0
 SILENCE = 0.3
-# How far each horizon leads [ns].
-STRETCH = 500_000_000
 SECOND = NANOSECONDS_PER_SECOND
+# How far each horizon leads [ns].
+STRETCH = SECOND // 5
+# The trains with which is checked: lead of the first onset [ns], period and width [s].
+LEAD, PERIOD, WIDTH = 3 * SECOND // 10, 0.5, 0.15
 
 
 class NodeBench:
     """What stands in for experiment and walker before the node under test."""
 
-    def __init__(self, name: str, side: Side, tolerances: Tolerances) -> None:
+    def __init__(
+        self, name: str, side: Side, tolerances: Tolerances, *, real_time: bool, arm: bool
+    ) -> None:
         self.side, self.height, self.tolerances = side, tolerances.torque, tolerances
+        self.real_time = real_time
         self._context = Context()
         rclpy.init(context=self._context)
         self.node = Node("entrain_driver_check", context=self._context)
@@ -73,6 +79,7 @@ class NodeBench:
         self._horizons = self.node.create_publisher(HORIZON.type, HORIZON.name, HORIZON.qos)
         self._change = self.node.create_client(ChangeState, f"{name}/change_state")
         self._stop = self.node.create_client(Trigger, f"{name}/stop")
+        self._arm = self.node.create_client(Trigger, f"{name}/arm") if arm else None
         self._train = ActionClient(self.node, DeliverPulseTrain, f"{name}/deliver_pulse_train")
         self.run = 0
         self.now = 0  # [ns]
@@ -82,6 +89,7 @@ class NodeBench:
             lambda: (
                 self._change.service_is_ready()
                 and self._stop.service_is_ready()
+                and (self._arm is None or self._arm.service_is_ready())
                 and self._train.server_is_ready()
                 and self._horizons.get_subscription_count() > 0
             )
@@ -89,8 +97,9 @@ class NodeBench:
         if not found:
             self.close()
             raise DeviceError(
-                f"no node {name} with change_state, stop, deliver_pulse_train and a subscription "
-                f"of {HORIZON.name} was found: start it in this ROS domain, unconfigured"
+                f"no node {name} with change_state, stop, {'arm, ' if arm else ''}"
+                f"deliver_pulse_train and a subscription of {HORIZON.name} was found: start it in "
+                "this ROS domain, unconfigured"
             )
 
     def close(self) -> None:
@@ -130,31 +139,55 @@ class NodeBench:
             made = self.transition(number)
         if not made:
             raise BrokenPromiseError("The node could not be configured and activated.")
-        self.run += 1
-        self.now = self.run * 1000 * SECOND
+        if self._arm is not None:
+            armed = self.answer(self._arm.call_async(Trigger.Request()), "arming")
+            if not armed.success:
+                raise BrokenPromiseError(f"The node could not be armed: {armed.message}")
+        self.begin()
         self.promise()
 
-    def promise(self, *, expected: bool = True) -> msg.TorqueProfile | None:
-        """Send a horizon and return its answer, held against the contract."""
-        count = len(self.profiles)
-        until = self.now + STRETCH
-        message = msg.Horizon(header=header(self.now), run=self.run, until=to_time(until))
-        sent = time.monotonic()
-        self._horizons.publish(message)
-        if not expected:
-            self.wait(lambda: len(self.profiles) > count, SILENCE)
-            return self.profiles[-1] if len(self.profiles) > count else None
-        if not self.wait(lambda: len(self.profiles) > count):
-            raise BrokenPromiseError(f"A horizon was not answered within {PATIENCE:g} s.")
-        self.latencies.append(time.monotonic() - sent)
-        profile = self.profiles[-1]
+    def begin(self) -> None:
+        """Begin a run, now or at a simulated instant of its own."""
+        self.run += 1
+        self.now = time.time_ns() if self.real_time else self.run * 1000 * SECOND
+
+    def promise(self) -> None:
+        """Send a horizon, hold its answer against the contract, and wait until it is over."""
+        until, count = self.now + STRETCH, len(self.profiles)
+        due = time.monotonic()
+        if self.real_time:
+            due += max(until - time.time_ns(), 0) / SECOND
+        self.send_horizon(until)
+        while self.now < until:
+            if not self.wait(lambda seen=count: len(self.profiles) > seen):
+                raise BrokenPromiseError(f"A horizon was not answered within {PATIENCE:g} s.")
+            self.now = self.end_of(self.profiles[count], until)
+            count += 1
+            if self.now < until and not self.real_time:
+                raise BrokenPromiseError("A profile does not reach up to the horizon.")
+        self.latencies.append(max(time.monotonic() - due, 0.0))
+        self.wait(lambda: time.monotonic() > due)
+
+    def promise_until(self, instant: int) -> None:
+        """Send horizons until what is promised reaches an instant [ns]."""
+        while self.now < instant:
+            self.promise()
+
+    def send_horizon(self, until: int) -> None:
+        """Send one horizon."""
+        self._horizons.publish(
+            msg.Horizon(header=header(self.now), run=self.run, until=to_time(until))
+        )
+
+    def end_of(self, profile: msg.TorqueProfile, until: int) -> int:
+        """Hold a profile against the contract; return the instant up to which it promises."""
         times = [to_nanoseconds(t) for t in profile.times]
         ends = [*times[1:], to_nanoseconds(profile.valid_until)]
         if profile.run != self.run:
             raise BrokenPromiseError(f"A profile has run {profile.run} instead of {self.run}.")
-        if not times or times[0] != self.now or ends[-1] != until:
+        if not times or times[0] != self.now or ends[-1] > until:
             raise BrokenPromiseError(
-                "A profile does not adjoin the one before, up to the horizon."
+                "A profile does not adjoin the one before, or goes beyond the horizon."
             )
         if len(times) != len(profile.torques) or any(
             a >= b for a, b in zip(times, ends, strict=True)
@@ -162,19 +195,27 @@ class NodeBench:
             raise BrokenPromiseError("The times of a profile are not ascending, one per torque.")
         if not all(math.isfinite(torque) for torque in profile.torques):
             raise BrokenPromiseError("The torques of a profile are not all finite.")
-        self.now = until
-        return profile
+        return ends[-1]
+
+    def start(self, **changes: Any) -> Any:
+        """Request a harmless train, which must be accepted; return the goal's handle."""
+        goal = self.request(**changes)
+        if not goal.accepted:
+            unarmed = self.real_time and self._arm is None
+            hint = " A real robot must be armed: --arm." if unarmed else ""
+            raise BrokenPromiseError(f"A harmless train was rejected.{hint}")
+        return goal
 
     def request(self, **changes: Any) -> Any:
         """Request a train; return the goal's handle."""
         values = {
             "run": self.run,
             "side": int(self.side),
-            "first_onset": to_time(self.now + SECOND // 5),
-            "period": 0.8,
+            "first_onset": to_time(self.now + LEAD),
+            "period": PERIOD,
             "count": 2,
             "torque": self.height,
-            "duration": 0.15,
+            "duration": WIDTH,
         }
         goal = DeliverPulseTrain.Goal(**{**values, **changes})
         return self.answer(self._train.send_goal_async(goal), "a goal")
@@ -205,22 +246,23 @@ class NodeBench:
 
 def inactive(bench: NodeBench) -> None:
     """Before it is active, the node promises no torque and takes no train."""
-    bench.run += 1
-    if bench.promise(expected=False) is not None:
+    bench.begin()
+    bench.send_horizon(bench.now + STRETCH)
+    if bench.wait(lambda: bench.profiles, SILENCE):
         raise BrokenPromiseError("A horizon was answered before the node was active.")
     if bench.request().accepted:
         raise BrokenPromiseError("A train was accepted before the node was active.")
 
 
 def idle(bench: NodeBench) -> None:
-    """Every horizon is answered by one adjoining profile; without a train there is no torque."""
+    """Every horizon is answered, by profiles that adjoin; without a train there is no torque."""
     bench.restart()
-    begin = bench.now
-    revision = bench.profiles[-1].revision
-    for expected in range(revision + 1, revision + 7):
-        profile = bench.promise()
-        if profile is not None and profile.revision != expected:
-            raise BrokenPromiseError(f"Revision {profile.revision} came instead of {expected}.")
+    begin, first = bench.now, len(bench.profiles) - 1
+    for _ in range(5):
+        bench.promise()
+    told = [profile.revision for profile in bench.profiles[first:]]
+    if told != list(range(told[0], told[0] + len(told))):
+        raise BrokenPromiseError(f"The revisions are not consecutive: {told}.")
     bench.require_zero(begin, "no train at all")
     latencies = sorted(bench.latencies)
     for name, share in (("median", 0.5), ("p99", 0.99), ("worst", 1.0)):
@@ -231,21 +273,17 @@ def pulses(bench: NodeBench) -> None:
     """Every pulse is promised once, at its onset, with its impulse and sign, and announced."""
     for sign in (1, -1):
         bench.restart()
-        first, heard = bench.now + SECOND // 5, len(bench.pulses)
-        goal = bench.request(torque=sign * bench.height)
-        if not goal.accepted:
-            raise BrokenPromiseError("A harmless train was rejected.")
-        result = goal.get_result_async()
+        first, heard = bench.now + LEAD, len(bench.pulses)
+        result = bench.start(torque=sign * bench.height).get_result_async()
         begin = len(bench.profiles)
-        for _ in range(4):
-            bench.promise()
-        expected = [first, first + round(0.8 * SECOND)]
+        bench.promise_until(first + 2 * round(PERIOD * SECOND))
+        expected = [first, first + round(PERIOD * SECOND)]
         told = [to_nanoseconds(o) for p in bench.profiles[begin:] for o in p.onsets]
         if told != expected:
             raise BrokenPromiseError(f"Onsets {told} were told for pulses at {expected} ns.")
-        asked = sign * bench.height * 0.15
+        asked = sign * bench.height * WIDTH
         for onset in expected:
-            span = (onset, onset + round(0.6 * SECOND))
+            span = (onset, onset + round(0.95 * PERIOD * SECOND))
             got = sum(
                 torque * max(min(end, span[1]) - max(start, span[0]), 0) / SECOND
                 for start, end, torque in bench.pieces(first)
@@ -280,16 +318,14 @@ def beyond_limits(bench: NodeBench) -> None:
     ):
         if bench.request(**changes).accepted:
             raise BrokenPromiseError(f"A train with {changes} was accepted.")
-    for _ in range(4):
-        bench.promise()
+    bench.promise_until(begin + 3 * STRETCH)
     bench.require_zero(begin, "trains that were all rejected")
 
 
 def one_at_a_time(bench: NodeBench) -> None:
     """A second train is rejected while one is under way."""
     bench.restart()
-    if not bench.request().accepted:
-        raise BrokenPromiseError("A harmless train was rejected.")
+    bench.start()
     if bench.request().accepted:
         raise BrokenPromiseError("A second train was accepted while one was under way.")
 
@@ -297,8 +333,8 @@ def one_at_a_time(bench: NodeBench) -> None:
 def cancelling(bench: NodeBench) -> None:
     """Cancelling ends the torque at once, by a stop, and another train may follow."""
     bench.restart()
-    goal = bench.request(count=20)
-    bench.promise()
+    goal = bench.start(count=20)
+    bench.promise_until(bench.now + LEAD + STRETCH // 2)
     _ended_by_stop(bench, lambda: bench.answer(goal.cancel_goal_async(), "cancelling"))
     begin = bench.now
     bench.promise()
@@ -310,8 +346,8 @@ def cancelling(bench: NodeBench) -> None:
 def stopping(bench: NodeBench) -> None:
     """The stop service ends the torque at once, latched until cleaned up and configured."""
     bench.restart()
-    bench.request(count=20)
-    bench.promise()
+    bench.start(count=20)
+    bench.promise_until(bench.now + LEAD + STRETCH // 2)
     _ended_by_stop(
         bench, lambda: bench.answer(bench._stop.call_async(Trigger.Request()), "the stop")
     )
@@ -331,8 +367,8 @@ def stopping(bench: NodeBench) -> None:
 def deactivating(bench: NodeBench) -> None:
     """Deactivation ends the torque at once, and no train is taken any more."""
     bench.restart()
-    bench.request(count=20)
-    bench.promise()
+    bench.start(count=20)
+    bench.promise_until(bench.now + LEAD + STRETCH // 2)
     _ended_by_stop(bench, lambda: bench.transition(Transition.TRANSITION_DEACTIVATE))
     if bench.request().accepted:
         raise BrokenPromiseError("A train was accepted after deactivation.")
@@ -341,15 +377,17 @@ def deactivating(bench: NodeBench) -> None:
 def states(bench: NodeBench) -> None:
     """States are published, ascending, with finite commands, and name no fault."""
     bench.restart()
-    bench.wait(lambda: False, SILENCE)
-    begin = len(bench.states)
-    bench.request()
-    for _ in range(4):
-        bench.promise()
-    bench.wait(lambda: any(state.commanded_torque for state in bench.states[begin:]))
-    found = [state for state in bench.states[begin:] if state.run == bench.run]
+    bench.start()
+    bench.promise_until(bench.now + LEAD + STRETCH)
+    found: list[msg.AnkleRobotState] = []
+
+    def asked() -> bool:
+        found[:] = [state for state in bench.states if state.run == bench.run]
+        return any(state.commanded_torque for state in found)
+
+    shown = bench.wait(asked)
     stamps = [to_nanoseconds(state.header.stamp) for state in found]
-    if not any(state.commanded_torque for state in found):
+    if not shown:
         raise BrokenPromiseError("No state shows that the robot was asked for the pulses.")
     if stamps != sorted(stamps):
         raise BrokenPromiseError("The stamps of the states are not ascending.")
@@ -373,9 +411,24 @@ CHECKS = (
 )
 
 
-def check_node(name: str, side: Side, tolerances: Tolerances) -> Iterator[Result]:
+def check_node(
+    name: str, side: Side, tolerances: Tolerances, *, real_time: bool = False, arm: bool = False
+) -> Iterator[Result]:
     """
     Run every check on a node; yields each result as it is there.
+
+    Parameters
+    ----------
+    name
+        Of the node.
+    side
+        The ankle on which its robot sits.
+    tolerances
+        What is put up with.
+    real_time
+        Send stamps of the wall clock, as the node of a real robot needs them.
+    arm
+        Call its service ``~/arm`` after each activation: it may deliver torque.
 
     Raises
     ------
@@ -383,7 +436,7 @@ def check_node(name: str, side: Side, tolerances: Tolerances) -> Iterator[Result
         where there is no such node.
 
     """
-    bench = NodeBench(name, side, tolerances)
+    bench = NodeBench(name, side, tolerances, real_time=real_time, arm=arm)
     try:
         for check in CHECKS:
             begun, broken = time.monotonic(), ""

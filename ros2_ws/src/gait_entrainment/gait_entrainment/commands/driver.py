@@ -35,6 +35,7 @@ _EXAMPLES = """examples:
   entrain driver check emulated:delay=0.01  does it keep every promise of the contract?
   entrain driver check my_robot --arm --json
   entrain driver check --node perturbator   any node that speaks the perturbator's topics
+  entrain driver check --node perturbator --real-time --arm      one that holds a real robot
 """
 
 
@@ -61,6 +62,11 @@ def add_command(commands: Any) -> None:
     )
     check.add_argument(
         "--side", choices=("left", "right"), default="right", help="ankle of the node's robot"
+    )
+    check.add_argument(
+        "--real-time",
+        action="store_true",
+        help="the node holds a real robot: check it by the wall clock",
     )
     check.add_argument(
         "--arm",
@@ -122,7 +128,11 @@ def check_node(options: argparse.Namespace) -> int:
         )
         return 1
     results = found[0].load()(
-        options.node, Side[options.side.upper()], Tolerances(torque=options.torque)
+        options.node,
+        Side[options.side.upper()],
+        Tolerances(torque=options.torque),
+        real_time=options.real_time,
+        arm=options.arm,
     )
     try:
         return report(options.node, results, options.json)
