@@ -35,6 +35,7 @@ setup(
         "console_scripts": [
             "entrain = gait_entrainment.__main__:main",
             "ak_motor_emulator = gait_entrainment.device.ak_motor_emulator:main",
+            "odrive_emulator = gait_entrainment.device.odrive_emulator:main",
         ],
         "pytest11": ["ankle_robots = gait_entrainment.device.pytest_plugin"],
     },

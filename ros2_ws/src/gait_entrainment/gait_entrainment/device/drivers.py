@@ -39,6 +39,7 @@ OWN_DRIVERS = {
     "ideal": "gait_entrainment.device.ideal:IdealAnkleRobot",
     "emulated": "gait_entrainment.device.emulated:EmulatedAnkleRobot",
     "ak_mit_can": "gait_entrainment.device.ak_mit_can:AkMitCanRobot",
+    "odrive_can": "gait_entrainment.device.odrive_can:OdriveCanRobot",
 }
 
 

@@ -24,13 +24,13 @@ CHANNEL = "239.74.163.2"
 
 
 @contextlib.contextmanager
-def emulator(*arguments, trace=None):
-    """Run the emulator; yields the text that names the driver for it."""
+def emulator(*arguments, trace=None, program="ak_motor_emulator", driver="ak_mit_can"):
+    """Run an emulator; yields the text that names the driver for it."""
     # A port of its own keeps a test apart from others that run at the same time.
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind(("", 0))
         port = free.getsockname()[1]
-    command = [sys.executable, "-m", "gait_entrainment.device.ak_motor_emulator"]
+    command = [sys.executable, "-m", f"gait_entrainment.device.{program}"]
     command += ["--channel", CHANNEL, "--port", str(port), *arguments]
     if trace is not None:
         command += ["--trace", str(trace)]
@@ -39,7 +39,7 @@ def emulator(*arguments, trace=None):
         assert "ready" in process.stdout.readline()
         # Patience for a machine that others share; the limits themselves are tested one by one.
         patience = "rate=250,silence=0.3,lateness=0.5"
-        yield f"ak_mit_can:interface=udp_multicast,channel={CHANNEL},port={port},{patience}"
+        yield f"{driver}:interface=udp_multicast,channel={CHANNEL},port={port},{patience}"
     finally:
         process.terminate()
         process.wait(10)

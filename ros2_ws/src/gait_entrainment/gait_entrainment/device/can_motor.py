@@ -1,0 +1,192 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What drivers of a motor on a CAN bus share: options, the bus, asking until it answers."""
+
+import contextlib
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, TypeVar
+
+from gait_entrainment.conventions import Side
+from gait_entrainment.device.can_bus import open_bus
+from gait_entrainment.device.faults import DeviceError, LimitError
+from gait_entrainment.device.host_loop import HostTimedRobot
+from gait_entrainment.device.robot import Capabilities
+
+_T = TypeVar("_T")
+
+# A motor that is there answers within a millisecond; on a busy host this is ample [s].
+ANSWER_TIMEOUT = 0.5
+# How often a question is repeated while waiting, since a frame may be lost [s].
+_ASK_PERIOD = 0.05
+
+
+@dataclass(frozen=True)
+class CanMotorOptions:
+    """Bus, transmission and loop."""
+
+    interface: str = field(
+        default="socketcan", metadata={"meaning": "python-can interface", "unit": ""}
+    )
+    channel: str = field(default="can0", metadata={"meaning": "channel of the bus", "unit": ""})
+    port: int = field(
+        default=0,
+        metadata={
+            "meaning": "UDP port of udp_multicast; 0 is python-can's own",
+            "unit": "",
+            "range": (0, 65535),
+        },
+    )
+    bitrate: int = field(
+        default=1_000_000,
+        metadata={"meaning": "of the bus", "unit": "bit/s", "range": (10_000, 1_000_000)},
+    )
+    ratio: float = field(
+        default=1.0,
+        metadata={
+            "meaning": "ankle torque per motor torque; negative where the motor turns against it",
+            "unit": "1",
+            "range": (-20.0, 20.0),
+        },
+    )
+    rate: float = field(
+        default=500.0,
+        metadata={"meaning": "torque commands per second", "unit": "Hz", "range": (50.0, 1000.0)},
+    )
+    silence: float = field(
+        default=0.05,
+        metadata={"meaning": "longest silence of the motor", "unit": "s", "range": (0.005, 1.0)},
+    )
+    lateness: float = field(
+        default=0.05,
+        metadata={
+            "meaning": "by which the loop may wake up late",
+            "unit": "s",
+            "range": (0.005, 1.0),
+        },
+    )
+
+    def __post_init__(self) -> None:
+        """Check what has no range of its own."""
+        if self.ratio == 0:
+            raise LimitError("driver: ratio: 0; allowed: any other number")
+
+
+class CanMotorRobot(HostTimedRobot):
+    """
+    A motor whose torque is streamed to it in frames with 11-bit ids.
+
+    A subclass says how it is called in messages, opens the bus first of all in ``_open``, and
+    implements ``_enable``, ``_exchange`` and ``_disable``; ``_disable`` must bring zero torque.
+
+    Parameters
+    ----------
+    side
+        The ankle on which the robot sits.
+    options
+        Bus, transmission and loop.
+    name
+        The motor, in messages.
+    motor_torque
+        Its peak torque [N m], before the transmission.
+
+    """
+
+    PROTOCOL: ClassVar[str]  # as in "motor 1 does not answer PROTOCOL on can0"
+    CHECK: ClassVar[str]  # what a person should check, besides power, wiring and bit rate
+
+    def __init__(self, side: Side, options: Any, name: str, motor_torque: float) -> None:
+        super().__init__(side, options.rate, options.silence, options.lateness)
+        self._options = options
+        self._name = name
+        self._bus: Any = None
+        self._others: set[int] = set()  # ids of other motors that were heard
+        self.capabilities = Capabilities(
+            peak_torque=motor_torque * abs(options.ratio),
+            torque_rate=float("inf"),
+            own_pulse_timer=False,
+            measures_torque=True,
+            simulated=False,
+            state_rate=options.rate,
+        )
+
+    def _open_bus(self) -> None:
+        options = self._options
+        self._others.clear()
+        self._bus = open_bus(options.interface, options.channel, options.bitrate, options.port)
+
+    def _shut(self) -> None:
+        if self._bus is not None:
+            with contextlib.suppress(Exception):
+                self._disable()
+            self._bus.shutdown()
+            self._bus = None
+
+    def _send(self, identifier: int, data: bytes = b"", *, remote: bool = False) -> None:
+        import can
+
+        self._bus.send(
+            can.Message(
+                arbitration_id=identifier, data=data, is_extended_id=False, is_remote_frame=remote
+            )
+        )
+
+    def _answer(self, understand: Callable[[Any], _T | None], give_up: float) -> _T | None:
+        """Return the newest answer among the frames, waiting for the first until a time [s]."""
+        newest = None
+        while True:
+            patience = 0.0 if newest is not None else give_up - time.monotonic()
+            if patience < 0:
+                return newest
+            message = self._bus.recv(patience)
+            if message is None:
+                return newest
+            if message.is_error_frame or message.is_remote_frame or message.is_extended_id:
+                continue
+            answer = understand(message)
+            newest = newest if answer is None else answer
+
+    def _ask(self, ask: Callable[[], None], understand: Callable[[Any], _T | None]) -> _T:
+        """Ask until there is an answer."""
+        give_up = time.monotonic() + ANSWER_TIMEOUT
+        while time.monotonic() < give_up:
+            ask()
+            answer = self._answer(understand, time.monotonic() + _ASK_PERIOD)
+            if answer is not None:
+                return answer
+        options = self._options
+        others = f" (others do: {', '.join(map(str, sorted(self._others)))})"
+        raise DeviceError(
+            f"{self._name} does not answer {self.PROTOCOL} on {options.interface} "
+            f"{options.channel}{others if self._others else ''}: check its power, wiring, "
+            f"{self.CHECK}, and that the bus runs at {options.bitrate} bit/s"
+        )
+
+    def _require_zero_torque(self, doubt: str) -> None:
+        """Raise DeviceError where the motor, enabled, keeps showing torque at zero command."""
+        give_up = time.monotonic() + ANSWER_TIMEOUT
+        while True:
+            reading = self._exchange(0.0, _ASK_PERIOD)
+            torque = float("nan") if reading is None else reading.torque
+            if abs(torque) <= 0.05 * self.capabilities.peak_torque:
+                return
+            if time.monotonic() > give_up:
+                self._disable()
+                raise DeviceError(
+                    f"{self._name} shows {torque:g} N m at zero command: {doubt} "
+                    "is the joint free?"
+                )
+            time.sleep(1 / self._options.rate)
