@@ -430,11 +430,14 @@ class Perturbator(Participant, LifecycleNode):
             self.look_after(robot)
 
     def look_after(self, robot: GuardedRobot) -> None:
-        """Note the faults of a robot of which no torque is asked for."""
+        """Note states and faults of a robot of which no torque is asked for at the moment."""
         try:
-            robot.read()
+            states = robot.read()
         except DeviceError as error:
-            self.failure = str(error)
+            states, self.failure = (), str(error)
+        # In a run the next horizon is only late, and every state belongs to the record.
+        for state in states if self.open else ():
+            self.publish_state(state)
         self.report_faults()
 
     def publish_profile(self, profile: CoreProfile, last: bool) -> None:
