@@ -73,7 +73,7 @@ def run(options: argparse.Namespace) -> int:
             check_output(bag)
     except (ProtocolError, LimitError, DeviceError) as error:
         print(f"entrain node: {error}", file=sys.stderr)
-        return 1 if isinstance(error, DeviceError) else 2
+        return 2 if isinstance(error, ProtocolError) else 1
     set_environment(int(os.environ.get("ROS_DOMAIN_ID", "0")))
     parameters = chosen_parameters(protocol, bag, options)
     parameters["experiment"]["protocol"] = write_protocol(protocol)
