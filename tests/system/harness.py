@@ -23,6 +23,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -217,6 +218,8 @@ class Started:
                 stdout=out_file,
                 stderr=subprocess.STDOUT,
                 env={**os.environ, **environment},
+                # A shell's background job, and so a test in one, ignores it.
+                preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
             )
         self.nodes: dict[str, int] = {}
         self.ended_at = math.inf  # on the steady clock [s]
