@@ -22,7 +22,6 @@ is waited for, and for how long, is decided here.
 """
 
 import contextlib
-import json
 import sys
 import time
 from collections.abc import Callable
@@ -34,7 +33,6 @@ from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
 from rclpy.node import Node
 from rclpy.task import Future
-from std_srvs.srv import Trigger
 
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.device import PulseTrain
@@ -45,6 +43,7 @@ from gait_entrainment_msgs import msg
 from gait_entrainment_msgs.action import DeliverPulseTrain, RunProtocol
 from gait_entrainment_msgs.srv import StartRun
 from gait_entrainment_nodes.node import Participant, declare, run_node
+from gait_entrainment_nodes.participants import Participants
 from gait_entrainment_nodes.stamps import header, to_nanoseconds, to_time
 from gait_entrainment_nodes.topics import (
     DIAGNOSTICS,
@@ -55,13 +54,8 @@ from gait_entrainment_nodes.topics import (
     TORQUE_PROFILE,
     WALKER_PROGRESS,
 )
+from gait_entrainment_nodes.waiting import OverdueError, Waiting
 
-# How often waiting is looked after [s].
-TICK = 0.02
-# A tick that is so late [s] says that this process was held up: others are not blamed for it.
-HELD_UP = 1.0
-# After so long [s] a participant is asked anew whether it is ready.
-ASK_AGAIN = 0.5
 # How long each step of ending a failed run may take [s]: who fails may not answer any more. And
 # how long its reason may come after its effect, which is on another topic.
 FAREWELL = 0.5
@@ -83,7 +77,7 @@ class Experiment(Participant, Node):
 
     def __init__(self) -> None:
         super().__init__("experiment")
-        self.participants: list[str] = declare(
+        names: list[str] = declare(
             self,
             "participants",
             ["walker_sim", "perturbator", "gait_analyzer"],
@@ -138,9 +132,7 @@ class Experiment(Participant, Node):
         self.conductor: Conductor | None = None  # of the run that goes on
         self._goal: Any = None
         self.perturbator = f"{self.get_namespace()}/perturbator".lstrip("/")
-        self._tick_at = time.monotonic() + TICK
-        self._waits: list[tuple[Future, float, str]] = []  # what, until when, why it matters
-        self._ticks: list[Future] = []
+        self.waiting = Waiting()
 
         self.subscription(GAIT_EVENTS, self.on_event)
         self.subscription(WALKER_PROGRESS, self.on_progress)
@@ -151,9 +143,7 @@ class Experiment(Participant, Node):
         self._change_state = self.create_client(ChangeState, "perturbator/change_state")
         self._get_state = self.create_client(GetState, "perturbator/get_state")
         self._deliver = ActionClient(self, DeliverPulseTrain, "perturbator/deliver_pulse_train")
-        # Ready services are looked up by name: a participant may be any node that offers one. They
-        # come behind the other clients: see not_ready_yet.
-        self._ready = {p: self.create_client(Trigger, f"{p}/ready") for p in self.participants}
+        self.participants = Participants(self, names, self.waiting)
         self._server = ActionServer(
             self,
             RunProtocol,
@@ -221,7 +211,7 @@ class Experiment(Participant, Node):
             result.outcome = RunProtocol.Result.FINISHED
             self.publish_state(Phase.FINISHED, result.message)
             self.note_state(DiagnosticStatus.OK, f"run {self.run_number} finished")
-        except (ExperimentError, ProtocolError) as failure:
+        except (ExperimentError, OverdueError, ProtocolError) as failure:
             result.message = str(failure)
             await self.give_up(result.message)
             if self.cancelled:
@@ -270,10 +260,10 @@ class Experiment(Participant, Node):
         self.publish_state(Phase.FAILED, reason)
         self.diagnose(self.known_until, DiagnosticStatus.ERROR, reason)
         if self.activated:
-            with contextlib.suppress(ExperimentError):
+            with contextlib.suppress(ExperimentError, OverdueError):
                 await self.transition(Transition.TRANSITION_DEACTIVATE, FAREWELL)
         if self.promised_until and self.closed is None:
-            with contextlib.suppress(ExperimentError):
+            with contextlib.suppress(ExperimentError, OverdueError):
                 await self.close_run(FAREWELL)
 
     def begin_run(self) -> None:
@@ -306,70 +296,16 @@ class Experiment(Participant, Node):
             self.fail_if_cancelled()
             waiting = await self.not_ready_yet()
             if waiting:
-                await self.tick()
+                await self.waiting.tick()
 
     async def not_ready_yet(self) -> str:
         """Return who is waited for, and for what; an empty text once all are ready."""
-        here = self.get_namespace()
-        nodes = self.get_node_names_and_namespaces()
-        for name, client in self._ready.items():
-            if not client.service_is_ready():
-                return f"{name} does not answer"
-            if nodes.count((name, here)) > 1:
-                return (
-                    f"there are two {name} in {here}: another experiment runs here; choose "
-                    "another namespace or ROS_DOMAIN_ID"
-                )
+        waiting = await self.participants.not_ready()
+        if waiting:
+            return waiting
         if not (self._start.service_is_ready() and self._deliver.server_is_ready()):
             return "walker_sim or perturbator is not there"
-        if "bag_recorder" in self.participants:
-            for topic in self.not_recorded():
-                return f"bag_recorder has not subscribed to {topic}"
-        for name, client in self._ready.items():
-            # An answer may be lost, as long as the participant does not know who asked. Who has
-            # answered here knows all clients of this node: discovery goes in their order.
-            try:
-                response = await self.within(
-                    client.call_async(Trigger.Request()), f"{name} does not answer", ASK_AGAIN
-                )
-            except ExperimentError as silence:
-                return str(silence)
-            if not response.success:
-                return f"{name} waits for {response.message}"
-            for topic in self.reaching_too_few(response.message):
-                return f"{name} waits for subscriptions of {topic}"
         return f"experiment waits for {self.not_ready()}" if self.not_ready() else ""
-
-    def not_recorded(self) -> list[str]:
-        """Return the topics of participants that the recorder has not subscribed to."""
-        here = self.get_namespace()
-        beneath = here.rstrip("/") + "/"
-        recorder = (here, "bag_recorder")
-        publishers = {(here, name) for name in (*self.participants, self.get_name())} - {recorder}
-        missing = []
-        for name, _ in self.get_topic_names_and_types():
-            if not name.startswith(beneath) or "/_" in name:
-                continue
-            offers = self.get_publishers_info_by_topic(name)
-            readers = self.get_subscriptions_info_by_topic(name)
-            if publishers & {(offer.node_namespace, offer.node_name) for offer in offers} and (
-                recorder not in {(reader.node_namespace, reader.node_name) for reader in readers}
-            ):
-                missing.append(name)
-        return missing
-
-    def reaching_too_few(self, matched: str) -> list[str]:
-        """
-        Return the topics on which a participant reaches fewer subscriptions than exist.
-
-        It says itself how many it reaches, if it is one of ours. How many there are is known
-        here: every participant has been seen whole.
-        """
-        try:
-            counts = json.loads(matched)
-        except ValueError:
-            return []
-        return [topic for topic, count in counts.items() if count < self.count_subscribers(topic)]
 
     async def activate_perturbator(self) -> None:
         """Bring the perturbator from where a run before has left it to active."""
@@ -543,7 +479,7 @@ class Experiment(Participant, Node):
         """Return why the perturbator did what it did; it may come later, on another topic."""
         deadline = time.monotonic() + FAREWELL
         while not self.trouble and time.monotonic() < deadline:
-            await self.tick()
+            await self.waiting.tick()
         return self.trouble or NO_REASON
 
     def fail_if_troubled(self) -> None:
@@ -560,7 +496,7 @@ class Experiment(Participant, Node):
 
     def next_deadline(self) -> float:
         """Return the time of the next tick."""
-        return self._tick_at
+        return self.waiting.deadline
 
     def on_deadline(self) -> None:
         """Look after everything that is waited for."""
@@ -568,20 +504,9 @@ class Experiment(Participant, Node):
             self.own_begun = True
             self.executor.create_task(self.conduct_own)
         now = time.monotonic()
-        if now > self._tick_at + HELD_UP:
-            self.excuse_everyone(now)
-        self._tick_at = now + TICK
-        waits, self._waits = self._waits, []
-        for future, deadline, reason in waits:
-            if future.done():
-                continue
-            if now > deadline:
-                future.set_exception(ExperimentError(reason))
-            else:
-                self._waits.append((future, deadline, reason))
-        ticks, self._ticks = self._ticks, []
-        for future in ticks:
-            future.set_result(None)
+        if self.waiting.look_after():
+            # This process was held up: what came meanwhile has not been heard yet.
+            self.progress_at = self.profile_at = self.planning_at = self.recorded_at = now
         if self.conductor is not None and not self.ended.done():
             silent = self.silent_participant(now)
             if self.cancelled:
@@ -596,14 +521,6 @@ class Experiment(Participant, Node):
         if self.protocol and self.busy and not self.failure:
             self.failure = "stopped before the end of the protocol"
 
-    def excuse_everyone(self, now: float) -> None:
-        """Begin all waiting anew: what came meanwhile has not been heard yet."""
-        self.progress_at = self.profile_at = self.planning_at = self.recorded_at = now
-        self._waits = [
-            (future, deadline + now - self._tick_at, reason)
-            for future, deadline, reason in self._waits
-        ]
-
     def silent_participant(self, now: float) -> str:
         """Return who has owed an answer for too long, or an empty text."""
         latest = now - self.silence_timeout
@@ -611,7 +528,7 @@ class Experiment(Participant, Node):
             return "perturbator"
         if self.horizons_sent > self.profiles_received:
             return "perturbator" if self.profile_at < latest else ""
-        if "bag_recorder" in self.participants and self.recorded_grant < self.grant:
+        if "bag_recorder" in self.participants.names and self.recorded_grant < self.grant:
             if self.recorded_at < latest:
                 return "bag_recorder"
             # In lock-step the walker waits for the recorder, rightly.
@@ -636,14 +553,7 @@ class Experiment(Participant, Node):
     async def within(self, future: Future, reason: str, timeout: float | None = None) -> Any:
         """Wait for an answer, at most for a time [s], by default the silence timeout."""
         timeout = self.silence_timeout if timeout is None else timeout
-        self._waits.append((future, time.monotonic() + timeout, reason))
-        return await future
-
-    async def tick(self) -> None:
-        """Wait for the next tick."""
-        future = Future()
-        self._ticks.append(future)
-        await future
+        return await self.waiting.within(future, reason, timeout)
 
     # Telling people
 

@@ -1,0 +1,73 @@
+# Copyright 2026 The gait_entrainment authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Waiting for answers in coroutines of a node, on steady time."""
+
+import time
+from typing import Any
+
+from rclpy.task import Future
+
+# How often waiting is looked after [s].
+TICK = 0.02
+# A tick that is so late [s] says that this process was held up: others are not blamed for it.
+HELD_UP = 1.0
+
+
+class OverdueError(Exception):
+    """Somebody owes an answer for too long; the message says who, and what is amiss."""
+
+
+class Waiting:
+    """What the coroutines of one node wait for; its loop looks after it at every deadline."""
+
+    def __init__(self) -> None:
+        self.deadline = time.monotonic() + TICK  # when it is looked after next, steady time [s]
+        self._waits: list[tuple[Future, float, str]] = []  # what, until when, why it matters
+        self._ticks: list[Future] = []
+
+    async def within(self, future: Future, reason: str, timeout: float) -> Any:
+        """Return the result of a future; OverdueError with the reason after a time [s]."""
+        self._waits.append((future, time.monotonic() + timeout, reason))
+        return await future
+
+    async def tick(self) -> None:
+        """Wait for the next tick."""
+        future = Future()
+        self._ticks.append(future)
+        await future
+
+    def look_after(self) -> bool:
+        """
+        Go on with what is due.
+
+        Returns whether this process was held up: then all waiting begins anew, since what came
+        meanwhile has not been heard yet.
+        """
+        now = time.monotonic()
+        late, self.deadline = now - self.deadline, now + TICK
+        held_up = late > HELD_UP
+        waits, self._waits = self._waits, []
+        for future, until, reason in waits:
+            latest = until + late if held_up else until
+            if future.done():
+                continue
+            if now > latest:
+                future.set_exception(OverdueError(reason))
+            else:
+                self._waits.append((future, latest, reason))
+        ticks, self._ticks = self._ticks, []
+        for future in ticks:
+            future.set_result(None)
+        return held_up
