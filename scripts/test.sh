@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Every test. Those of the packages share the processors; those of the whole system start five
-# processes each and have them alone. Arguments go to pytest both times.
+# Every test. Most of the packages' share the processors. Those of ankle robots, which run in real
+# time, and of the whole system, five processes each, have them alone. Arguments go to pytest both
+# times.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -11,6 +12,7 @@ run() {
     pytest "$@" || [[ $? == "$nothing_selected" ]] || failed=1
 }
 
-run --numprocesses auto ros2_ws/src "$@"
-run tests "$@"
+devices=ros2_ws/src/gait_entrainment/test/device
+run --numprocesses auto --ignore "$devices" ros2_ws/src "$@"
+run "$devices" tests "$@"
 exit $failed

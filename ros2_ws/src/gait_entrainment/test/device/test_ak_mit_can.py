@@ -92,7 +92,11 @@ def test_pulses_arrive_and_are_measured(reply_bytes, tmp_path):
         audit.add_pulse(onset, 8.0, 0.15)
     timings = [*audit.add_states(states), *audit.finish()]
     for timing in timings:
-        assert timing.commanded <= timing.sent <= timing.measured
+        assert timing.commanded <= timing.sent
+        # Interpolated between two states: a motor that answers within the tick in which it was told
+        # is placed up to a tick earlier.
+        before = max(state.stamp for state in states if state.stamp < timing.sent)
+        assert before <= timing.measured
     rows = read_trace(trace)
     assert rows[-1][1] == pytest.approx(0.0, abs=0.01)  # zero before the end
     assert max(row[2] for row in rows) == pytest.approx(8.0, abs=0.05)
