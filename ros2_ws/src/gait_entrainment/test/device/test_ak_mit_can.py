@@ -93,8 +93,8 @@ def test_pulses_arrive_and_are_measured(reply_bytes, tmp_path):
     timings = [*audit.add_states(states), *audit.finish()]
     for timing in timings:
         assert timing.commanded <= timing.sent
-        # Interpolated between two states: a motor that answers within the tick in which it was told
-        # is placed up to a tick earlier.
+        # Interpolated between two states: a motor that answers within the tick in which it was
+        # told is placed up to a tick earlier.
         before = max(state.stamp for state in states if state.stamp < timing.sent)
         assert before <= timing.measured
     rows = read_trace(trace)
