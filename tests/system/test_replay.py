@@ -19,6 +19,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -140,6 +141,25 @@ def test_a_bag_that_lacks_messages_gives_the_same_replayed_and_offline(
     assert bool(told["differences"]) is lacks_events
     assert recorded(again) == offline(damaged)
     assert (read_run(damaged, torques=False).differences != ()) is lacks_events
+
+
+def test_a_run_in_a_namespace_is_replayed_and_recorded_there(live: Path, tmp_path: Path) -> None:
+    moved, again = tmp_path / "moved", tmp_path / "again"
+    with BagReader(live) as reader:
+        data = {k: v for k, v in reader.custom_data.items() if k != "messages_lost"}
+        with BagWriter(moved, ros_distro="jazzy", custom_data=data) as writer:
+            for topic in reader.topics.values():
+                writer.add_topic(replace(topic, name=f"/lab{topic.name}"))
+            for message in sorted(reader.messages(), key=lambda message: message.place):
+                writer.write(
+                    f"/lab{message.topic}", message.data, message.log_time, message.publish_time
+                )
+    code, told = replay(moved, "--out", again)
+    assert (code, told["as_published_live"]) == (0, True)
+    results = payloads(again, [f"/lab{topic}" for topic in RESULTS])
+    assert [[data for _, data in found] for found in results.values()] == [
+        *recorded(live).values()
+    ]
 
 
 class Player:

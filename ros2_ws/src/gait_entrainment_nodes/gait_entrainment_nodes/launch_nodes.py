@@ -30,7 +30,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.utilities import make_namespace_absolute, prefix_namespace
 
 from gait_entrainment_nodes.environment import config_file
-from gait_entrainment_nodes.node_list import DISPLAY
+from gait_entrainment_nodes.node_list import DISPLAY, MOVED
 from gait_entrainment_nodes.supervisor import PACKAGE
 
 # Argument of a launch file: name, default (None where it must be given), what --show-args tells.
@@ -42,17 +42,6 @@ PARAMETERS_FILE: Argument = (
     "what may be set of the nodes (YAML)",
 )
 RVIZ: Argument = ("rviz", "false", "show the walker in RViz: true or false")
-# Names of the root that are moved into a namespace: each experiment keeps its own time.
-MOVED = (
-    "/clock",
-    "/diagnostics",
-    "/tf",
-    "/tf_static",
-    # Absolute in RViz's configuration alone.
-    "/robot_description",
-    "/walker_display/markers",
-)
-
 
 # How often a service is asked again [s].
 ASKING_PERIOD = 0.25

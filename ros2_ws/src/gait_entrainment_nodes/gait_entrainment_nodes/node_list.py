@@ -44,6 +44,16 @@ REAL_TIME_LOOKAHEAD = 0.3
 # the wall clock [s] the walker shows what it felt.
 MEASURED_DELAY = 0.1
 
+# Names of the root that are moved into a namespace: each experiment keeps its own time.
+MOVED = (
+    "/clock",
+    "/diagnostics",
+    "/tf",
+    "/tf_static",
+    # Absolute in RViz's configuration alone.
+    "/robot_description",
+    "/walker_display/markers",
+)
 # Nodes of a replay; where it is recorded, the recorder comes last.
 REPLAY_NODES = ("bag_player", "gait_analyzer")
 # In a replay made anew, or of the processes that were recorded.

@@ -71,6 +71,7 @@ class ReplayClient:
         self._topic_names = {
             self._node.resolve_topic_name(topic.name): topic.name for topic in RESULTS
         }
+        self._counts_topic = self._node.resolve_topic_name(PUBLISHED_COUNTS.name)
         self._counts: dict[str, int] | None = None  # what the analyzer says that it published
         for topic in RESULTS:
             self._node.create_subscription(
@@ -84,8 +85,8 @@ class ReplayClient:
             for service in (
                 "gait_analyzer/ready",
                 "gait_analyzer/finish",
-                "/bag_player/ready",
-                "/bag_player/resume",
+                "bag_player/ready",
+                "bag_player/resume",
             )
         }
 
@@ -100,8 +101,8 @@ class ReplayClient:
 
         """
         self._ask("gait_analyzer/ready", self._all_listen)
-        self._ask("/bag_player/ready", self._all_recorded)
-        self._ask("/bag_player/resume")
+        self._ask("bag_player/ready", self._all_recorded)
+        self._ask("bag_player/resume")
         with tqdm(
             desc="replay", unit="stride", disable=True if quiet else None, leave=False
         ) as bar:
@@ -122,14 +123,20 @@ class ReplayClient:
         if not answer.success:
             return False
         matched = json.loads(answer.message)
-        return all(matched.get(name, 0) >= self._listeners for name in self._topic_names)
+        names = (*self._topic_names, self._counts_topic)
+        return all(matched.get(name, 0) >= self._listeners for name in names)
 
     def _all_recorded(self, answer: Trigger.Response) -> bool:
-        """Whether a recorder, if there is one, hears all that is played, hidden topics apart."""
+        """Whether a recorder, if there is one, hears all of its namespace, hidden topics apart."""
         if not answer.success:
             return False
         heard = json.loads(answer.message)
-        return self._listeners == 1 or all(heard[name] for name in heard if "/_" not in name)
+        if self._listeners == 1:
+            return True
+        beneath = self._node.get_namespace().rstrip("/") + "/"
+        recorded = [name for name in heard if name.startswith(beneath) and "/_" not in name]
+        # The final counts are heard here too.
+        return heard[self._counts_topic] >= self._listeners and all(map(heard.get, recorded))
 
     def _complete(self) -> bool:
         """Whether everything that the analyzer says it has published is here."""
@@ -157,7 +164,7 @@ class ReplayClient:
                 answers.append(client.call_async(Trigger.Request()))
             return False
 
-        self._wait_until(answered, service, service.strip("/").partition("/")[0])
+        self._wait_until(answered, service, service.partition("/")[0])
 
     def _wait_until(self, condition: Any, what: str, blamed: str) -> None:
         deadline = time.monotonic() + PATIENCE

@@ -28,6 +28,7 @@ from gait_entrainment.report.summary import outcome_of, summary
 from gait_entrainment_nodes.domain import DomainError, claimed_domain
 from gait_entrainment_nodes.environment import set_environment
 from gait_entrainment_nodes.node_list import (
+    MOVED,
     REPLAY_NODES,
     parameter_arguments,
     replay_parameters,
@@ -114,12 +115,13 @@ def replay(options: argparse.Namespace, domain: int) -> dict[str, list[bytes]]:
         }
     with tempfile.TemporaryDirectory(prefix="entrain_") as folder:
         common = parameter_arguments(parameters, Path(folder))
+        remaps = [f"__ns:={namespace}", *(f"{name}:={name[1:]}" for name in MOVED)]
+        moved = [word for remap in remaps for word in ("-r", remap)] if namespace else []
         supervisor = Supervisor(Path(folder), environment)
         client: ReplayClient | None = None
         try:
             for node in (*REPLAY_NODES, *(["bag_recorder"] if recorder else [])):
-                moved = namespace and node != "bag_player"
-                supervisor.start(node, [*common, *(["-r", f"__ns:={namespace}"] if moved else [])])
+                supervisor.start(node, [*common, *moved])
             client = ReplayClient(supervisor, namespace, listeners=listeners)
             client.play(quiet=options.json)
             if recorder and supervisor.wait("bag_recorder", CLOSING_TIMEOUT) != 0:
