@@ -28,6 +28,7 @@ from typing import Any
 
 import pytest
 from harness import PATIENCE, Probe, probe
+from rcl_interfaces.msg import ParameterEvent
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
@@ -260,14 +261,17 @@ def test_what_comes_before_ros_time_begins_is_logged_at_its_beginning(tmp_path: 
         empty = listener.node.create_publisher(Empty, "empty", EVERY_MESSAGE)
         clock = listener.node.create_publisher(CLOCK.type, CLOCK.name, CLOCK.qos)
         left = publisher(listener, "left")
-        for made in (empty, clock):
+        event = listener.node.create_publisher(ParameterEvent, "event", EVERY_MESSAGE)
+        for made in (empty, clock, event):
             listener.until(made.get_subscription_count, "the recorder")
         empty.publish(Empty())
+        # As rclpy stamps those of a node that is being made.
+        event.publish(ParameterEvent(stamp=to_time(time.time_ns())))
         left.publish(joints(0, 0))  # a stamp of zero is none
         left.publish(joints(1, 77 * SECOND))
         clock.publish(CLOCK.type(clock=to_time(78 * SECOND)))
         empty.publish(Empty())
-        assert process.finish(listener, left=2, clock=1, empty=2) == 0
+        assert process.finish(listener, left=2, clock=1, empty=2, event=1) == 0
     assert check(process.bag) == []
     with BagReader(process.bag) as bag:
         assert bag.start == 77 * SECOND

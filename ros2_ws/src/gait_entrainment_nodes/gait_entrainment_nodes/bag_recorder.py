@@ -73,6 +73,9 @@ LONGEST_OVERTAKING = 60 * NANOSECONDS_PER_SECOND
 # A message whose first field is a header or a stamp has it behind four bytes of CDR header.
 _STAMP = struct.Struct("<iI")
 _STAMPED = ("std_msgs/Header ", "builtin_interfaces/Time ")
+# Stamped by the wall clock also where time is simulated: log entries always, parameter events
+# while a node is being made. With one of them among simulated stamps a bag would span decades.
+_BY_WALL_CLOCK = ("rcl_interfaces/msg/Log", "rcl_interfaces/msg/ParameterEvent")
 
 
 class BagRecorder(Participant, Node):
@@ -238,8 +241,7 @@ class BagRecorder(Participant, Node):
 
     def writer_for(self, name: str, definition: Definition) -> Callable[[bytes], None]:
         """Return the callback that writes the messages of one topic."""
-        # The stamp of a log entry is of the wall clock, also where time is simulated.
-        stamped = definition.type != "rcl_interfaces/msg/Log" and _first_field(
+        stamped = definition.type not in _BY_WALL_CLOCK and _first_field(
             definition.schema_text
         ).startswith(_STAMPED)
         write, wall_clock, unpack = self.bag.write, time.time_ns, _STAMP.unpack_from
