@@ -131,6 +131,25 @@ def test_domain_in_use_is_refused(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(
+    ("words", "domain", "code", "named"),
+    [
+        (["ready", "walker_sim"], "nine", 1, ["ROS_DOMAIN_ID", "'nine'", "0 to 232"]),
+        (["node", "experiment"], "233", 1, ["ROS_DOMAIN_ID", "'233'", "0 to 232"]),
+        (["ready", "no name"], "7", 2, ["no name", "alphanumerics"]),
+    ],
+)
+def test_node_and_ready_refuse_what_is_no_domain_and_no_name(words, domain, code, named):
+    done = subprocess.run(
+        ["entrain", *words],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "ROS_DOMAIN_ID": domain},
+    )
+    assert done.returncode == code
+    assert_one_line(done.stderr, named)
+
+
 @pytest.fixture
 def small_disk(tmp_path):
     """Give a folder on a file system of 6 MB, or skip where none may be made."""

@@ -31,6 +31,16 @@ class DomainError(RuntimeError):
     """No domain can be had; the message says what to do."""
 
 
+def wanted_domain() -> int | None:
+    """Return ROS_DOMAIN_ID, None where it is unset; DomainError where it is no domain."""
+    wanted = os.environ.get("ROS_DOMAIN_ID")
+    if wanted is not None and not (wanted.isdigit() and int(wanted) <= LARGEST_DOMAIN):
+        raise DomainError(
+            f"ROS_DOMAIN_ID: {wanted!r}; allowed: 0 to {LARGEST_DOMAIN}, or unset for a free one"
+        )
+    return None if wanted is None else int(wanted)
+
+
 @contextmanager
 def claimed_domain() -> Iterator[int]:
     """
@@ -46,12 +56,8 @@ def claimed_domain() -> Iterator[int]:
         where ROS_DOMAIN_ID is not a domain, or is claimed by another run.
 
     """
-    wanted = os.environ.get("ROS_DOMAIN_ID")
-    if wanted is not None and not (wanted.isdigit() and int(wanted) <= LARGEST_DOMAIN):
-        raise DomainError(
-            f"ROS_DOMAIN_ID: {wanted!r}; allowed: 0 to {LARGEST_DOMAIN}, or unset for a free one"
-        )
-    for domain in DOMAINS if wanted is None else [int(wanted)]:
+    wanted = wanted_domain()
+    for domain in DOMAINS if wanted is None else [wanted]:
         claim = _claim(domain)
         if claim is not None:
             with claim:

@@ -16,7 +16,6 @@
 
 import argparse
 import importlib
-import os
 import sys
 import tempfile
 from pathlib import Path
@@ -24,6 +23,7 @@ from typing import Any
 
 from gait_entrainment.device import DeviceError, LimitError
 from gait_entrainment.protocol import ProtocolError, write_protocol
+from gait_entrainment_nodes.domain import DomainError, wanted_domain
 from gait_entrainment_nodes.environment import set_environment
 from gait_entrainment_nodes.node_list import NODES, bag_folder, parameter_arguments
 from gait_entrainment_nodes.run_command import (
@@ -65,16 +65,17 @@ def add_command(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the node to its end; 1 where it failed, 2 for a protocol or an option that is wrong."""
     try:
+        domain = wanted_domain() or 0
         protocol = checked_protocol(options)
         bag = options.out or bag_folder(protocol)
         if options.node == "perturbator":
             check_driver(protocol.driver, options)
         if options.node == "bag_recorder":
             check_output(bag)
-    except (ProtocolError, LimitError, DeviceError) as error:
+    except (DomainError, ProtocolError, LimitError, DeviceError) as error:
         print(f"entrain node: {error}", file=sys.stderr)
         return 2 if isinstance(error, ProtocolError) else 1
-    set_environment(int(os.environ.get("ROS_DOMAIN_ID", "0")))
+    set_environment(domain)
     parameters = chosen_parameters(protocol, bag, options)
     parameters["experiment"]["protocol"] = write_protocol(protocol)
     with tempfile.TemporaryDirectory(prefix="entrain_") as folder:

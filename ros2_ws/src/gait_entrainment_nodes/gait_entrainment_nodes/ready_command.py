@@ -15,10 +15,11 @@
 """entrain ready: whether nodes answer and are ready for a run; a health check of containers."""
 
 import argparse
-import os
 import sys
 import time
 from typing import Any
+
+from gait_entrainment_nodes.domain import DomainError, wanted_domain
 
 # An answer may be lost while the node does not know yet who asks [s].
 ASK_AGAIN = 0.5
@@ -42,9 +43,10 @@ def add_command(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Ask every node until all are ready; 1 after the timeout."""
+    """Ask every node until all are ready; 1 after the timeout, 2 for what is no name of a node."""
     # Imported here: other commands do without ROS.
     import rclpy
+    from rclpy.exceptions import InvalidServiceNameException
     from rclpy.experimental import EventsExecutor
     from rclpy.node import Node
     from rclpy.signals import SignalHandlerOptions
@@ -52,15 +54,19 @@ def run(options: argparse.Namespace) -> int:
 
     from gait_entrainment_nodes.environment import set_environment
 
-    set_environment(int(os.environ.get("ROS_DOMAIN_ID", "0")))
+    try:
+        set_environment(wanted_domain() or 0)
+    except DomainError as error:
+        print(f"entrain ready: {error}", file=sys.stderr)
+        return 1
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     asker = Node("entrain_ready", enable_rosout=False, start_parameter_services=False)
     executor = EventsExecutor()
     executor.add_node(asker)
-    clients = {name: asker.create_client(Trigger, f"{name}/ready") for name in options.nodes}
     waiting = dict.fromkeys(options.nodes, "does not answer")
     give_up = time.monotonic() + options.timeout
     try:
+        clients = {name: asker.create_client(Trigger, f"{name}/ready") for name in options.nodes}
         while waiting and time.monotonic() < give_up:
             asked = {n: clients[n].call_async(Trigger.Request()) for n in waiting}
             again = time.monotonic() + ASK_AGAIN
@@ -73,6 +79,9 @@ def run(options: argparse.Namespace) -> int:
                     del waiting[name]
                 elif call.done():
                     waiting[name] = f"waits for {call.result().message}"
+    except InvalidServiceNameException as error:
+        print(f"entrain ready: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
     except KeyboardInterrupt:
         pass  # who did not answer until now is named
     finally:
