@@ -16,15 +16,20 @@
 
 import argparse
 import json
+import re
 import sys
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gait_entrainment.commands.pulse_options import (
     PAPER_WIDTH,
     add_walker_options,
     chosen_walker,
 )
+
+if TYPE_CHECKING:
+    from gait_entrainment.sweep import Axis
 
 # The exact borders are drawn at this many torques or more: a coarse sweep has smooth borders too.
 _BORDER_TORQUES = 50
@@ -75,15 +80,15 @@ def add_command(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Sweep what is missing, join, draw."""
     from gait_entrainment.parameters import ParameterError
-    from gait_entrainment.sweep import Axis, SweepError, SweepPlan, SweepStore
+    from gait_entrainment.sweep import SweepError, SweepPlan, SweepStore
 
     try:
         if options.jobs is not None and options.jobs < 1:
             raise SweepError(f"jobs: {options.jobs}; allowed: at least 1")
         plan = SweepPlan(
             walker=chosen_walker(options),
-            period_offsets=Axis(*_range(options.period_offsets)),
-            torque_fractions=Axis(*_range(options.torque_fractions)),
+            period_offsets=_axis("period_offsets", options.period_offsets),
+            torque_fractions=_axis("torque_fractions", options.torque_fractions),
             phases=options.phases,
             strides=options.strides,
             width=options.width,
@@ -109,9 +114,13 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _range(values: list[float]) -> tuple[float, float, int]:
+def _axis(name: str, values: Sequence[float]) -> "Axis":
+    from gait_entrainment.sweep import Axis, SweepError
+
     least, most, count = values
-    return least, most, int(count)
+    if not float(count).is_integer():
+        raise SweepError(f"{name}: {count:g} values; allowed: a whole number")
+    return Axis(least, most, int(count))
 
 
 def _fill(plan: Any, store: Any, options: argparse.Namespace) -> None:
@@ -150,28 +159,28 @@ def _report(plan: Any, store: Any, options: argparse.Namespace) -> None:
     paths += draw_locked_lags(plan, table, options.out)
     columns = {name: np.asarray(table[name]) for name in table.column_names}
     # Where walks were long enough to tell, both maps must agree.
-    told = (columns["share_censored"] == 0) & (columns["problem"] == "")
+    asked = columns["problem"] == ""
+    told = (columns["share_censored"] == 0) & asked
     told &= columns["share_alternating"] == 0
     told &= columns["share_fell"] + columns["share_flew_off"] == 0
     agree = (columns["stable_locks"] > 0) == (columns["share_locked"] > 0)
-    outcome = {
-        "walks": plan.walks,
-        "strides": plan.walks * plan.strides,
-        "cells": int(told.size),
-        "cells_with_a_stable_lock": int((columns["stable_locks"] > 0).sum()),
-        "cells_told_by_walking": int(told.sum()),
-        "of_these_agreeing": int((told & agree).sum()),
-        "cells_with_2_2_locks": int((columns["share_alternating"] > 0).sum()),
-        "cells_with_falls": int((columns["share_fell"] > 0).sum()),
-        "cells_with_flights": int((columns["share_flew_off"] > 0).sum()),
-        "cells_not_asked": int((columns["problem"] != "").sum()),
-        "borders": [vars(one) for one in borders],
+    counts = {
+        "cells": asked.size,
+        "cells not asked": (~asked).sum(),
+        "walks": asked.sum() * plan.phases,
+        "strides of each": plan.strides,
+        "cells with a stable lock": (columns["stable_locks"] > 0).sum(),
+        "cells told by walking": told.sum(),
+        "of these agreeing": (told & agree).sum(),
+        "cells with 2:2 locks": (columns["share_alternating"] > 0).sum(),
+        "cells with falls": (columns["share_fell"] > 0).sum(),
+        "cells with flights": (columns["share_flew_off"] > 0).sum(),
     }
     if options.json:
-        print(json.dumps(outcome))
+        outcome = {re.sub(r"\W", "_", name): int(count) for name, count in counts.items()}
+        print(json.dumps({**outcome, "borders": [vars(one) for one in borders]}))
         return
-    for name, value in outcome.items():
-        if name != "borders":
-            print(f"{name.replace('_', ' '):25} {value}")
+    for name, count in counts.items():
+        print(f"{name:25} {count}")
     for path in paths:
         print(f"{'written':25} {path}")

@@ -18,6 +18,7 @@ Who makes the rows: processes of this machine, or the workers of a Dask cluster.
 Rows come back as they are made and are written at once; nothing else is kept.
 """
 
+import asyncio
 import importlib
 import multiprocessing
 import os
@@ -25,13 +26,14 @@ import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
 from gait_entrainment.sweep.plan import SweepError, SweepPlan
 from gait_entrainment.sweep.row import Row, sweep_row
 
 # A scheduler that does not answer is named within this time [s].
-SCHEDULER_TIMEOUT = 8.0
+SCHEDULER_TIMEOUT = 6.0
 
 # Rows handed out ahead of those that are made: enough to keep every worker busy.
 _AHEAD = 2
@@ -60,6 +62,11 @@ def rows_by_processes(plan: SweepPlan, indices: Sequence[int], jobs: int) -> Row
     )
     try:
         yield from _in_flight(lambda index: pool.submit(sweep_row, plan, index), indices, jobs)
+    except BrokenProcessPool:
+        raise SweepError(
+            f"one of {jobs} processes was killed, perhaps for want of memory: give the same"
+            " command again, or with fewer --jobs; what is made is kept"
+        ) from None
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
 
@@ -79,20 +86,45 @@ def _in_flight(submit: Callable[[int], "Future[Row]"], indices: Sequence[int], j
 
 
 def rows_by_dask(plan: SweepPlan, indices: Sequence[int], scheduler: str) -> Rows:
-    """Make rows on a Dask cluster. Raises SweepError where its scheduler does not answer."""
+    """
+    Make rows on a Dask cluster.
+
+    Raises SweepError where its scheduler does not answer or a row cannot be made there.
+    """
     try:
         dask: Any = importlib.import_module("distributed")
     except ImportError:
         raise SweepError("--scheduler needs Dask: pip install distributed") from None
+    _ask_who_it_is(dask, scheduler)
+    with dask.Client(scheduler, timeout=SCHEDULER_TIMEOUT) as client:
+        futures = {client.submit(sweep_row, plan, index, pure=False): index for index in indices}
+        for future in dask.as_completed(list(futures)):
+            try:
+                row = future.result()
+            except Exception as error:  # whatever a worker raised, or that it is gone
+                what = f"{type(error).__name__}: {error}".partition("\n")[0]
+                raise SweepError(
+                    f"scheduler {scheduler}: a row could not be made ({what}): see that it runs,"
+                    " its workers with this version of gait_entrainment; the same command goes on"
+                ) from None
+            yield futures.pop(future), row
+            future.release()
+
+
+def _ask_who_it_is(dask: Any, scheduler: str) -> None:
+    """Let the scheduler tell its kind: Dask's client waits forever for another service."""
+
+    async def kind() -> str:
+        async with dask.rpc(scheduler) as remote:
+            identity = await asyncio.wait_for(remote.identity(), SCHEDULER_TIMEOUT)
+        return str(identity["type"])
+
     try:
-        client = dask.Client(scheduler, timeout=SCHEDULER_TIMEOUT)
-    except (OSError, ValueError, TimeoutError) as error:
+        answer = asyncio.run(kind())
+    except Exception as error:  # another service answers with anything
         raise SweepError(
             f"scheduler {scheduler} does not answer within {SCHEDULER_TIMEOUT:g} s"
             f" ({type(error).__name__}): start it, or leave out --scheduler"
         ) from None
-    with client:
-        futures = {client.submit(sweep_row, plan, index, pure=False): index for index in indices}
-        for future in dask.as_completed(list(futures)):
-            yield futures.pop(future), future.result()
-            future.release()
+    if answer != "Scheduler":
+        raise SweepError(f"scheduler {scheduler} is a {answer}: give the scheduler's address")

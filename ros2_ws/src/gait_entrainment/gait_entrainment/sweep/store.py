@@ -40,7 +40,7 @@ class SweepStore:
         self._provenance = plan.provenance()
         self._parts.mkdir(parents=True, exist_ok=True)
         description = folder / "sweep.json"
-        if description.exists():
+        if description.exists() and any(self._parts.iterdir()):
             self._refuse_another(description)
         else:
             _write_whole(description, json.dumps(self._provenance, indent=1).encode())
@@ -51,9 +51,9 @@ class SweepStore:
         return self.folder / "tongue.parquet"
 
     def missing(self) -> list[int]:
-        """Return the rows that are not on disk yet."""
+        """Return the rows that are not on disk yet, or damaged there."""
         rows = range(self._plan.torque_fractions.count)
-        return [index for index in rows if not self._part(index).exists()]
+        return [index for index in rows if not _whole(self._part(index))]
 
     def add(self, index: int, row: Row) -> None:
         """Write one row."""
@@ -110,6 +110,17 @@ def _flat(nested: dict[str, Any], prefix: str = "") -> dict[str, Any]:
         else:
             flat[prefix + name] = value
     return flat
+
+
+def _whole(part: Path) -> bool:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        pq.read_table(part)
+    except (FileNotFoundError, pa.ArrowInvalid):
+        return False
+    return True
 
 
 def _write_whole(path: Path, content: bytes) -> None:

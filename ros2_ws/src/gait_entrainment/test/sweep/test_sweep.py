@@ -13,12 +13,15 @@
 # limitations under the License.
 
 import json
+import multiprocessing
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
 from functools import partial
+from threading import Thread
 
 import numpy as np
 import pytest
@@ -119,6 +122,16 @@ def test_processes_make_the_same_rows_as_one():
         same(alone[index], together[index])
 
 
+def test_a_killed_process_is_named():
+    plan = plan_of(torque_fractions=Axis(0.05, 0.15, 60))
+    rows = rows_by_processes(plan, range(60), 2)
+    next(rows)
+    for process in multiprocessing.active_children():
+        process.kill()
+    with pytest.raises(SweepError, match="one of 2 processes was killed"):
+        list(rows)
+
+
 def test_dask_makes_the_same_rows_on_a_cluster_of_two_workers():
     distributed = pytest.importorskip("distributed")
     plan = plan_of()
@@ -126,26 +139,61 @@ def test_dask_makes_the_same_rows_on_a_cluster_of_two_workers():
         n_workers=2, threads_per_worker=1, dashboard_address=None
     ) as cluster:
         made = dict(rows_by_dask(plan, range(3), cluster.scheduler_address))
+        worker = cluster.workers[0].worker_address
+        with pytest.raises(SweepError, match="is a Worker: give the scheduler's address"):
+            next(rows_by_dask(plan, range(3), worker))
     for index in range(3):
         same(made[index], sweep_row(plan, index))
 
 
-def test_a_scheduler_that_does_not_answer_is_named(tmp_path, capsys, monkeypatch):
+def test_rows_that_a_cluster_cannot_make_are_named():
+    distributed = pytest.importorskip("distributed")
+    plan = plan_of(torque_fractions=Axis(0.05, 0.15, 60), strides=400)
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, dashboard_address=None
+    ) as cluster:
+        rows = rows_by_dask(plan, range(60), cluster.scheduler_address)
+        next(rows)
+        cluster.close()
+        with pytest.raises(SweepError, match=r"a row could not be made.*the same command goes on"):
+            list(rows)
+
+
+@pytest.mark.parametrize("service", ["none", "silent", "another"])
+def test_a_scheduler_that_does_not_answer_is_named(service, tmp_path, capsys, monkeypatch):
     pytest.importorskip("distributed")
     assert engine.SCHEDULER_TIMEOUT < 10
     monkeypatch.setattr(engine, "SCHEDULER_TIMEOUT", 0.5)
-    arguments = ["sweep", "--out", str(tmp_path / "s"), "--scheduler", "tcp://127.0.0.1:9"]
-    assert main(arguments) == 1
-    assert "scheduler tcp://127.0.0.1:9 does not answer" in capsys.readouterr().err
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        if service == "another":
+            Thread(target=lambda: server.accept()[0].sendall(b"HTTP/1.0 400 Bad request")).start()
+        elif service == "none":
+            server.close()
+        address = f"tcp://127.0.0.1:{port}"
+        assert main(["sweep", "--out", str(tmp_path / "s"), "--scheduler", address]) == 1
+    assert f"scheduler {address} does not answer" in capsys.readouterr().err
 
 
 def test_a_sweep_is_resumed_only_with_its_own_plan(tmp_path):
     plan = plan_of()
     store = SweepStore(tmp_path, plan)
+    SweepStore(tmp_path, plan_of(strides=98))  # nothing was made with the first plan
+    store = SweepStore(tmp_path, plan)
     store.add(1, sweep_row(plan, 1))
     assert SweepStore(tmp_path, plan).missing() == [0, 2]
     with pytest.raises(SweepError, match=r"plan\.strides 120, not 99: resume it with that"):
         SweepStore(tmp_path, plan_of(strides=99))
+
+
+@pytest.mark.parametrize("size", [0, 100])
+def test_a_damaged_row_is_made_again(size, tmp_path):
+    plan = plan_of()
+    store = SweepStore(tmp_path, plan)
+    for index in range(3):
+        store.add(index, sweep_row(plan, index))
+    os.truncate(tmp_path / "parts" / "000001.parquet", size)
+    assert store.missing() == [1]
 
 
 def test_the_table_carries_plan_and_versions(tmp_path):
@@ -200,6 +248,8 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path, capsys):
     [
         (["--torque-fractions", "0.2", "0.1", "3"], "torque_fractions: 0.2 to 0.1"),
         (["--period-offsets", "-0.1", "0", "0"], "period_offsets: 0 values"),
+        (["--period-offsets", "-0.1", "0", "2.5"], "period_offsets: 2.5 values"),
+        (["--torque-fractions", "0", "0.1", "nan"], "torque_fractions: nan values"),
         (["--width", "1.2"], "width 1.2 s is out of range"),
         (["--jobs", "-1"], "jobs: -1; allowed: at least 1"),
         (["--phases", "0"], "phases: 0; allowed: at least 1"),
