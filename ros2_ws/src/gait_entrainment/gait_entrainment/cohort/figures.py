@@ -15,10 +15,11 @@
 """The cohort as a picture: verdicts by pulse period, and the basins."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from gait_entrainment.cohort.study import Study, basin_percent, verdicts
+from gait_entrainment.cohort.study import Study, verdicts
 from gait_entrainment.report.drawing import (
     BLUE,
     GREEN,
@@ -45,29 +46,37 @@ _COLOURS = {
 def draw_cohort(study: Study, folder: Path) -> list[Path]:
     """Draw the share of each verdict, and each subject's basin without noise."""
     figure, (left, right) = new_figure(1, 2, size=(9.6, 4.0))
+    _draw_verdicts(study, left)
+    if study.basins.size:
+        _draw_basins(study, right)
+    else:
+        right.set_axis_off()
+    for axes in (left, right):
+        axes.locator_params(axis="y", integer=True)
+        axes.legend(
+            frameon=False, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=4
+        )
+    return save_figure(figure, folder, "cohort")
+
+
+def _draw_verdicts(study: Study, axes: Any) -> None:
     offsets = sorted({trial.period_offset for trial in study.trials})
     place, base = np.arange(len(offsets)), np.zeros(len(offsets))
     for name, colour in _COLOURS.items():
         counts = np.array([verdicts(study, offset).get(name, 0) for offset in offsets])
         if counts.any():
-            left.bar(place, counts, bottom=base, color=colour, label=name, width=0.8)
+            axes.bar(place, counts, bottom=base, color=colour, label=name, width=0.8)
             base = base + counts
-    left.set_xticks(place, [f"{offset * 1e3:+.0f}" for offset in offsets], fontsize=8)
-    left.set(xlabel="pulse period off the measured stride period [ms]", ylabel="subjects")
-    left.set_title("verdicts, with variability", fontsize=10)
-    left.legend(
-        frameon=False, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=4
-    )
-    percent = np.sort(basin_percent(study))
-    right.plot(percent, np.arange(1, percent.size + 1), "o", color=BLUE, ms=4)
-    right.axvline(percent.mean(), color=BLUE, ls="--", lw=1, label=f"mean {percent.mean():.2f} %")
-    right.axvspan(6.7 - 3.6, 6.7 + 3.6, color=ORANGE, alpha=0.15, lw=0, label="human 6.7 ± 3.6 %")
-    right.axvline(6.7, color=ORANGE, lw=1)
-    right.set(xlabel="basin of entrainment [% of the stride]", ylabel="subjects, sorted", xlim=0)
-    right.set_title("basins without noise, solved", fontsize=10)
-    right.legend(
-        frameon=False, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2
-    )
-    for axes in (left, right):
-        axes.locator_params(axis="y", integer=True)
-    return save_figure(figure, folder, "cohort")
+    axes.set_xticks(place, [f"{offset * 1e3:+.0f}" for offset in offsets], fontsize=8)
+    axes.set(xlabel="pulse period off the measured stride period [ms]", ylabel="subjects")
+    axes.set_title("verdicts, with variability", fontsize=10)
+
+
+def _draw_basins(study: Study, axes: Any) -> None:
+    percent = np.sort(study.basin_widths)
+    axes.plot(percent, np.arange(1, percent.size + 1), "o", color=BLUE, ms=4)
+    axes.axvline(percent.mean(), color=BLUE, ls="--", lw=1, label=f"mean {percent.mean():.2f} %")
+    axes.axvspan(6.7 - 3.6, 6.7 + 3.6, color=ORANGE, alpha=0.15, lw=0, label="human 6.7 ± 3.6 %")
+    axes.axvline(6.7, color=ORANGE, lw=1)
+    axes.set(xlabel="basin of entrainment [% of the stride]", ylabel="subjects, sorted", xlim=0)
+    axes.set_title("basins without noise, solved", fontsize=10)

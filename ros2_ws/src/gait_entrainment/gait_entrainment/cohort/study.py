@@ -41,6 +41,10 @@ from gait_entrainment.variability import (
     noise_for,
 )
 
+# Streams of noise beside that which draws the subjects. A trial's goes by its pulse period: it is
+# the same trial, whatever other periods are asked for.
+_PILOT, _TRIAL = 1, 2
+
 # A pulse within this fraction of the stride of the noise-free lock counts as locked.
 _LOCKED_WITHIN = 0.05
 
@@ -62,6 +66,11 @@ class StudyPlan:
     slope: float = 0.0
     asymmetry: float = 0.0
 
+    @property
+    def solvable(self) -> bool:
+        """Whether locks are solved for: on level ground, with equal legs."""
+        return self.slope == 0 and self.asymmetry == 0
+
 
 @dataclass(frozen=True)
 class Trial:
@@ -81,13 +90,20 @@ class Trial:
 
 @dataclass(frozen=True)
 class Study:
-    """All trials, and each subject's basin without noise, solved [s]: (shortest, longest)."""
+    """All trials, and each subject's basin without noise."""
 
     trials: tuple[Trial, ...]
-    basins: tuple[tuple[float, float], ...]
-    """Pulse periods with a stable lock, off the unperturbed stride period."""
-    stride_periods: tuple[float, ...]
-    """Unperturbed, without noise [s]."""
+    basins: Floats
+    """
+    (n, 2) shortest and longest pulse period with a stable lock, solved without noise, off the
+    unperturbed stride period in percent of it; (0, 2) where the plan is not solvable.
+    """
+
+    @property
+    def basin_widths(self) -> Floats:
+        """Each subject's basin without noise, both sides together, in percent of its stride."""
+        widths: Floats = self.basins[:, 1] - self.basins[:, 0]
+        return widths
 
 
 def run_study(subjects: Subjects, plan: StudyPlan) -> Study:
@@ -100,7 +116,7 @@ def run_study(subjects: Subjects, plan: StudyPlan) -> Study:
         raise ValueError(f"torque {plan.torque} N m is not a finite number")
     count = len(subjects.walkers)
     population = Population(subjects.walkers, plan.slope)
-    noise = noise_for(population, subjects.variation, plan.seed, plan.hurst)
+    noise = noise_for(population, subjects.variation, (plan.seed, _PILOT), plan.hurst)
     gaits = [PulsedGait(walker, plan.torque, plan.width) for walker in subjects.walkers]
     pieces = [pieces_of(gait) for gait in gaits]
     # Half the stride is room enough for any stride that noise makes.
@@ -111,34 +127,32 @@ def run_study(subjects: Subjects, plan: StudyPlan) -> Study:
                 f"period_offset {offset:g} s is out of range; allowed: within {shortest:.3g} s"
             )
     trials: list[Trial] = []
-    for number, offset in enumerate(plan.period_offsets):
+    for offset in plan.period_offsets:
         walker = PopulationWalker(
             population,
             2 * (plan.baseline + plan.pulses + plan.washout) + 2,
-            plan.seed + 1 + number,
-            np.nan_to_num(noise),
+            (plan.seed, _TRIAL, nanoseconds(offset) % 2**64),
+            noise,
             plan.hurst,
             plan.asymmetry,
         )
         walk, trains = _conduct(walker, plan, offset, count)
         for subject in range(count):
-            # Slope and asymmetry shift the lock, and only the plain walker's is solved.
-            plain = plan.slope == 0 and plan.asymmetry == 0
             lock = float("nan")
-            if plain:
+            if plan.solvable:
                 period = gaits[subject].unperturbed_period + offset
                 locks = locked_gaits(gaits[subject], period, pieces[subject])
                 lock = next((one.lag for one in reversed(locks) if one.stable), lock)
             trials.append(_trial(walk, trains, subject, offset, lock))
     basins = []
-    for gait, branches in zip(gaits, pieces, strict=True):
+    for gait, branches in zip(gaits, pieces, strict=True) if plan.solvable else ():
         stable = stable_intervals(branches)
         ends = [(p.least_period.period, p.greatest_period.period) for p in stable]
         base = gait.unperturbed_period
-        low = min((end[0] for end in ends), default=base) - base
-        high = max((end[1] for end in ends), default=base) - base
-        basins.append((low, high))
-    return Study(tuple(trials), tuple(basins), tuple(g.unperturbed_period for g in gaits))
+        low = min((end[0] for end in ends), default=base) / base - 1
+        high = max((end[1] for end in ends), default=base) / base - 1
+        basins.append((100 * low, 100 * high))
+    return Study(tuple(trials), np.reshape(basins, (-1, 2)))
 
 
 def _conduct(
@@ -203,13 +217,6 @@ def _events(strikes: Floats, toe_offs: Floats) -> list[GaitEvent]:
 def verdicts(study: Study, offset: float) -> dict[str, int]:
     """Count the verdicts at one pulse period; they add up to the number of subjects."""
     return dict(Counter(t.verdict for t in study.trials if t.period_offset == offset))
-
-
-def basin_percent(study: Study) -> Floats:
-    """Each subject's basin without noise, both sides together, in percent of its stride."""
-    widths = np.array([high - low for low, high in study.basins])
-    percent: Floats = 100 * widths / np.array(study.stride_periods)
-    return percent
 
 
 def measured_basin_percent(study: Study) -> Floats:

@@ -53,8 +53,8 @@ class SubjectDistributions:
             # Two deviations off it must still be positive.
             if not (mean > 2 * deviation >= 0 and mean < np.inf):
                 raise ValueError(
-                    f"{item.name}: mean {mean:g}, deviation {deviation:g} {item.metadata['unit']};"
-                    " allowed: a positive mean above twice the deviation"
+                    f"{item.name} {mean:g} +/- {deviation:g} [{item.metadata['unit']}] is out of"
+                    " range; allowed: a mean above twice the deviation, none negative"
                 )
 
 

@@ -22,6 +22,8 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gait_entrainment.commands.pulse_options import check_at_least
+
 if TYPE_CHECKING:
     from gait_entrainment.cohort import Study, StudyPlan, Subjects
 
@@ -70,7 +72,8 @@ def add_command(commands: Any) -> None:
         type=float,
         action="append",
         metavar="FLOAT",
-        help=f"pulse period minus measured stride period [s]; default {_OFFSETS}",
+        help="pulse period minus measured stride period [s], may be given again; default "
+        + " ".join(map(str, _OFFSETS)),
     )
     drawn = parser.add_argument_group("distributions of the subjects")
     for name, meaning in (
@@ -97,10 +100,8 @@ def run(options: argparse.Namespace) -> int:
     names = [item.name for item in fields(SubjectDistributions)]
     given = {name: tuple(value) for name in names if (value := getattr(options, name))}
     try:
-        if options.subjects < 2 or options.pulses < 1:
-            raise ValueError(
-                f"subjects {options.subjects}, pulses {options.pulses}; allowed: at least 2 and 1"
-            )
+        for name, least in (("subjects", 2), ("pulses", 1), ("seed", 0)):
+            check_at_least(name, getattr(options, name), least)
         distributions = SubjectDistributions(**given)
         subjects = draw_subjects(distributions, options.subjects, options.seed)
         plan = StudyPlan(
@@ -139,7 +140,7 @@ def _outcome(
 ) -> dict[str, Any]:
     import numpy as np
 
-    from gait_entrainment.cohort import basin_percent, measured_basin_percent, verdicts
+    from gait_entrainment.cohort import measured_basin_percent, verdicts
 
     def mean(values: list[float]) -> float | None:
         finite = [value for value in values if np.isfinite(value)]
@@ -160,9 +161,7 @@ def _outcome(
             }
         )
     anywhere = {trial.subject for trial in study.trials if trial.verdict == "entrained"}
-    solved, measured = basin_percent(study), measured_basin_percent(study)
-    # Solved for level ground and equal legs only.
-    plain = plan.slope == 0 and plan.asymmetry == 0
+    solved, measured = study.basin_widths, measured_basin_percent(study)
     return {
         "subjects": len(subjects.walkers),
         "redrawn_for_want_of_a_gait": subjects.redrawn,
@@ -172,31 +171,41 @@ def _outcome(
         "periods": periods,
         "entrained_at_some_period": len(anywhere),
         "basin_solved_percent": (
-            [float(solved.mean()), float(solved.std(ddof=1))] if plain else None
+            [float(solved.mean()), float(solved.std(ddof=1))] if solved.size else None
         ),
+        "basin_ends_percent": study.basins.mean(axis=0).tolist() if solved.size else None,
         "basin_measured_percent": [float(measured.mean()), float(measured.std(ddof=1))],
     }
 
 
+def _of(found: int, count: int) -> str:
+    """Say how many, with the 95 % interval of the share by Wilson's score."""
+    from scipy.stats import binomtest
+
+    interval = binomtest(found, count).proportion_ci(method="wilson")
+    return f"{found} of {count}, 95 % interval {interval.low:.0%} to {interval.high:.0%}"
+
+
 def _summary(outcome: dict[str, Any]) -> str:
     count = outcome["subjects"]
+
+    def shown(value: float | None, form: str, factor: float = 1.0) -> str:
+        return "-" if value is None else format(value * factor, form)
+
     lines = [
-        f"subjects         {count}, measured stride period {outcome['mean_stride_period']:.4f} s"
-        f" on average; {outcome['redrawn_for_want_of_a_gait']} drawn again for want of a gait",
+        f"subjects         {count}, {outcome['redrawn_for_want_of_a_gait']} drawn again for want"
+        f" of a gait; measured stride period {shown(outcome['mean_stride_period'], '.4f')} s on"
+        " average",
         "",
         "| offset [ms] | verdicts | strides locked* | mean run* | lag of the entrained [ms] |",
         "| --- | --- | --- | --- | --- |",
     ]
-
-    def shown(value: float | None, factor: float, unit: str = "") -> str:
-        return "-" if value is None else f"{value * factor:.1f}{unit}"
-
     for row in outcome["periods"]:
         found = ", ".join(f"{number} {name}" for name, number in sorted(row["verdicts"].items()))
         lines.append(
             f"| {row['period_offset'] * 1e3:+.0f} | {found} |"
-            f" {shown(row['fraction_locked'], 100, ' %')} | {shown(row['mean_run'], 1)} |"
-            f" {shown(row['lag_of_entrained'], 1e3)} |"
+            f" {shown(row['fraction_locked'], '.1%')} | {shown(row['mean_run'], '.1f')} |"
+            f" {shown(row['lag_of_entrained'], '.1f', 1e3)} |"
         )
     lines += [
         "",
@@ -206,15 +215,17 @@ def _summary(outcome: dict[str, Any]) -> str:
     for row in outcome["periods"]:
         if row["period_offset"] == _HEADLINE:
             entrained = row["verdicts"].get("entrained", 0)
-            lines += ["", f"entrained at {_HEADLINE * 1e3:+.0f} ms: {entrained} of {count}"]
+            lines += ["", f"entrained at {_HEADLINE * 1e3:+.0f} ms: {_of(entrained, count)}"]
     lines.append(
-        f"entrained at some period: {outcome['entrained_at_some_period']} of {count}"
-        " (human: 18 of 19)"
+        f"entrained at some period: {_of(outcome['entrained_at_some_period'], count)}"
+        f" (human: {_of(18, 19)})"
     )
     if solved is not None:
+        shortest, longest = outcome["basin_ends_percent"]
         lines.append(
             f"basin without noise, solved: {solved[0]:.2f} +/- {solved[1]:.2f} % of the stride,"
-            " to shorter periods only (human: 6.7 +/- 3.6 %, to both sides)"
+            f" from {shortest:+.2f} to {longest:+.2f} % on average (human: 6.7 +/- 3.6 %, to both"
+            " sides)"
         )
     lines += [
         f"furthest period found entrained: {measured[0]:.2f} +/- {measured[1]:.2f} %",

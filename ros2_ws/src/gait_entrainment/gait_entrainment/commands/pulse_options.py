@@ -17,8 +17,12 @@
 import argparse
 import math
 from dataclasses import fields
+from typing import TYPE_CHECKING
 
 from gait_entrainment.parameters import WalkerParameters
+
+if TYPE_CHECKING:
+    from gait_entrainment.locking import PulsedGait
 
 PAPER_FRACTION = 0.1
 PAPER_WIDTH = 0.1
@@ -50,6 +54,21 @@ def add_pulse_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--width", type=float, metavar="FLOAT", default=PAPER_WIDTH, help="duration [s]"
     )
+
+
+def check_at_least(name: str, value: int, least: int) -> None:
+    """Raise ValueError where a number is too small."""
+    if value < least:
+        raise ValueError(f"{name} {value} is out of range; allowed: at least {least}")
+
+
+def check_period_offset(offset: float, gait: "PulsedGait") -> None:
+    """Raise ValueError where pulses at this period [s] off the unperturbed one would overlap."""
+    least = gait.width - gait.unperturbed_period
+    if not least < offset < math.inf:
+        raise ValueError(
+            f"period_offset {offset:g} s is out of range; allowed: above {least:.4g} s"
+        )
 
 
 def chosen_walker(options: argparse.Namespace) -> WalkerParameters:

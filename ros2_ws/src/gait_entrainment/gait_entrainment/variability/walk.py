@@ -30,6 +30,10 @@ _PILOT_ROUNDS = 2
 _PILOT_NOISE = 0.02
 
 
+# What numpy's generators are seeded with.
+Seed = int | tuple[int, ...]
+
+
 @dataclass(frozen=True)
 class PulseTrains:
     """One train of pulses per walker, on the leg of heel strike 0: arrays (n,)."""
@@ -70,7 +74,7 @@ class PopulationWalker:
         self,
         population: Population,
         steps: int,
-        seed: int,
+        seed: Seed,
         noise: Floats,
         hurst: float = 0.5,
         asymmetry: float = 0.0,
@@ -118,21 +122,29 @@ class PopulationWalker:
 
 
 def noise_for(
-    population: Population, coefficient_of_variation: Floats, seed: int, hurst: float = 0.5
+    population: Population, coefficient_of_variation: Floats, seed: Seed, hurst: float = 0.5
 ) -> Floats:
     """
     Return the noise (n,) with which each walker's stride period varies by this coefficient.
 
-    Found by pilot walks, in which the coefficient is nearly proportional to the noise. NaN where a
-    walker ends in them: so much variation it cannot walk with.
+    Found by pilot walks, in which the coefficient is nearly proportional to the noise. Of a walker
+    that falls in them the strides before the fall count; it may fall in the experiment too.
     """
     noise = np.full(population.size, _PILOT_NOISE)
     for _ in range(_PILOT_ROUNDS):
         walker = PopulationWalker(population, 2 * _PILOT_STRIDES, seed, noise, hurst)
-        periods = walker.walk(2 * _PILOT_STRIDES).stride_periods
-        found = periods.std(axis=0, ddof=1) / periods.mean(axis=0)
-        noise = noise * coefficient_of_variation / found
+        found = coefficients_of_variation(walker.walk(2 * _PILOT_STRIDES).stride_periods)
+        # One that fell before its third stride tells nothing new.
+        noise = np.where(found > 0, noise * coefficient_of_variation / found, noise)
     return noise
+
+
+def coefficients_of_variation(stride_periods: Floats) -> Floats:
+    """Of each walker (n,), from stride periods (strides, n) up to an end; NaN for fewer than 2."""
+    walked = np.ma.masked_invalid(stride_periods)
+    found = walked.std(axis=0, ddof=1) / walked.mean(axis=0)
+    coefficients: Floats = np.ma.filled(found, np.nan)
+    return coefficients
 
 
 def locked_runs(lags: Floats, locked_lag: float, tolerance: float) -> tuple[float, list[int]]:

@@ -63,6 +63,27 @@ def test_variability_keeps_subjects_from_being_shown_entrained():
     assert sum(lively.values()) == 12
 
 
+def test_subjects_that_cannot_walk_with_their_variation_are_reported():
+    found = verdicts(run_study(table_1_subjects(6, 0.4), StudyPlan()), -0.05)
+    assert set(found) <= {"fell", "flew off"}
+    assert sum(found.values()) == 6
+
+
+def test_a_trial_is_the_same_whatever_other_periods_are_asked_for():
+    subjects = table_1_subjects(3, 0.02)
+    alone = run_study(subjects, StudyPlan(period_offsets=(-0.05,))).trials
+    among = run_study(subjects, StudyPlan(period_offsets=(-0.08, -0.05))).trials
+    assert [trial for trial in among if trial.period_offset == -0.05] == list(alone)
+    assert among[0].measured_period != among[3].measured_period
+
+
+def test_basins_are_those_of_the_solved_borders_and_only_where_they_hold():
+    study = run_study(table_1_subjects(2, 1e-9), StudyPlan(torque=13.3464))
+    assert study.basins[0] == pytest.approx([-4.1045, 0.0], abs=1e-4)
+    assert study.basin_widths == pytest.approx([4.1045] * 2, abs=1e-4)
+    assert run_study(table_1_subjects(2, 1e-9), StudyPlan(slope=-0.01)).basins.shape == (0, 2)
+
+
 def test_subjects_are_drawn_from_what_is_stated_and_by_seed():
     distributions = SubjectDistributions(mass=(70.0, 5.0))
     subjects = draw_subjects(distributions, 400, 1)
@@ -94,10 +115,11 @@ def test_command_counts_every_subject_in_its_denominators(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--mass", "10", "6"], "mass: mean 10, deviation 6 kg"),
+        (["--mass", "10", "6"], "mass 10 +/- 6 [kg] is out of range"),
         (["--slope", "0.7"], "slope 0.7 rad is out of range"),
         (["--period-offset", "-1.5"], "period_offset -1.5 s is out of range"),
-        (["--subjects", "1"], "subjects 1"),
+        (["--subjects", "1"], "subjects 1 is out of range; allowed: at least 2"),
+        (["--seed", "-1"], "seed -1 is out of range; allowed: at least 0"),
         (["--peak-torque", "0.9", "0.001"], "hardly a subject drawn has a gait"),
     ],
 )
