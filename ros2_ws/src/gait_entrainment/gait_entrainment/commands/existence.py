@@ -21,8 +21,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from gait_entrainment.commands.pulse_options import add_walker_options, chosen_walker
-from gait_entrainment.parameters import ParameterError
+from gait_entrainment.commands.pulse_options import (
+    add_walker_options,
+    check_at_least,
+    chosen_walker,
+)
 
 
 def add_command(commands: Any) -> None:
@@ -34,7 +37,9 @@ def add_command(commands: Any) -> None:
         epilog="examples:\n  entrain existence --out figures\n  entrain existence --json",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--points", type=int, default=120, metavar="INT", help="leg angles")
+    parser.add_argument(
+        "--points", type=int, default=120, metavar="INT", help="leg angles; default 120"
+    )
     add_walker_options(parser)
     parser.add_argument("--out", type=Path, metavar="DIR", help="draw the map into a folder")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
@@ -48,8 +53,9 @@ def run(options: argparse.Namespace) -> int:
     try:
         walker = chosen_walker(options)
         own = stiffness_range(walker)
-        ranges = existence_map(walker, max(options.points, 2))
-    except ParameterError as error:
+        check_at_least("points", options.points, 2)
+        ranges = existence_map(walker, options.points)
+    except ValueError as error:
         print(f"entrain existence: {error}", file=sys.stderr)
         return 2
     if options.json:

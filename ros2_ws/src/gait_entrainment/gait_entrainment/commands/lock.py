@@ -16,7 +16,6 @@
 
 import argparse
 import json
-import math
 import sys
 from dataclasses import asdict
 from pathlib import Path
@@ -25,6 +24,8 @@ from typing import Any
 from gait_entrainment.commands.pulse_options import (
     add_pulse_options,
     add_walker_options,
+    check_at_least,
+    check_period_offset,
     chosen_torque,
     chosen_walker,
 )
@@ -52,10 +53,14 @@ def add_command(commands: Any) -> None:
         type=float,
         default=-0.05,
         metavar="FLOAT",
-        help="pulse period minus the unperturbed stride period [s]",
+        help="pulse period minus the unperturbed stride period [s]; default -0.05",
     )
     parser.add_argument(
-        "--phases", type=int, default=32, metavar="INT", help="initial phases walked from"
+        "--phases",
+        type=int,
+        default=32,
+        metavar="INT",
+        help="initial phases walked from; default 32",
     )
     add_pulse_options(parser)
     add_walker_options(parser)
@@ -67,22 +72,16 @@ def add_command(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Solve, walk, print."""
     from gait_entrainment.locking import PulsedGait, locked_gaits, pieces_of, shares_of
-    from gait_entrainment.parameters import ParameterError
 
     try:
         walker = chosen_walker(options)
         gait = PulsedGait(walker, chosen_torque(options, walker), options.width)
-    except (ParameterError, ValueError) as error:
+        check_period_offset(options.period_offset, gait)
+        check_at_least("phases", options.phases, 1)
+    except ValueError as error:
         print(f"entrain lock: {error}", file=sys.stderr)
         return 2
     period = gait.unperturbed_period + options.period_offset
-    if not (options.width < period < math.inf and options.phases >= 1):
-        print(
-            f"entrain lock: period_offset {options.period_offset:g} s, phases {options.phases};"
-            f" allowed: above {options.width - gait.unperturbed_period:.4g} s, at least 1",
-            file=sys.stderr,
-        )
-        return 2
     pieces = pieces_of(gait)
     locks = locked_gaits(gait, period, pieces)
     shares = shares_of(gait, period, locks, options.phases)

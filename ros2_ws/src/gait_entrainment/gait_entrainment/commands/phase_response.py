@@ -23,6 +23,8 @@ from typing import Any
 from gait_entrainment.commands.pulse_options import (
     add_pulse_options,
     add_walker_options,
+    check_at_least,
+    check_period_offset,
     chosen_torque,
     chosen_walker,
 )
@@ -52,9 +54,12 @@ def add_command(commands: Any) -> None:
         type=float,
         action="append",
         metavar="FLOAT",
-        help="predict the lock at this pulse period off the stride period [s]; default -0.05",
+        help="predict the lock at this pulse period off the stride period [s], may be given"
+        " again; default -0.05",
     )
-    parser.add_argument("--points", type=int, default=201, metavar="INT", help="per branch")
+    parser.add_argument(
+        "--points", type=int, default=201, metavar="INT", help="per branch; default 201"
+    )
     add_pulse_options(parser)
     add_walker_options(parser)
     parser.add_argument("--out", type=Path, metavar="DIR", help="write curve and CSV to a folder")
@@ -66,16 +71,19 @@ def run(options: argparse.Namespace) -> int:
     """Solve and print; the curve itself goes to JSON and CSV."""
     import numpy as np
 
-    from gait_entrainment.parameters import ParameterError
+    from gait_entrainment.locking import PulsedGait
     from gait_entrainment.phase_response import phase_response, predictions
 
     offsets = np.array(options.period_offset or [-0.05])
     try:
         walker = chosen_walker(options)
         pulse = walker, chosen_torque(options, walker), options.width
-        response = phase_response(*pulse, max(options.points, 2))
+        for offset in offsets:
+            check_period_offset(offset, PulsedGait(*pulse))
+        check_at_least("points", options.points, 2)
+        response = phase_response(*pulse, options.points)
         found = predictions(*pulse, offsets)
-    except (ParameterError, ValueError) as error:
+    except ValueError as error:
         print(f"entrain phase-response: {error}", file=sys.stderr)
         return 2
     curve = np.column_stack([getattr(response, name) for name in _COLUMNS])
@@ -95,6 +103,12 @@ def run(options: argparse.Namespace) -> int:
         most, least = np.nanmax(response.shift), np.nanmin(response.shift)
         print(f"stride period    {response.stride_period:.9f} s")
         print(f"advance          {least * 1e3:.4f} to {most * 1e3:.4f} ms in the end")
+        ended = response.phase[np.isnan(response.shift)]
+        if ended.size:
+            print(
+                f"falls, flies off at {ended.size} of {response.phase.size} phases, between"
+                f" {np.nanmin(ended):.4f} and {np.nanmax(ended):.4f}"
+            )
         for one in found:
             print(
                 f"lock at {one.period_offset * 1e3:+.3f} ms: lag predicted"

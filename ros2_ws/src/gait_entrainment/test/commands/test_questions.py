@@ -55,6 +55,13 @@ def test_phase_response_writes_curve_and_csv(capsys, tmp_path):
     assert (tmp_path / "phase_response.svg").stat().st_size > 10_000
 
 
+def test_phase_response_reports_pulses_that_the_walker_does_not_survive(capsys):
+    assert main(["phase-response", "--torque", "60", "--points", "9"]) == 0
+    line = capsys.readouterr().out.splitlines()[2]
+    # Early in double stance they lift the leading leg; 2 points stand for swing at either end.
+    assert line == "falls, flies off at 10 of 31 phases, between 0.4556 and 0.5156"
+
+
 def test_existence_gives_the_range_and_the_map(capsys, tmp_path):
     outcome = printed(capsys, "existence", "--points", "30", "--out", str(tmp_path))
     assert outcome["walker"]["just_vault_over"] == pytest.approx(67.4792, abs=1e-4)
@@ -69,7 +76,11 @@ def test_existence_gives_the_range_and_the_map(capsys, tmp_path):
         (["lock", "--width", "1.2"], "width 1.2 s is out of range"),
         (["lock", "--period-offset", "-1.9"], "period_offset -1.9 s"),
         (["lock", "--period-offset", "nan"], "period_offset nan s"),
+        (["lock", "--phases", "0"], "phases 0 is out of range; allowed: at least 1"),
         (["lock", "--torque", "nan"], "torque nan N m is not a finite number"),
+        (["phase-response", "--period-offset", "nan"], "period_offset nan s is out of range"),
+        (["phase-response", "--points", "1"], "points 1 is out of range; allowed: at least 2"),
+        (["existence", "--points", "1"], "points 1 is out of range; allowed: at least 2"),
         (["phase-response", "--ankle-stiffness", "10"], "the walker falls"),
         (["existence", "--foot-length", "-1"], "foot_length -1.0 is not a positive"),
     ],
