@@ -62,14 +62,21 @@ def draw_tongue(
         share, origin="lower", extent=extent, aspect="auto", vmin=0, vmax=1, cmap="cividis"
     )
     figure.colorbar(image, ax=right, label="share of the initial phases")
-    ended = np.asarray(table["share_fell"]) + np.asarray(table["share_flew_off"])
-    where = np.argwhere(np.nan_to_num(ended.reshape(shape)) > 0)
-    if where.size:
-        label = "a walk fell or flew off"
-        right.plot(
-            offsets[where[:, 1]], fractions[where[:, 0]], ".", color=ORANGE, ms=2, label=label
+    # Marks keep cells apart in which no walk can lock because it ends, or is not made.
+    for column, marker, label in (
+        ("share_fell", "v", "a walk fell"),
+        ("share_flew_off", "^", "a walk flew off"),
+    ):
+        rows, columns = np.nonzero(np.nan_to_num(np.asarray(table[column]).reshape(shape)))
+        if rows.size:
+            style = {"color": ORANGE, "ms": 3, "mew": 0, "label": label}
+            right.plot(offsets[columns], fractions[rows], marker, **style)
+    if np.isnan(share).any():
+        right.fill_between([], [], [], fc="white", ec=GREY, lw=0.6, label="not asked")
+    if right.get_legend_handles_labels()[0]:
+        right.legend(
+            frameon=False, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3
         )
-        right.legend(fontsize=8, loc="lower right")
     for axes in (left, right):
         axes.axvline(0, color=GREY, lw=0.6, ls=":")
         axes.set(xlabel=r"pulse period $\tau_p - 2\tau_0$ [ms]", xlim=extent[:2], ylim=extent[2:])
