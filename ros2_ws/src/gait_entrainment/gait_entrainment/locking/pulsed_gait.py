@@ -62,13 +62,15 @@ _unloading_arm: Callable[..., Any] = geometry.unloading_arm
 # Gauss-Legendre rule of one stretch of double stance, and the weights that give the last two
 # Legendre coefficients. At Table 1 these fall by 3 each over a whole double stance, so 24 nodes
 # leave 3^-48 of the time. A stretch whose last two are not this small beside its mean has not
-# converged: the error is then about their square.
+# converged and is halved, as many other walkers need: the error is then about their square.
 _COUNT = 24
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(_COUNT)
 _LAST = np.arange(_COUNT - 2, _COUNT)
 _TAILS = np.polynomial.legendre.legvander(_NODES, _COUNT - 1)[:, _LAST].T
 _TAILS = (_LAST[:, None] + 0.5) * _TAILS * _WEIGHTS
 _TAIL_TOLERANCE = 1e-8
+# What so many halvings leave ends in a stall.
+_MOST_HALVINGS = 12
 # Both ends beside the nodes, for the force, which is least there.
 _PLACES = np.concatenate([[-1.0], _NODES, [1.0]])
 
@@ -312,7 +314,12 @@ class PulsedGait:
     # Times
 
     def _stretch(
-        self, low: Floats, high: Floats, apex: Floats, start: Floats | None = None
+        self,
+        low: Floats,
+        high: Floats,
+        apex: Floats,
+        start: Floats | None = None,
+        halvings: int = _MOST_HALVINGS,
     ) -> _Stretch:
         """Time from `low` to `high` in double stance, with the pulse on since `start`."""
         half = 0.5 * (high - low)
@@ -330,8 +337,19 @@ class PulsedGait:
             by_apex = -0.5 * half * ((integrand / square[..., 1:-1]) @ _WEIGHTS)
         force = self._pendulum_force(cosine, square)
         force = force - _unloading_arm(np.sin(angle), sine, *self._lengths) * torque
-        sound = (tail <= 0.5 * _TAIL_TOLERANCE * total) & (force >= 0).all(axis=-1)
-        return _Stretch(half * total, by_apex, sound | (half <= 0))
+        time, converged = half * total, tail <= 0.5 * _TAIL_TOLERANCE * total
+        sound = (converged & (force >= 0).all(axis=-1)) | (half <= 0)
+        rough = ~converged & (square > 0).all(axis=-1) & (half > 0)
+        if halvings > 0 and rough.any():
+            ends = low[rough], (low + half)[rough], high[rough]
+            since = None if start is None else start[rough]
+            first, last = (
+                self._stretch(*ends[i : i + 2], apex[rough], since, halvings - 1) for i in (0, 1)
+            )
+            time[rough] = first.time + last.time
+            by_apex[rough] = first.by_apex + last.by_apex
+            sound[rough] = first.sound & last.sound
+        return _Stretch(time, by_apex, sound)
 
     def _pulse_time(self, start: Floats, end: Floats, apex: Floats | None = None) -> _Stretch:
         """Time under the pulse, in two stretches where it unloads the trailing foot."""

@@ -74,6 +74,24 @@ def test_jacobian_is_the_derivative_of_the_walkers_stride(torque, branch):
     assert np.column_stack([by_apex, by_onset]) == pytest.approx(one.jacobian, abs=2e-8)
 
 
+def test_walkers_whose_double_stance_takes_more_nodes_have_their_gaits_too():
+    # A stance foot a third of the leg: an integrand that 24 nodes do not resolve.
+    walker = WalkerParameters(
+        leg_length=0.695,
+        foot_length=0.2235,
+        leg_angle=0.455,
+        max_plantarflexion=2.006,
+        ankle_stiffness=100.0,
+    )
+    gait = PulsedGait(walker, 0.1 * walker.peak_torque, 0.1)
+    for branch, gaits in gaits_of(gait).items():
+        assert gaits.feasible.all(), branch
+        for i in range(6):
+            one = gaits.at(i)
+            duration, _ = walk_a_stride(walker, gait.speed(one.apex), one.onset, gait.torque, 0.1)
+            assert duration == pytest.approx(one.period, abs=3e-9)
+
+
 def test_slope_is_the_derivative_of_the_period_along_each_branch():
     gait = PulsedGait(TABLE_1, 13.3, 0.1)
     start = np.linspace(gait.heel_strike, gait.last_start, 2001)
