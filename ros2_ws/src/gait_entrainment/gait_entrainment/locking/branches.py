@@ -30,12 +30,19 @@ from scipy.optimize import brentq
 
 from gait_entrainment.locking.pulsed_gait import Floats, Gaits, PulsedGait
 
-# Points of the scan along a branch. Periods bend once or twice per branch; what the scan brackets
-# is then solved for, so its step decides only what could be overlooked.
-_SCAN_POINTS = 33
+# The scan along a branch, closer at its ends, where periods bend most, but not at the corners
+# themselves, where rounding would tell. What it brackets is then solved for, so its step decides
+# only what could be overlooked.
+_SCAN = 0.5 - 0.5 * np.cos(np.linspace(1e-3, np.pi - 1e-3, 65))
 
 # Borders are solved to this ankle angle [rad]: at 0.1 rad/s and faster, below 1e-11 s.
 _ANGLE_TOLERANCE = 1e-12
+
+# Right beside a turn [rad].
+_BESIDE = 1e-8
+
+# Whether a gait is feasible, stable, and on a branch with a growing period.
+_Marks = tuple[bool, bool, bool]
 
 
 class Place(str, Enum):
@@ -169,20 +176,37 @@ def _split(
 ) -> Iterator[Piece]:
     """Cut a branch where period or stability turns."""
     along = _along(gait, place)
-    angles = np.linspace(first, last, _SCAN_POINTS)
+    angles = first + (last - first) * _SCAN
     marks = _marks(along(angles))
-    begin = _end(corners[0], first, along)
-    for i in range(1, _SCAN_POINTS):
-        if marks[i] == marks[i - 1]:
-            continue
-        angle, border = _turn(along, angles[i - 1], angles[i])
-        end = _end(border, angle, along)
-        yield Piece(place, begin, end, *marks[i - 1][:2])
-        begin = end
-    yield Piece(place, begin, _end(corners[1], last, along), *marks[-1][:2])
+    begin, mark = _end(corners[0], first, along), marks[0]
+    for i in range(1, _SCAN.size):
+        for angle, border, after in _turns(along, *angles[i - 1 : i + 1], *marks[i - 1 : i + 1]):
+            end = _end(border, angle, along)
+            yield Piece(place, begin, end, *mark[:2])
+            begin, mark = end, after
+    yield Piece(place, begin, _end(corners[1], last, along), *mark[:2])
 
 
-def _marks(gaits: Gaits) -> list[tuple[bool, bool, bool]]:
+def _turns(
+    along: Callable[[Floats], Gaits], low: float, high: float, before: _Marks, after: _Marks
+) -> Iterator[tuple[float, Border, _Marks]]:
+    """Yield what turns between two angles with these marks: where, what, and the marks then."""
+    if before == after:
+        return
+    angle, border, here = _turn(along, low, high, before, after)
+    if high - low < 4 * _BESIDE:
+        yield angle, border, after
+        return
+    # More than one may turn, as where a flip lies close to a fold: look right beside it.
+    beside = np.clip([angle - _BESIDE, angle + _BESIDE], low, high)
+    if border is Border.FOLD:
+        left, here = _marks(along(beside))
+        yield from _turns(along, low, beside[0], before, left)
+    yield angle, border, here
+    yield from _turns(along, beside[1], high, here, after)
+
+
+def _marks(gaits: Gaits) -> list[_Marks]:
     """Tell of each gait whether it is feasible, stable, and whether its period grows."""
     with np.errstate(invalid="ignore"):
         growing = gaits.feasible & (gaits.slope > 0)
@@ -191,21 +215,25 @@ def _marks(gaits: Gaits) -> list[tuple[bool, bool, bool]]:
         )
 
 
-def _turn(along: Callable[[Floats], Gaits], low: float, high: float) -> tuple[float, Border]:
-    """Find what turns between two angles of a branch, and where."""
-    before, after = _marks(along(np.array([low, high])))
+def _turn(
+    along: Callable[[Floats], Gaits], low: float, high: float, before: _Marks, after: _Marks
+) -> tuple[float, Border, _Marks]:
+    """Find something that turns between two angles with these marks: where, what, marks then."""
     if before[0] and after[0] and before[2] != after[2]:
-        return _solve(lambda angle: along(angle).slope, low, high), Border.FOLD
+        return _solve(lambda angle: along(angle).slope, low, high), Border.FOLD, after
     while high - low > _ANGLE_TOLERANCE:
         middle = 0.5 * (low + high)
-        if _marks(along(np.array([middle])))[0] == before:
+        marks = _marks(along(np.array([middle])))[0]
+        if marks == before:
             low = middle
         else:
-            high = middle
+            high, after = middle, marks
     if before[0] != after[0]:
-        return (low if before[0] else high), Border.NO_GAIT
+        return (low if before[0] else high), Border.NO_GAIT, after
+    if before[2] != after[2]:
+        return low, Border.FOLD, after
     largest = along(np.array([low])).multipliers[0, 0]
-    return low, Border.FLIP if largest.imag == 0 else Border.NEIMARK_SACKER
+    return low, Border.FLIP if largest.imag == 0 else Border.NEIMARK_SACKER, after
 
 
 def _solve(function: Callable[[Floats], Floats], low: float, high: float) -> float:

@@ -76,11 +76,14 @@ _PLACES = np.concatenate([[-1.0], _NODES, [1.0]])
 
 # Newton steps on an ankle angle end here [rad]; convergence is quadratic, so the next is rounding.
 _ANGLE_STEP = 1e-12
-_MOST_STEPS = 50
+_MOST_STEPS = 100
+# A Newton step that would still be longer than this [rad]: there is no such angle.
+_NO_ROOT = 1e-10
 
-# Points of the scan for a corner. The function searched grows; the scan only steps around places
-# without a gait.
+# Points of the scan for a corner. The function searched grows; the scan only steps up to where
+# the walker falls, ever closer.
 _SCAN_POINTS = 33
+_MOST_SCANS = 8
 
 
 @dataclass(frozen=True)
@@ -341,11 +344,10 @@ class PulsedGait:
         sound = (converged & (force >= 0).all(axis=-1)) | (half <= 0)
         rough = ~converged & (square > 0).all(axis=-1) & (half > 0)
         if halvings > 0 and rough.any():
-            ends = low[rough], (low + half)[rough], high[rough]
+            middle, fewer = (low + half)[rough], halvings - 1
             since = None if start is None else start[rough]
-            first, last = (
-                self._stretch(*ends[i : i + 2], apex[rough], since, halvings - 1) for i in (0, 1)
-            )
+            first = self._stretch(low[rough], middle, apex[rough], since, fewer)
+            last = self._stretch(middle, high[rough], apex[rough], since, fewer)
             time[rough] = first.time + last.time
             by_apex[rough] = first.by_apex + last.by_apex
             sound[rough] = first.sound & last.sound
@@ -457,26 +459,38 @@ def _newton(
     most: float,
 ) -> Floats:
     """Roots of a growing function, element by element, held within bounds; NaN for none."""
-    angle = guess
+    angle, low, high = guess, least, np.full_like(guess, most)
     for _ in range(_MOST_STEPS):
         with np.errstate(invalid="ignore", divide="ignore"):
             value, slope = function(angle)
             following = np.clip(angle - value / slope, least, most)
+            # Where the walker has fallen the root is before it.
+            short = value < 0
+            low, high = np.where(short, angle, low), np.where(short, high, angle)
+            within = (low <= following) & (following <= high) & (slope > 0)
+        following = np.where(within, following, 0.5 * (low + high))
         step = np.abs(following - angle)
         angle = following
         if not (step > _ANGLE_STEP).any():
             break
-    return angle
+    found: Floats = np.where(np.abs(value) <= np.abs(slope) * _NO_ROOT, angle, np.nan)
+    return found
 
 
 def _first_root(function: Callable[[Floats], Floats], start: float, end: float) -> float:
     """Return the root of a function, negative at `start`, nearest to it; `end` for none."""
     angles = np.linspace(start, end, _SCAN_POINTS)
-    with np.errstate(invalid="ignore"):
-        beyond = np.flatnonzero(function(angles) >= 0)
-    if beyond.size == 0:
-        return end
-    bracket = angles[beyond[0] - 1], angles[beyond[0]]
-    return float(
-        brentq(lambda angle: float(function(np.array([angle]))[0]), *bracket, xtol=_ANGLE_STEP)
-    )
+    for _ in range(_MOST_SCANS):
+        with np.errstate(invalid="ignore"):
+            values = function(angles)
+        beyond = np.flatnonzero(~(values < 0))
+        if beyond.size == 0:
+            return end
+        bracket = angles[beyond[0] - 1], angles[beyond[0]]
+        if values[beyond[0]] >= 0:
+            return float(
+                brentq(lambda x: float(function(np.array([x]))[0]), *bracket, xtol=_ANGLE_STEP)
+            )
+        # There the walker has fallen: the time grows without bound on the way.
+        angles = np.linspace(*bracket, _SCAN_POINTS)
+    return end

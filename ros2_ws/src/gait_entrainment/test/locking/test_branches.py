@@ -151,3 +151,38 @@ def test_every_border_is_where_the_walkers_poincare_map_has_it(fraction):
             second = step_to_step(TABLE_1, first.speed)
             assert first.duration + second.duration == pytest.approx(end.period, abs=1e-11)
             assert second.speed == pytest.approx(speed, abs=1e-11)
+
+
+def test_a_flip_close_to_a_corner_is_not_overlooked():
+    # The stable stretch between the two is a hundredth of the branch, or less.
+    walker = WalkerParameters(
+        leg_length=0.8446,
+        foot_length=0.0961,
+        leg_angle=0.3186,
+        max_plantarflexion=1.6442,
+        ankle_stiffness=168.5,
+    )
+    gait = PulsedGait(walker, -0.05522 * walker.peak_torque, 0.2483)
+    early = [piece for piece in pieces_of(gait) if piece.place is Place.EARLY]
+    borders = [piece.last.border for piece in early]
+    assert borders == [Border.FLIP, Border.FLIP, Border.END_AT_TOE_OFF]
+    assert [piece.stable for piece in early] == [True, False, True]
+    between = 0.5 * (early[2].first.period + early[2].last.period)
+    [lock] = [lock for lock in locked_gaits(gait, between, early) if lock.stable]
+    assert abs(lock.multipliers[0]) < 1
+
+
+def test_no_gait_is_made_up_where_the_pulse_does_not_fit():
+    # Beyond some onset the walker falls before a pulse of this width and depth has passed.
+    walker = WalkerParameters(
+        leg_length=1.09,
+        foot_length=0.517,
+        leg_angle=0.6245,
+        max_plantarflexion=2.293,
+        ankle_stiffness=204.5,
+    )
+    gait = PulsedGait(walker, -1.62 * walker.peak_torque, 0.8936)
+    gaits = gait.inside(np.linspace(gait.heel_strike, gait.last_start, 331))
+    found = np.isfinite(gaits.period)
+    time = gait._pulse_time(gaits.start[found], gaits.end[found], gaits.apex[found]).time
+    assert time == pytest.approx(gait.width, abs=1e-9)
