@@ -95,8 +95,24 @@ class Population:
                 f"slope {slope:g} rad is out of range; allowed: within the leg angle,"
                 f" {float(self._angle.min()):.4g} rad"
             )
-        rate = column("speed_after_collision") / self._length
-        self.start_apex = (rate**2 - self._height_gain(self._angle))[:, 0]
+
+    def periodic_apex(self, first: Floats, second: Floats) -> Floats:
+        """
+        State of the speed that repeats itself every two steps without noise.
+
+        `first` and `second` are the stiffness [N m/rad] of the two push-offs; arrays (n,).
+        """
+        none = np.zeros_like(self._angle)
+        apex, kept = none, self._kept
+        # A step maps the state linearly; from zero, two of them give the map's constant.
+        for k in (first, second):
+            leaving = apex + self._per_energy * self._work(
+                self._start, self._off, k[:, None], none
+            )
+            apex = kept * (leaving + self._height_gain(-self._angle))
+            apex = apex - self._height_gain(self._angle)
+        repeated: Floats = (apex / (1 - kept**2))[:, 0]
+        return repeated
 
     def step(
         self, apex: Floats, stiffness: Floats, onset: Floats, width: float, torque: Floats

@@ -87,7 +87,9 @@ class PopulationWalker:
         # In odd steps the perturbed leg trails and pushes off.
         sides = np.where(np.arange(steps)[:, None] % 2 == 1, 1 + asymmetry, 1 - asymmetry)
         self._stiffness = population.stiffness * sides * np.clip(1 + noise * draws, 0.01, None)
-        self._apex = population.start_apex
+        # In the gait of this slope and these legs: no transient enters period or variation.
+        mean = population.stiffness
+        self._apex = population.periodic_apex(mean * (1 - asymmetry), mean * (1 + asymmetry))
         self._strikes = np.full((steps + 1, size), np.nan)
         self._strikes[0] = 0.0
         self._toe_offs = np.full((steps, size), np.nan)

@@ -80,7 +80,7 @@ def test_a_step_on_a_slope_is_that_of_the_equations_of_motion(slope):
         return event
 
     population = Population([p], slope)
-    apex = population.start_apex + 0.3
+    apex = population.periodic_apex(population.stiffness, population.stiffness) + 0.3
     square = apex[0] + 2 * p.gravity / p.leg_length * (1 - math.cos(p.leg_angle + slope))
     tight = {"rtol": 1e-11, "atol": 1e-12, "max_step": 0.01}
     double = solve_ivp(
@@ -156,3 +156,20 @@ def test_locked_runs_count_strides_near_the_lock():
 def test_values_out_of_range_are_refused(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+@pytest.mark.parametrize(("slope", "asymmetry"), [(-0.02, 0.0), (0.02, 0.0), (0.0, 0.04)])
+def test_a_walk_begins_in_the_gait_of_its_slope_and_legs(slope, asymmetry):
+    walker = PopulationWalker(
+        Population([TABLE_1], slope), 20, 0, np.zeros(1), asymmetry=asymmetry
+    )
+    periods = walker.walk(20).stride_periods
+    assert periods == pytest.approx(np.full_like(periods, periods[-1]), abs=1e-8)
+
+
+def test_the_coefficient_of_variation_on_a_slope_is_that_asked_for():
+    # Little variation: a transient from the level gait would outweigh it.
+    population = Population([TABLE_1] * 8, 0.02)
+    noise = noise_for(population, np.full(8, 0.002), 1)
+    periods = PopulationWalker(population, 800, 1, noise).walk(800).stride_periods[5:]
+    assert periods.std(axis=0, ddof=1) / periods.mean(axis=0) == pytest.approx(0.002, rel=0.02)
