@@ -119,8 +119,13 @@ def run_study(subjects: Subjects, plan: StudyPlan) -> Study:
     noise = noise_for(population, subjects.variation, (plan.seed, _PILOT), plan.hurst)
     gaits = [PulsedGait(walker, plan.torque, plan.width) for walker in subjects.walkers]
     pieces = [pieces_of(gait) for gait in gaits]
-    # Half the stride is room enough for any stride that noise makes.
-    shortest = min(gait.unperturbed_period for gait in gaits) / 2
+    if not 0 <= plan.initial_phase < 1:
+        raise ValueError(
+            f"initial_phase {plan.initial_phase:g} is out of range; allowed: 0 to below 1"
+        )
+    # Half the stride is room enough for any stride that noise makes; less the pulse, so that no
+    # two of them reach into one double stance.
+    shortest = min(gait.unperturbed_period for gait in gaits) / 2 - plan.width
     for offset in plan.period_offsets:
         if not abs(offset) < shortest:
             raise ValueError(

@@ -107,7 +107,7 @@ def run(options: argparse.Namespace) -> int:
         plan = StudyPlan(
             torque=options.torque,
             width=options.width,
-            period_offsets=tuple(options.period_offset or _OFFSETS),
+            period_offsets=tuple(dict.fromkeys(options.period_offset or _OFFSETS)),
             pulses=options.pulses,
             initial_phase=options.initial_phase,
             seed=options.seed,

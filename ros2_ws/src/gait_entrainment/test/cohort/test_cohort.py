@@ -103,6 +103,9 @@ def test_command_counts_every_subject_in_its_denominators(tmp_path, capsys):
         "-0.05",
         "--period-offset",
         "0.02",
+        # The same again is the same trials.
+        "--period-offset",
+        "-0.05",
     ]
     assert main([*arguments, "--out", str(tmp_path), "--json"]) == 0
     outcome = json.loads(capsys.readouterr().out)
@@ -118,6 +121,8 @@ def test_command_counts_every_subject_in_its_denominators(tmp_path, capsys):
         (["--mass", "10", "6"], "mass 10 +/- 6 [kg] is out of range"),
         (["--slope", "0.7"], "slope 0.7 rad is out of range"),
         (["--period-offset", "-1.5"], "period_offset -1.5 s is out of range"),
+        (["--period-offset", "-0.5", "--width", "0.7"], "period_offset -0.5 s is out of range"),
+        (["--initial-phase", "inf"], "initial_phase inf is out of range; allowed: 0 to below 1"),
         (["--subjects", "1"], "subjects 1 is out of range; allowed: at least 2"),
         (["--seed", "-1"], "seed -1 is out of range; allowed: at least 0"),
         (["--peak-torque", "0.9", "0.001"], "hardly a subject drawn has a gait"),
