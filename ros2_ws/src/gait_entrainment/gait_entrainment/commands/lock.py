@@ -19,7 +19,7 @@ import json
 import sys
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gait_entrainment.commands.pulse_options import (
     add_pulse_options,
@@ -29,6 +29,9 @@ from gait_entrainment.commands.pulse_options import (
     chosen_torque,
     chosen_walker,
 )
+
+if TYPE_CHECKING:
+    from gait_entrainment.locking import Piece
 
 _EXAMPLES = """examples:
   entrain lock                                  the paper's pulses at 2 tau_0 - 50 ms
@@ -91,7 +94,7 @@ def run(options: argparse.Namespace) -> int:
         "pulse_period": period,
         "torque": gait.torque,
         "width": gait.width,
-        "branches": [asdict(piece) for piece in pieces],
+        "branches": [_branch(piece) for piece in pieces],
         "locked_gaits": [
             {
                 **asdict(lock),
@@ -117,6 +120,15 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
+def _branch(piece: "Piece") -> dict[str, Any]:
+    """Return a piece as JSON holds it: there is no number where there is no gait."""
+    ends = {
+        name: {key: None if value != value else value for key, value in asdict(end).items()}
+        for name, end in (("first", piece.first), ("last", piece.last))
+    }
+    return {**asdict(piece), **ends}
+
+
 def _summary(outcome: dict[str, Any]) -> str:
     unperturbed = outcome["unperturbed_stride_period"]
     offset = (outcome["pulse_period"] - unperturbed) * 1e3
@@ -128,7 +140,7 @@ def _summary(outcome: dict[str, Any]) -> str:
     ]
     for piece in outcome["branches"]:
         ends = [
-            f"{(end['period'] - unperturbed) * 1e3:+.6f} ({end['border'].value})"
+            f"{_offset(end['period'], unperturbed)} ({end['border'].value})"
             for end in (piece["first"], piece["last"])
         ]
         kind = "stable  " if piece["stable"] else "unstable" if piece["feasible"] else "no gait "
@@ -147,3 +159,7 @@ def _summary(outcome: dict[str, Any]) -> str:
         lines.append("  none")
     walked = ", ".join(f"{count} {name}" for name, count in outcome["walked"].items())
     return "\n".join([*lines, "", f"Walked from evenly spread initial phases: {walked}"])
+
+
+def _offset(period: float | None, unperturbed: float) -> str:
+    return "-" if period is None else f"{(period - unperturbed) * 1e3:+.6f}"

@@ -143,7 +143,9 @@ def locked_gaits(
         along = _along(gait, piece.place)
         angles = piece.first.angle, piece.last.angle
         angle = _solve(lambda x, along=along: along(x).period - period, *angles)  # type: ignore[misc]
-        found.append(_locked(gait, piece.place, along(np.array([angle]))))
+        solution = along(np.array([angle]))
+        if solution.end[0] > solution.start[0]:
+            found.append(_locked(gait, piece.place, solution))
     return found
 
 

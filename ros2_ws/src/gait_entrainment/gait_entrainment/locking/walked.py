@@ -41,6 +41,9 @@ _QUIET_STRIDES = 5
 # Gait cycles that the pulses must slip through: one, and what the first strides may have skipped.
 _SLIPPED_CYCLES = 1.25
 
+# What whole nanoseconds can count [s], with room for a pulse.
+_CLOCK = 9e9
+
 
 class Outcome(str, Enum):
     """What became of a walk under pulses."""
@@ -102,9 +105,11 @@ class PulsedWalk:
         if self.ending is not None:
             return self.ending
         lags = self.unwrapped_lags
-        if (np.abs(np.diff(lags[-_QUIET_STRIDES - 1 :])) < creep).all():
+        quiet = np.abs(np.diff(lags))[-_QUIET_STRIDES:] < creep
+        if quiet.size == _QUIET_STRIDES and quiet.all():
             return Outcome.LOCKED
-        if (np.abs(lags[2:] - lags[:-2])[-2 * _QUIET_STRIDES :] < creep).all():
+        quiet = np.abs(lags[2:] - lags[:-2])[-2 * _QUIET_STRIDES :] < creep
+        if quiet.size == 2 * _QUIET_STRIDES and quiet.all():
             return Outcome.ALTERNATING
         if abs(lags[-1] - lags[0]) > _SLIPPED_CYCLES * self.stride_periods[-1]:
             return Outcome.SLIPPING
@@ -128,7 +133,9 @@ def walk_under_pulses(
     model, stride = _prepared(parameters)
     # Enough for strides a third longer than the pulse period or the walker's own.
     count = int(4 / 3 * (strides + 1) * max(stride / period, 1.0)) + 1
-    onsets = np.rint(np.arange(count) * (period * 1e9)).astype(np.int64)
+    # Pulses that come after the end of the clock are none.
+    count = min(count, 1 + int(_CLOCK / period))
+    onsets = np.rint(np.arange(count) * (min(period, _CLOCK) * 1e9)).astype(np.int64)
     onsets += nanoseconds(initial_phase * stride)
     pulses = Pulses(onsets, nanoseconds(width), torque)
     walk, ends = _walk(model, 2 * strides, pulses)

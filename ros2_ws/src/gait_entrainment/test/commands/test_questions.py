@@ -45,6 +45,14 @@ def test_lock_reports_walks_that_slip(capsys):
     assert outcome["walked"] == {"slipping": 4}
 
 
+def test_lock_has_no_number_where_there_is_no_gait(capsys):
+    arguments = ["lock", "--torque-fraction", "-2", "--width", "0.2", "--phases", "1"]
+    branches = printed(capsys, *arguments)["branches"]
+    assert any(branch["first"]["period"] is None for branch in branches)
+    assert main(arguments) == 0
+    assert "nan" not in capsys.readouterr().out
+
+
 def test_phase_response_writes_curve_and_csv(capsys, tmp_path):
     outcome = printed(capsys, "phase-response", "--points", "21", "--out", str(tmp_path))
     assert len(outcome["locks"]) == 1

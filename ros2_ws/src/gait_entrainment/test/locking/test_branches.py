@@ -153,6 +153,19 @@ def test_every_border_is_where_the_walkers_poincare_map_has_it(fraction):
             assert second.speed == pytest.approx(speed, abs=1e-11)
 
 
+def test_a_walk_with_a_pulse_or_two_is_not_called_locked():
+    for period in (150.0, 1e3, 1e10, 1e300):
+        walk = walk_under_pulses(TABLE_1, GAIT.torque, GAIT.width, period, 0.0, 100)
+        assert walk.outcome() in (Outcome.CENSORED, Outcome.SLIPPING)
+
+
+def test_a_pulse_that_acts_nowhere_is_not_a_lock():
+    # At the unperturbed period the branches end in such pulses, whatever the torque.
+    for fraction in (0.1, -0.1, 0.3):
+        gait = PulsedGait(TABLE_1, fraction * TABLE_1.peak_torque, 0.1)
+        assert locked_gaits(gait, gait.unperturbed_period) == []
+
+
 def test_a_flip_close_to_a_corner_is_not_overlooked():
     # The stable stretch between the two is a hundredth of the branch, or less.
     walker = WalkerParameters(
