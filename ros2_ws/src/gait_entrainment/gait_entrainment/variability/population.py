@@ -25,7 +25,7 @@ the paper's model does not have, each zero unless it is asked for:
 
 The equations are those of `locking.PulsedGait`, but a step begins with any speed and the pulse at
 any time, so the ankle angles where it begins and ends are found by Newton steps on the time.
-Times are good to about 1e-9 s, and to 1e-6 s where a negative pulse unloads the trailing foot.
+Times are good to about 1e-9 s, and to 1e-5 s where a negative pulse unloads the trailing foot.
 """
 
 import math
@@ -43,8 +43,11 @@ from gait_entrainment.parameters import WalkerParameters
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 _PLACES = np.concatenate([[-1.0], _NODES, [1.0]])
 
-# Newton steps for a place at a given time: from an error of a tenth, the fifth is rounding.
-_NEWTON_STEPS = 7
+# A place at a given time: steps, the last angle that they move it by [rad], and the time that may
+# be missing there [s]: more is missing where the walker comes to rest before.
+_MOST_STEPS = 60
+_ANGLE_STEP = 1e-12
+_TIME_STEP = 1e-6
 
 _leg_sine: Any = geometry.leg_sine
 _leg_per_ankle: Any = geometry.leg_per_ankle
@@ -133,15 +136,17 @@ class Population:
             for edge, acting in pieces + last if torque.any() else last:
                 whole = self._stretch(low, self._off, energy, k, acting)
                 left = np.clip(edge - elapsed, 0.0, None)
-                inside = left < whole.time
+                # One that would fall under a lasting pulse may still outlive this one.
+                inside = np.isfinite(left) & ~(left >= whole.time)
                 high, done = self._off, whole
                 if inside.any():
-                    place = self._place(low, left, energy, k, acting)
+                    place = self._place(low, np.where(inside, left, 0.0), energy, k, acting)
                     high = np.where(inside, place, self._off)
                     done = self._stretch(low, high, energy, k, acting)
-                # What lies beyond the edge of the pulse has not been walked under it.
-                slowest = np.fmin(slowest, np.where(inside, done.slowest, whole.slowest))
-                force = np.fmin(force, np.where(inside, done.force, whole.force))
+                # What lies beyond the edges of the pulse has not been walked under it.
+                walked = high > low
+                slowest = np.fmin(slowest, np.where(walked, done.slowest, np.inf))
+                force = np.fmin(force, np.where(walked, done.force, np.inf))
                 energy = energy + self._per_energy * self._work(low, high, k, acting)
                 elapsed = elapsed + np.where(inside, left, whole.time)
                 low = high
@@ -205,13 +210,22 @@ class Population:
     def _place(
         self, low: Floats, left: Floats, energy: Floats, k: Floats, torque: Floats
     ) -> Floats:
-        """Ankle angle after this time."""
-        psi = low
-        for _ in range(_NEWTON_STEPS):
+        """Ankle angle after this time; NaN where the walker comes to rest before."""
+        psi, first, last = low, low, self._off
+        for _ in range(_MOST_STEPS):
             square, _, slope = self._square(low, psi, energy, k, torque)
             missing = left - self._stretch(low, psi, energy, k, torque).time
-            psi = np.clip(psi + missing * np.sqrt(square) / slope, low, self._off)
-        return psi
+            # NaN: past the place of rest.
+            short = missing > 0
+            first, last = np.where(short, psi, first), np.where(short, last, psi)
+            following = psi + missing * np.sqrt(square) / slope
+            within = (first <= following) & (following <= last)
+            following = np.where(within, following, 0.5 * (first + last))
+            step, psi = np.abs(following - psi), following
+            if not ((step > _ANGLE_STEP) & np.isfinite(energy)).any():
+                break
+        found: Floats = np.where(np.abs(missing) < _TIME_STEP, psi, np.nan)
+        return found
 
     def _single_stance(self, energy: Floats) -> Floats:
         """Time from toe-off to heel strike, from and to the apex by R_F."""

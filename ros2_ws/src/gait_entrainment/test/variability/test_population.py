@@ -29,6 +29,7 @@ from gait_entrainment.variability import (
     noise_for,
     step_noise,
 )
+from gait_entrainment.walker import step_to_step
 
 TABLE_1 = WalkerParameters()
 PERIOD = 1.9332295304390836
@@ -173,3 +174,15 @@ def test_the_coefficient_of_variation_on_a_slope_is_that_asked_for():
     noise = noise_for(population, np.full(8, 0.002), 1)
     periods = PopulationWalker(population, 800, 1, noise).walk(800).stride_periods[5:]
     assert periods.std(axis=0, ddof=1) / periods.mean(axis=0) == pytest.approx(0.002, rel=0.02)
+
+
+def test_a_walker_outlives_a_pulse_under_which_it_would_fall_if_it_lasted():
+    onset = np.array([0.02, 0.16, -0.01, 0.1, -0.134])
+    torque = np.array([-100.0, -75.0, -95.0, -160.0, 60.0])
+    population = Population([TABLE_1] * 5)
+    apex = population.periodic_apex(population.stiffness, population.stiffness)
+    steps = population.step(apex, population.stiffness, onset, 0.1, torque)
+    reference = step_to_step(TABLE_1, TABLE_1.speed_after_collision, onset, 0.1, torque)
+    # The last has ended before heel strike, where it would lift the leading leg.
+    assert not (steps.fell | steps.flew_off)[[0, 1, 2, 4]].any()
+    assert steps.duration == pytest.approx(reference.duration, abs=1e-5, nan_ok=True)
