@@ -67,10 +67,11 @@ def draw_tongue(
         ("share_fell", "v", "a walk fell"),
         ("share_flew_off", "^", "a walk flew off"),
     ):
-        rows, columns = np.nonzero(np.nan_to_num(np.asarray(table[column]).reshape(shape)))
-        if rows.size:
+        cells = np.nan_to_num(np.asarray(table[column]).reshape(shape))
+        torques, periods = np.nonzero(cells)
+        if torques.size:
             style = {"color": ORANGE, "ms": 3, "mew": 0, "label": label}
-            right.plot(offsets[columns], fractions[rows], marker, **style)
+            right.plot(offsets[periods], fractions[torques], marker, **style)
     if np.isnan(share).any():
         right.fill_between([], [], [], fc="white", ec=GREY, lw=0.6, label="not asked")
     if right.get_legend_handles_labels()[0]:
