@@ -47,11 +47,13 @@ def draw_cohort(study: Study, folder: Path) -> list[Path]:
     """Draw the share of each verdict, and each subject's basin without noise."""
     figure, (left, right) = new_figure(1, 2, size=(9.6, 4.0))
     _draw_verdicts(study, left)
+    drawn = [left]
     if study.basins.size:
         _draw_basins(study, right)
+        drawn.append(right)
     else:
         right.set_axis_off()
-    for axes in (left, right):
+    for axes in drawn:
         axes.locator_params(axis="y", integer=True)
         axes.legend(
             frameon=False, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=4

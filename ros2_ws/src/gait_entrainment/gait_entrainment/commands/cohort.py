@@ -183,18 +183,19 @@ def _of(found: int, count: int) -> str:
     from scipy.stats import binomtest
 
     interval = binomtest(found, count).proportion_ci(method="wilson")
-    return f"{found} of {count}, 95 % interval {interval.low:.0%} to {interval.high:.0%}"
+    low, high = 100 * interval.low, 100 * interval.high
+    return f"{found} of {count}, 95 % interval {low:.0f} to {high:.0f} %"
 
 
 def _summary(outcome: dict[str, Any]) -> str:
     count = outcome["subjects"]
 
     def shown(value: float | None, form: str, factor: float = 1.0) -> str:
-        return "-" if value is None else format(value * factor, form)
+        return "-" if value is None else form.format(value * factor)
 
     lines = [
         f"subjects         {count}, {outcome['redrawn_for_want_of_a_gait']} drawn again for want"
-        f" of a gait; measured stride period {shown(outcome['mean_stride_period'], '.4f')} s on"
+        f" of a gait; measured stride period {shown(outcome['mean_stride_period'], '{:.4f}')} s on"
         " average",
         "",
         "| offset [ms] | verdicts | strides locked* | mean run* | lag of the entrained [ms] |",
@@ -204,8 +205,9 @@ def _summary(outcome: dict[str, Any]) -> str:
         found = ", ".join(f"{number} {name}" for name, number in sorted(row["verdicts"].items()))
         lines.append(
             f"| {row['period_offset'] * 1e3:+.0f} | {found} |"
-            f" {shown(row['fraction_locked'], '.1%')} | {shown(row['mean_run'], '.1f')} |"
-            f" {shown(row['lag_of_entrained'], '.1f', 1e3)} |"
+            f" {shown(row['fraction_locked'], '{:.1f} %', 100)} |"
+            f" {shown(row['mean_run'], '{:.1f}')} |"
+            f" {shown(row['lag_of_entrained'], '{:.1f}', 1e3)} |"
         )
     lines += [
         "",

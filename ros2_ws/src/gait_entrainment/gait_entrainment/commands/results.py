@@ -114,9 +114,10 @@ SECTIONS = (
     Section(
         "Extension: a cohort",
         "The human study's experiment on simulated subjects with stride-to-stride variability."
-        " With the assumed variation of 2 % with long-range correlation, few subjects are shown to"
-        " be entrained by our verdict, which asks for more than a slope that does not differ from"
-        " zero, and none to longer periods. The distributions are our assumptions.",
+        " With the assumed variation of 2 % with long-range correlation, less than half of the"
+        " subjects are shown to be entrained at any one period by our verdict, which asks for more"
+        " than a slope that does not differ from zero, and none to longer periods. The"
+        " distributions are our assumptions.",
         ("cohort",),
         ("cohort",),
     ),
