@@ -24,7 +24,8 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from ament_index_python.packages import get_package_prefix
@@ -87,8 +88,13 @@ class Supervisor:
         Stop what still runs: SIGTERM in order, SIGKILL for what does not obey.
 
         The first in order has ended before the next is asked; the rest end side by side. Returns
-        the nodes that had to be killed.
+        the nodes that had to be killed. Another Ctrl-C meanwhile changes nothing: it would leave
+        a recorder at work on a bag that this process takes for given up.
         """
+        with _undisturbed():
+            return self._stop(order)
+
+    def _stop(self, order: Sequence[str]) -> list[str]:
         running = [node for node in order if node in self._processes]
         running = [node for node in running if self._processes[node].poll() is None]
         killed = []
@@ -120,3 +126,14 @@ class Supervisor:
         self._library.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
         if os.getppid() == 1:  # the parent died before the line above
             os.kill(os.getpid(), signal.SIGTERM)
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Let neither SIGINT nor SIGTERM break in: for what has an end that is near."""
+    handlers = {n: signal.signal(n, signal.SIG_IGN) for n in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)

@@ -16,6 +16,7 @@
 
 import os
 import signal
+import threading
 import time
 
 import pytest
@@ -84,6 +85,16 @@ def test_who_does_not_obey_is_killed(programs):
     assert programs.stop(["stubborn", "one"]) == ["stubborn"]
     assert time.monotonic() - begin >= PATIENCE
     assert programs.ended() == {"stubborn": -signal.SIGKILL, "one": 0}
+
+
+def test_second_ctrl_c_does_not_break_off_the_stopping(programs):
+    started(programs, "one", "stubborn", "two")
+    impatient = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
+    impatient.start()
+    assert programs.stop(["stubborn", "one", "two"]) == ["stubborn"]
+    impatient.join()
+    assert programs.ended() == {"stubborn": -signal.SIGKILL, "one": 0, "two": 0}
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_suspended_process_can_obey(programs):
