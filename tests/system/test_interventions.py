@@ -82,14 +82,14 @@ class Conducted:
 def conducted(tmp_path_factory):
     with session(tmp_path_factory.mktemp("runs"), *BROAD) as nodes:
         yield Conducted(nodes)
-    # Runs 2 and 4 were refused. All are in one bag; torque was on only before its run's stop.
+    # Runs 2, 4 and 5 were refused. All are in one bag; torque was on only before its run's stop.
     with BagReader(nodes.bag) as reader:
         recorded = list(reader.decoded(["/walker_sim/progress", "/ankle_torque"]))
         profiles = list(reader.decoded(["/perturbation/torque_profile"]))
     finals = {m.run: raw for raw, m in recorded if raw.topic.endswith("progress") and m.state}
-    assert set(finals) == {1, 3, 5}
+    assert set(finals) == {1, 3, 6}
     stops = {m.run: raw for raw, m in profiles if m.stop}
-    assert set(stops) == {1, 3, 5}
+    assert set(stops) == {1, 3, 6}
     side = nodes.protocol.side
     torques = [(r.publish_time, m.delivered[side]) for r, m in recorded if "torque" in r.topic]
     assert max(torque for _, torque in torques) > 10
@@ -145,6 +145,12 @@ def test_latched_stop_ends_the_run_and_lasts_until_clean_up(conducted):
     assert "perturbator refused to be activated" in refused.result.message
     assert not conducted.transition(Transition.TRANSITION_DEACTIVATE)  # it is not active
     assert conducted.transition(Transition.TRANSITION_CLEANUP)
+
+
+def test_stop_before_there_is_a_robot_keeps_the_next_run_from_configuring_it(conducted):
+    assert conducted.probe.call(Trigger, "perturbator/stop").success
+    refused = conducted.probe.result(conducted.nodes.conduct())
+    assert "refused to be configured: the stop service was called" in refused.result.message
 
 
 def test_deactivation_ends_the_run(conducted):

@@ -102,6 +102,7 @@ class Perturbator(Participant, LifecycleNode):
         )
         declare_fields(self, DeviceLimits, "limits.")
         self.robot: GuardedRobot | None = None  # from configuring to cleaning up
+        self.stop_latched = False  # the stop service was called while there was no robot
         self.begin_participation()
 
         self.profiles = self.publisher(TORQUE_PROFILE)
@@ -167,8 +168,16 @@ class Perturbator(Participant, LifecycleNode):
             return response
 
     def on_configure(self, _: LifecycleState) -> TransitionCallbackReturn:
-        """Connect to the robot; no torque is possible yet. Releases a latched stop."""
+        """
+        Connect to the robot; no torque is possible yet. Releases what was latched before.
+
+        Refused once where somebody stopped before there was a robot: a run that is about to
+        begin would otherwise release the stop by itself.
+        """
         try:
+            if self.stop_latched:
+                self.stop_latched = False
+                raise DeviceError("the stop service was called; configure again to release it")
             driver = find_driver(self.driver)
             if self.get_parameter("use_sim_time").value and not driver.simulated:
                 raise DeviceError(
@@ -261,6 +270,8 @@ class Perturbator(Participant, LifecycleNode):
         if self.robot is not None:
             self.robot.stop()
             self.report_faults("the stop service was called")
+        else:
+            self.stop_latched = True
         response.success, response.message = True, "torque is zero, latched"
         return response
 
