@@ -145,13 +145,17 @@ class CanMotorRobot(HostTimedRobot):
         )
 
     def _answer(self, understand: Callable[[Any], _T | None], give_up: float) -> _T | None:
-        """Return the newest answer among the frames, waiting for the first until a time [s]."""
+        """
+        Return the newest answer among the frames, waiting for the first until a time [s].
+
+        After that time none is read any more: frames may come faster than they are read.
+        """
         newest = None
         while True:
-            patience = 0.0 if newest is not None else give_up - time.monotonic()
+            patience = give_up - time.monotonic()
             if patience < 0:
                 return newest
-            message = self._bus.recv(patience)
+            message = self._bus.recv(patience if newest is None else 0.0)
             if message is None:
                 return newest
             if message.is_error_frame or message.is_remote_frame or message.is_extended_id:

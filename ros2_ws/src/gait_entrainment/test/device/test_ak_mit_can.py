@@ -19,11 +19,13 @@ import subprocess
 import sys
 import time
 
+import can
 import pytest
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.device import DeviceError, LimitError, PulseTrain, TimingAudit, find_driver
 from gait_entrainment.device.ak_mit import ENTER, EXIT, MOTORS, Command, pack_command
+from gait_entrainment.device.ak_mit_can import AkMitCanOptions, AkMitCanRobot
 from gait_entrainment.device.ak_motor_emulator import EmulatedAkMotor
 
 from .emulator_process import emulator, read_trace, until
@@ -268,3 +270,16 @@ def test_the_emulated_motor_holds_its_command_across_modes_as_the_real_one_does(
     motor.receive(EXIT, 100.0)
     motor.advance(101.0)
     assert motor.torque == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_bus_on_which_answers_never_end_does_not_hold_the_loop_up():
+    class Babbling:
+        def recv(self, timeout):
+            assert timeout >= 0
+            assert time.monotonic() < begun + 1.0, "the loop reads on and on"
+            return can.Message(arbitration_id=1, is_extended_id=False)
+
+    begun = time.monotonic()
+    robot = AkMitCanRobot(Side.RIGHT, AkMitCanOptions(), 0)
+    robot._bus = Babbling()
+    assert robot._answer(lambda _: 5.0, begun + 0.02) == 5.0
