@@ -96,7 +96,7 @@ class HostTimedRobot(AnkleRobot):
         self._states: list[RobotState] = []
         self._samples: list[tuple[int, float]] = []
         self._held = 0.0  # torque of the last sample that was promised [N m]
-        self._promised = 0
+        self._promised = 0  # up to this instant [ns]; 0 until a run begins
         self._offset = time.time_ns() - time.monotonic_ns()  # from steady time to stamps
 
     @abstractmethod
@@ -130,6 +130,7 @@ class HostTimedRobot(AnkleRobot):
         """Enable the device and start to stream zero torque."""
         self._enable()
         self._ending.clear()
+        self._promised = 0
         self._thread = threading.Thread(target=self._run, name="torque loop", daemon=True)
         self._thread.start()
 
@@ -138,6 +139,9 @@ class HostTimedRobot(AnkleRobot):
         with self._lock:
             self._train = None
             self._promised, self._states = start, []
+            # Stamps from before are of another offset, where the wall clock was set meanwhile.
+            self._held = self._samples[-1][1] if self._samples else 0.0
+            self._samples = []
             self._offset = time.time_ns() - time.monotonic_ns()
 
     def schedule(self, train: PulseTrain) -> None:
@@ -270,8 +274,10 @@ class HostTimedRobot(AnkleRobot):
             self._faults = (*self._faults, fault)
 
     def _note(self, sent: int, torque: float, reading: Reading | None) -> None:
-        stamp = sent + self._offset
         with self._lock:
+            stamp = sent + self._offset
+            if not self._promised:  # nobody asks for samples until a run begins
+                self._samples, self._states = self._samples[-1:], self._states[-1:]
             if reading is not None:
                 self._samples.append((stamp, reading.torque))
                 state = RobotState(stamp, torque, reading.torque, reading.angle, self._faults)

@@ -114,6 +114,25 @@ def test_each_sample_holds_until_the_next_however_it_is_asked_for(gaps, torques,
         assert torque == (before[-1] if before else 0.0)
 
 
+def test_a_clock_that_was_set_back_before_a_run_makes_no_promise_of_what_is_not_measured(
+    monkeypatch,
+):
+    device = Echo()
+    robot = GuardedRobot(device, Side.LEFT)
+    robot.configure()
+    robot.activate()
+    with robot:
+        until(lambda: len(device.sent) > 20)
+        assert len(device._samples) < 5  # a robot may wait for its run for hours
+        hour_ago = time.time_ns() - 3600 * SECOND
+        monkeypatch.setattr(time, "time_ns", lambda: hour_ago)
+        robot.begin(hour_ago)
+        count = len(device.sent)
+        until(lambda: len(device.sent) > count + 5)
+        robot.heard()
+        assert hour_ago < robot.promise(hour_ago + 60 * SECOND).valid_until < hour_ago + SECOND
+
+
 def test_a_loop_that_wakes_up_late_is_a_fault():
     device = Echo(lateness=0.02)
     with guarded(device) as robot:
