@@ -336,6 +336,8 @@ class Perturbator(Participant, LifecycleNode):
             return "a pulse train is under way; allowed: one at a time"
         if not self.open or goal.run != self.run_number:
             return f"run: {goal.run} is not under way"
+        if goal.side not in tuple(Side):
+            return f"side: {goal.side}; allowed: 0 (left), 1 (right)"
         try:
             self.robot.schedule(
                 PulseTrain(
