@@ -318,11 +318,20 @@ def entrain_run(bag: Path, *options: str, **environment: str) -> Iterator[Entrai
 class Session:
     """The nodes of an experiment without ``entrain run``: the test conducts."""
 
-    def __init__(self, folder: Path, domain: int, options: Sequence[str], real_time: bool) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        domain: int,
+        options: Sequence[str],
+        real_time: bool,
+        participants: Sequence[str],
+    ) -> None:
         self.bag = folder / "bag"
         self.protocol = protocol_of(*options)
         node_parameters = parameters(self.protocol, str(self.bag), "{}", real_time=real_time)
         del node_parameters["bag_recorder"]["publishers"]  # it records until it is stopped
+        if participants:
+            node_parameters["experiment"]["participants"] = list(participants)
         file = folder / "parameters.yaml"
         file.write_text(
             yaml.safe_dump({f"/{n}": {"ros__parameters": p} for n, p in node_parameters.items()})
@@ -356,11 +365,15 @@ class Session:
 
 @contextmanager
 def session(
-    folder: Path, *options: str, nodes: Sequence[str] = NODES, real_time: bool = True
+    folder: Path,
+    *options: str,
+    nodes: Sequence[str] = NODES,
+    real_time: bool = True,
+    participants: Sequence[str] = (),
 ) -> Iterator[Session]:
     """Start nodes in a domain of their own; stop them in the end."""
     with claimed_domain() as domain:
-        running = Session(folder, domain, options, real_time)
+        running = Session(folder, domain, options, real_time, participants)
         try:
             running.start(*nodes)
             yield running

@@ -22,7 +22,8 @@ from std_srvs.srv import Trigger
 
 from gait_entrainment.bags import BagReader
 from gait_entrainment_msgs.action import DeliverPulseTrain, RunProtocol
-from gait_entrainment_msgs.msg import Horizon
+from gait_entrainment_msgs.msg import Horizon, Progress
+from gait_entrainment_msgs.srv import StartRun
 from gait_entrainment_nodes.topics import (
     ANKLE_TORQUE,
     HORIZON,
@@ -113,6 +114,10 @@ def test_second_protocol_second_train_and_reset_are_refused_in_mid_run(conducted
         DeliverPulseTrain, "perturbator/deliver_pulse_train", train
     )
     assert not refused.accepted
+    train.side = 7  # which there is not: whoever asks for it must not end the run
+    assert not conducted.probe.send_goal(
+        DeliverPulseTrain, "perturbator/deliver_pulse_train", train
+    ).accepted
     answer = conducted.reset()
     assert not answer.success
     assert "run 1 is in progress" in answer.message
@@ -159,6 +164,33 @@ def test_deactivation_ends_the_run(conducted):
     run = conducted.progress[-1].run
     assert conducted.transition(Transition.TRANSITION_DEACTIVATE)
     conducted.assert_torque_ended(handle, run, "the perturbator was deactivated")
+
+
+def test_walker_that_counts_events_which_nobody_receives_ends_the_run(tmp_path):
+    names = ("perturbator", "gait_analyzer", "experiment")
+    with session(tmp_path, *QUICK, nodes=names, participants=["walker_sim", *names[:2]]) as nodes:
+        probe = nodes.probe
+        progress = probe.node.create_publisher(
+            WALKER_PROGRESS.type, WALKER_PROGRESS.name, WALKER_PROGRESS.qos
+        )
+
+        def answer(_, response):
+            response.success = True
+            return response
+
+        probe.node.create_service(StartRun, "walker_sim/start", answer)
+        probe.node.create_service(Trigger, "walker_sim/ready", answer)
+        profiles = probe.listen(TORQUE_PROFILE)
+        handle = nodes.conduct()
+        probe.until(lambda: profiles, "a promise")
+        ended = handle.get_result_async()
+
+        def over():
+            progress.publish(Progress(run=1, events=1))
+            return ended.done()
+
+        probe.until(over, "the end of the run")
+        assert "walker_sim: 1 of 1 gait events missing for 3 s" in ended.result().result.message
 
 
 def test_cancelling_the_train_alone_ends_the_torque_at_once(tmp_path):

@@ -366,9 +366,11 @@ class Experiment(Participant, Node):
         """Take the walker's progress; it is answered once all that it covers is here."""
         if self.conductor is None or progress.run != self.run_number:
             return
-        self.progress, self.progress_at = progress, time.monotonic()
+        if self.progress is None:  # else this one says no more than that an answer is owed
+            self.progress_at = time.monotonic()
+        self.progress = progress
         if self.recorded_grant >= self.grant:
-            self.recorded_at = self.progress_at
+            self.recorded_at = time.monotonic()
         self.grant = progress.grant
         self.answer_progress()
 
@@ -514,7 +516,7 @@ class Experiment(Participant, Node):
             elif self.stopped_at and (self.trouble or now > self.stopped_at + FAREWELL):
                 self.fail(f"perturbator: {self.trouble or NO_REASON}")
             elif silent:
-                self.fail(f"{silent} has been silent for {self.silence_timeout:g} s")
+                self.fail(f"{silent} for {self.silence_timeout:g} s")
 
     def on_stop(self) -> None:
         """Say so where the node is ended before its own protocol is."""
@@ -522,18 +524,22 @@ class Experiment(Participant, Node):
             self.failure = "stopped before the end of the protocol"
 
     def silent_participant(self, now: float) -> str:
-        """Return who has owed an answer for too long, or an empty text."""
+        """Return who has owed what for too long, or an empty text."""
         latest = now - self.silence_timeout
-        if self.planning and self.planning_at < latest:
-            return "perturbator"
+        silent = "{} has been silent".format
+        if self.planning:
+            return silent("perturbator") if self.planning_at < latest else ""
         if self.horizons_sent > self.profiles_received:
-            return "perturbator" if self.profile_at < latest else ""
+            return silent("perturbator") if self.profile_at < latest else ""
         if "bag_recorder" in self.participants.names and self.recorded_grant < self.grant:
-            if self.recorded_at < latest:
-                return "bag_recorder"
             # In lock-step the walker waits for the recorder, rightly.
+            return silent("bag_recorder") if self.recorded_at < latest else ""
+        if max(self.progress_at, self.profile_at) >= latest:
             return ""
-        return "walker_sim" if max(self.progress_at, self.profile_at) < latest else ""
+        if self.progress is not None:
+            total = self.progress.events
+            return f"walker_sim: {total - self.events} of {total} gait events missing"
+        return silent("walker_sim")
 
     @property
     def cancelled(self) -> bool:
