@@ -16,8 +16,10 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -238,6 +240,29 @@ def test_nothing_is_played_without_those_who_are_expected(player: Any) -> None:
     process, _ = player("expect:=[/gait_events]", "expect_timeout:=0.5")
     assert process.process.wait(PATIENCE) == 1
     assert "no subscriptions of /gait_events within 0.5 s" in process.log.read_text()
+
+
+def test_a_player_whose_reader_hangs_says_so_and_obeys_a_signal(player: Any) -> None:
+    process, listener = player("topics:=[/gait_events]", "expect:=[/gait_events]", "rate:=0.0")
+    domain = str(listener.node.context.get_domain_id())
+    reader = subprocess.Popen(
+        [sys.executable, "-m", "gait_entrainment_nodes.gait_analyzer"],
+        env={**os.environ, "ROS_DOMAIN_ID": domain},
+    )
+    try:
+        listener.until(
+            lambda: listener.call(Trigger, "bag_player/ready").success, "its subscription"
+        )
+        reader.send_signal(signal.SIGSTOP)
+        assert listener.call(Trigger, "bag_player/resume").success
+        listener.until(lambda: "does not keep up" in process.log.read_text(), "a word")
+        told = time.monotonic()
+        process.process.terminate()
+        assert process.process.wait(PATIENCE) == 0
+        assert time.monotonic() - told < 5
+    finally:
+        reader.kill()
+        reader.wait()
 
 
 def test_topics_are_remapped_and_played_in_a_loop(player: Any) -> None:

@@ -254,16 +254,20 @@ class BagPlayer(Participant, Node):
         player.publish(moment.message.data)
         # Who keeps all waits by itself; who keeps the last ones for late-comers would overwrite.
         if moment.message.topic in self.forgetful and player.count % (KEPT // 2) == 0:
-            player.wait_until_received(1.0)
+            player.wait_for_readers()
 
     def end_if_played(self) -> None:
         """End the node once everything was played and received, unless it is to stay."""
         if not self.playback.ended or self.stay or self.finished:
             return
         self.publish_counts(0, self.bag.end)
-        deadline = time.monotonic() + FAREWELL
+        give_up = time.monotonic() + FAREWELL
         for player in self.players.values():
-            player.wait_until_received(max(deadline - time.monotonic(), 0.0))
+            if not player.wait_for_readers(give_up - time.monotonic()):
+                self.failure = (
+                    f"a reader of {player.topic_name} has not received its last messages within "
+                    f"{FAREWELL:g} s"
+                )
         self.finished = True
 
     def on_stop(self) -> None:

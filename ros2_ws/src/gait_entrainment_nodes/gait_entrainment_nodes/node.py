@@ -21,6 +21,7 @@ default executor, and between two calls the node meets its own deadlines on stea
 
 import functools
 import json
+import math
 import signal
 import sys
 import time
@@ -116,19 +117,44 @@ class CountedPublisher:
                     raise StopRequestedError from None
                 if time.monotonic() > report_at:
                     report_at += LAG_REPORT_PERIOD
-                    readers = self._node.get_subscriptions_info_by_topic(self.topic_name)
-                    names = ", ".join(sorted({reader.node_name for reader in readers}))
-                    self._node.get_logger().warning(
-                        f"{self.topic_name} waits: one of its readers does not keep up ({names})"
-                    )
+                    self._report_lag()
                 time.sleep(RETRY_PERIOD)
             else:
                 self.count += 1
                 return
 
-    def wait_until_received(self, timeout: float) -> None:
-        """Wait until every reader has acknowledged what was published, or for ``timeout`` [s]."""
-        self._publisher.wait_for_all_acked(Duration(seconds=timeout))
+    def wait_until_received(self, timeout: float) -> bool:
+        """Wait until every reader has received what was published; False after a time [s]."""
+        return bool(self._publisher.wait_for_all_acked(Duration(seconds=timeout)))
+
+    def wait_for_readers(self, patience: float = math.inf) -> bool:
+        """
+        Wait until every reader has received what was published; False after a time [s].
+
+        Raises
+        ------
+        StopRequestedError
+            where the node is to end meanwhile.
+
+        """
+        give_up = time.monotonic() + patience
+        report_at = time.monotonic() + LAG_REPORT_PERIOD
+        while not self.wait_until_received(LONGEST_SLEEP):
+            if self._node.stopping:
+                raise StopRequestedError
+            if time.monotonic() > give_up:
+                return False
+            if time.monotonic() > report_at:
+                report_at += LAG_REPORT_PERIOD
+                self._report_lag()
+        return True
+
+    def _report_lag(self) -> None:
+        readers = self._node.get_subscriptions_info_by_topic(self.topic_name)
+        names = ", ".join(sorted({reader.node_name for reader in readers}))
+        self._node.get_logger().warning(
+            f"{self.topic_name} waits: one of its readers does not keep up ({names})"
+        )
 
 
 class Participant:
