@@ -16,13 +16,12 @@
 
 import argparse
 import json
-import os
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-from gait_entrainment_nodes.domain import domains_in_use
+from gait_entrainment_nodes.domain import DomainError, domains_in_use, wanted_domain
 
 # For so long perturbators are looked for [s]; and, in a domain where a run should be, until one is
 # found and all have answered, but no longer than this.
@@ -52,9 +51,13 @@ def add_command(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Stop everything; 1 where nothing was found or something did not answer."""
-    wanted = os.environ.get("ROS_DOMAIN_ID")
-    if wanted is not None and wanted.isdigit():
-        domains = {int(wanted): PATIENCE}
+    try:
+        wanted = wanted_domain()
+    except DomainError as error:
+        print(f"entrain stop: {error}; stopping every run", file=sys.stderr)
+        wanted = None
+    if wanted is not None:
+        domains = {wanted: PATIENCE}
     else:
         domains = {DEFAULT_DOMAIN: DISCOVERY, **dict.fromkeys(domains_in_use(), PATIENCE)}
     answers: dict[str, str | None] = {}
@@ -85,7 +88,7 @@ def stop_all(domain: int, patience: float) -> dict[str, str | None]:
     from std_srvs.srv import Trigger
 
     context = Context()
-    rclpy.init(context=context, domain_id=domain)
+    rclpy.init(args=[], context=context, domain_id=domain)
     node = Node(f"entrain_stop_{domain}", context=context)
     executor = EventsExecutor(context=context)
     executor.add_node(node)

@@ -17,10 +17,12 @@
 import os
 import subprocess
 import sys
+from argparse import Namespace
 
 import pytest
 
 from gait_entrainment_nodes import domain as module
+from gait_entrainment_nodes import stop_command
 from gait_entrainment_nodes.domain import DomainError, claimed_domain
 
 
@@ -84,3 +86,13 @@ def test_claim_ends_with_a_killed_process(monkeypatch):
         holder.kill()
     with claimed_domain() as free:
         assert free == 213
+
+
+def test_stop_in_what_is_no_domain_stops_every_run(monkeypatch, capsys):
+    monkeypatch.setenv("ROS_DOMAIN_ID", "500")
+    monkeypatch.setattr(stop_command, "domains_in_use", lambda: [7])
+    monkeypatch.setattr(stop_command, "stop_all", lambda domain, _: {f"robot {domain}": "zero"})
+    assert stop_command.run(Namespace(json=False)) == 0
+    out, err = capsys.readouterr()
+    assert out == "robot 0: zero\nrobot 7: zero\n"
+    assert "ROS_DOMAIN_ID: '500'" in err
