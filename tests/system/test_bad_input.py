@@ -118,6 +118,9 @@ def test_output_that_cannot_be_written_is_refused_before_anything_starts(tmp_pat
     code, text = entrain(tmp_path, "--out=/proc/bag")
     assert code == 2
     assert_one_line(text, ["--out", "/proc", "cannot be written to"])
+    code, text = entrain(tmp_path, b"--out=\xff")  # it could be no parameter of a node
+    assert code == 2
+    assert_one_line(text, ["--out", "udcff", "UTF-8"])
 
 
 def test_domain_in_use_is_refused(tmp_path):

@@ -61,7 +61,7 @@ class ReplayClient:
     """
 
     def __init__(self, supervisor: Supervisor, namespace: str, listeners: int) -> None:
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         self._supervisor = supervisor
         self._listeners = listeners
         self._node = Node("entrain_replay", namespace=namespace or None)

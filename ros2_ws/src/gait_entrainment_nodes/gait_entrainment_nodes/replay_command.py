@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from gait_entrainment.bags import BagError, BagReader
+from gait_entrainment.protocol import ProtocolError
 from gait_entrainment.report.recorded_run import RecordedRun, read_run
 from gait_entrainment.report.summary import outcome_of, summary
 from gait_entrainment_nodes.domain import DomainError, claimed_domain
@@ -33,6 +34,7 @@ from gait_entrainment_nodes.node_list import (
     parameter_arguments,
     replay_parameters,
 )
+from gait_entrainment_nodes.run_command import check_output, is_utf8
 from gait_entrainment_nodes.supervisor import Supervisor
 
 _EXAMPLES = """examples:
@@ -73,8 +75,13 @@ def run(options: argparse.Namespace) -> int:
         wrong = f"{options.bag}: no such file or folder"
     elif options.rate is not None and not 0 < options.rate < float("inf"):
         wrong = f"--rate: {options.rate:g}; allowed: above 0; without it, as fast as it goes"
-    elif options.out is not None and options.out.exists():
-        wrong = f"--out: {options.out} is already there; a bag is never overwritten"
+    elif not is_utf8(options.bag):
+        wrong = f"{str(options.bag)!a}: allowed: a name in UTF-8"
+    elif options.out is not None:
+        try:
+            check_output(options.out)
+        except ProtocolError as error:
+            wrong = str(error)
     if wrong:
         print(f"entrain replay: {wrong}", file=sys.stderr)
         return 2

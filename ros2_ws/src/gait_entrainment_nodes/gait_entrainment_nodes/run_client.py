@@ -62,7 +62,7 @@ class RunClient:
     """
 
     def __init__(self, supervisor: Supervisor, protocol: Protocol, quiet: bool) -> None:
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         self._supervisor = supervisor
         self._node = Node("entrain_run")
         self._executor = EventsExecutor()

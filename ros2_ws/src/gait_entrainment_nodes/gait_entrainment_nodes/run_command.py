@@ -187,6 +187,8 @@ def check_driver(text: str, options: argparse.Namespace) -> None:
 
 def check_output(bag: Path) -> None:
     """Raise ProtocolError where a bag cannot be made, before anything is started for it."""
+    if not is_utf8(bag):
+        raise ProtocolError(f"--out: {str(bag.absolute())!a}; allowed: a name in UTF-8")
     if os.path.lexists(bag):
         raise ProtocolError(f"--out: {bag} is already there; a bag is never overwritten")
     parent = next(folder for folder in bag.absolute().parents if folder.exists())
@@ -198,6 +200,11 @@ def check_output(bag: Path) -> None:
         raise ProtocolError(
             f"--out: {parent} cannot be written to: {error.strerror}; choose another folder"
         ) from None
+
+
+def is_utf8(path: Path) -> bool:
+    """Whether a path can be the value of a ROS parameter."""
+    return not any("\ud800" <= character <= "\udfff" for character in str(path.absolute()))
 
 
 def kept(bag: Path) -> str:
