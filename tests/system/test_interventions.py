@@ -202,8 +202,8 @@ def test_cancelling_the_train_alone_ends_the_torque_at_once(tmp_path):
             request = ChangeState.Request(transition=Transition(id=number))
             assert probe.call(ChangeState, "perturbator/change_state", request).success
 
-        def promise(known, until):
-            message = Horizon(run=7)
+        def promise(known, until, run=7):
+            message = Horizon(run=run)
             message.header.stamp.sec, message.until.sec = known, until
             count = len(profiles)
             horizons.publish(message)
@@ -231,3 +231,8 @@ def test_cancelling_the_train_alone_ends_the_torque_at_once(tmp_path):
         train.first_onset.sec = 7
         again = probe.send_goal(DeliverPulseTrain, "perturbator/deliver_pulse_train", train)
         assert again.accepted
+        # A run that begins before it is over ends it.
+        assert promise(7, 9, run=8).stop
+        result = probe.result(again).result
+        assert result.outcome == DeliverPulseTrain.Result.STOPPED
+        assert result.message == "another run began"

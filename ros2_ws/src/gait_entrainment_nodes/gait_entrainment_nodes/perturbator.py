@@ -387,6 +387,8 @@ class Perturbator(Participant, LifecycleNode):
         new = message.run != self.run_number
         if robot is None or not (robot.enabled if new else self.open):
             return
+        if new:
+            self.end_torque(DeliverPulseTrain.Result.STOPPED, "another run began")
         self.now = to_nanoseconds(message.header.stamp)
         self.horizon, self.last = to_nanoseconds(message.until), message.last
         if new:
