@@ -309,6 +309,45 @@ def test_kit_from_outside_finds_a_broken_node(tmp_path, fault):
     assert err.count("\n") == 1
 
 
+UNSTOPPABLE_NODE = """
+import sys
+from gait_entrainment.device import drivers
+from gait_entrainment.device.ideal import IdealAnkleRobot
+from gait_entrainment_nodes import perturbator
+
+class Unstoppable(IdealAnkleRobot):
+    def stop(self):
+        raise OSError("bus gone")
+
+sys.modules["unstoppable"] = sys.modules["__main__"]
+drivers.OWN_DRIVERS["unstoppable"] = "unstoppable:Unstoppable"
+sys.exit(perturbator.main())
+"""
+
+
+def test_driver_that_cannot_stop_ends_the_process_and_no_stop_is_confirmed(tmp_path):
+    script = tmp_path / "unstoppable.py"
+    script.write_text(UNSTOPPABLE_NODE)
+    with claimed_domain() as domain, probe(domain) as listener:
+        node = subprocess.Popen(
+            [sys.executable, str(script), "--ros-args", "-p", "driver:=unstoppable"],
+            env={**os.environ, "ROS_DOMAIN_ID": str(domain)},
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        try:
+            configure = ChangeState.Request(transition=Transition(id=CONFIGURE))
+            assert listener.call(ChangeState, "perturbator/change_state", configure).success
+            answer = listener.call(Trigger, "perturbator/stop")
+            assert not answer.success
+            assert "cut the power" in answer.message
+            _, err = node.communicate(timeout=10)
+        finally:
+            node.kill()
+    assert node.returncode == 1
+    assert "cut the power" in err
+
+
 def test_stop_from_the_command_line_ends_a_run(tmp_path):
     with entrain_run(tmp_path / "bag", "--real-time", "--baseline=2") as run:
         run.wait_for_stride(2)

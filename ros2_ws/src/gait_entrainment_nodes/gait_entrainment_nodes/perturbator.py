@@ -51,7 +51,7 @@ from gait_entrainment.device import (
     find_driver,
 )
 from gait_entrainment.device import TorqueProfile as CoreProfile
-from gait_entrainment.device.faults import STOPPED
+from gait_entrainment.device.faults import NOT_STOPPED, STOPPED
 from gait_entrainment_msgs.action import DeliverPulseTrain
 from gait_entrainment_msgs.msg import AnkleRobotState, Horizon, TorqueProfile, TorquePulse
 from gait_entrainment_nodes.node import (
@@ -273,6 +273,8 @@ class Perturbator(Participant, LifecycleNode):
         else:
             self.stop_latched = True
         response.success, response.message = True, "torque is zero, latched"
+        if self.robot is not None and NOT_STOPPED in self.robot.faults:
+            response.success, response.message = False, NOT_STOPPED.meaning
         return response
 
     def end_torque(self, outcome: int, reason: str) -> None:
@@ -308,6 +310,8 @@ class Perturbator(Participant, LifecycleNode):
             told = f"latched: {fault.name}: {reason or fault.meaning}"
             self.get_logger().error(told)
             self.diagnose(self.now, DiagnosticStatus.ERROR, told)
+        if NOT_STOPPED in new:
+            self.failure = NOT_STOPPED.meaning
         reason = reason or "; ".join(f"{fault.name}: {fault.meaning}" for fault in new)
         self.committed |= self.open  # in a run the stop is told also where no torque was due
         self.end_torque(DeliverPulseTrain.Result.STOPPED, reason)

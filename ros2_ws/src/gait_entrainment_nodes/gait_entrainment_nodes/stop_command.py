@@ -50,7 +50,7 @@ def add_command(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Stop everything; 1 where nothing was found or something did not answer."""
+    """Stop everything; 1 where nothing was found, or a stop was not confirmed."""
     try:
         wanted = wanted_domain()
     except DomainError as error:
@@ -70,16 +70,16 @@ def run(options: argparse.Namespace) -> int:
         print(json.dumps({"stopped": answers}))
     else:
         for name, answer in answers.items():
-            print(f"{name}: {answer or 'did not answer'}")
+            print(f"{name}: {answer or 'did not confirm the stop'}")
     if not answers:
         print("entrain stop: no perturbator was found: is a run going on?", file=sys.stderr)
     elif silent:
-        print(f"entrain stop: no answer of {', '.join(silent)}: cut the power", file=sys.stderr)
+        print(f"entrain stop: no stop of {', '.join(silent)}: cut the power", file=sys.stderr)
     return 0 if answers and not silent else 1
 
 
 def stop_all(domain: int, patience: float) -> dict[str, str | None]:
-    """Call every stop service in a domain; return the answers, None where there was none."""
+    """Call every stop service in a domain; return the answers, None where no stop is confirmed."""
     # Imported here: other commands do without ROS.
     import rclpy
     from rclpy.context import Context
@@ -109,12 +109,9 @@ def stop_all(domain: int, patience: float) -> dict[str, str | None]:
             answered = sum(call.done() for call in calls.values())
             if waited > DISCOVERY and clients and answered == len(clients):
                 break
-        return {
-            f"domain {domain} {name}": (
-                calls[name].result().message if name in calls and calls[name].done() else None
-            )
-            for name in clients
-        }
+        answered = {name: call.result() for name, call in calls.items() if call.done()}
+        confirmed = {name: answer.message for name, answer in answered.items() if answer.success}
+        return {f"domain {domain} {name}": confirmed.get(name) for name in clients}
     finally:
         executor.shutdown()
         node.destroy_node()

@@ -39,6 +39,7 @@ from gait_entrainment.device.faults import (
     DRIVER_FAILED,
     EXPERIMENT_SILENT,
     IMPULSE_EXCEEDED,
+    NOT_STOPPED,
     STOPPED,
     TORQUE_EXCEEDED,
     DeviceError,
@@ -284,12 +285,17 @@ class GuardedRobot:
             self._call(self._robot.cancel)
 
     def stop(self, fault: Fault = STOPPED) -> None:
-        """Bring the torque to zero and keep it there; from any thread and state, never raises."""
-        if fault not in self.faults:
-            self.faults = (*self.faults, fault)
+        """
+        Bring the torque to zero and keep it there; from any thread and state, never raises.
+
+        A driver that raises here breaks the last promise there is, which is a fault of its own.
+        """
+        self._latch(fault)
         self.train = None
-        with contextlib.suppress(Exception):
+        try:
             self._robot.stop()
+        except Exception:
+            self._latch(NOT_STOPPED)
 
     def promise(self, until: int) -> TorqueProfile:
         """
@@ -333,6 +339,10 @@ class GuardedRobot:
         return states
 
     # Guarding
+
+    def _latch(self, fault: Fault) -> None:
+        if fault not in self.faults:
+            self.faults = (*self.faults, fault)
 
     def _refuse_latched(self) -> None:
         if self.faults:

@@ -221,7 +221,7 @@ def test_a_failing_deactivation_stops_and_closes_all_the_same():
     driver.raises = {"deactivate": OSError("bus gone"), "stop": OSError("bus gone")}
     guard.close()
     assert driver.calls[-3:] == ["deactivate", "stop", "close"]
-    assert [f.name for f in guard.faults] == ["driver_failed"]
+    assert [f.name for f in guard.faults] == ["driver_failed", "not_stopped"]
 
 
 def test_a_device_that_does_not_answer_is_released_and_can_be_configured_later():
