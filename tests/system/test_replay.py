@@ -33,6 +33,7 @@ from std_srvs.srv import Trigger
 from gait_entrainment.bags import BagReader, BagWriter
 from gait_entrainment.report.recorded_run import read_run
 from gait_entrainment_msgs.srv import Burst, GetRate, IsPaused, Play, Seek, SetRate
+from gait_entrainment_nodes import replay_client, replay_command
 from gait_entrainment_nodes.domain import claimed_domain
 from gait_entrainment_nodes.gait_analyzer import GaitAnalyzerNode
 from gait_entrainment_nodes.raw_messages import serialize
@@ -162,6 +163,23 @@ def test_a_run_in_a_namespace_is_replayed_and_recorded_there(live: Path, tmp_pat
     assert [[data for _, data in found] for found in results.values()] == [
         *recorded(live).values()
     ]
+
+
+def test_an_analyzer_that_hangs_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(replay_client, "PATIENCE", 3.0)
+    play = replay_client.ReplayClient._ask
+
+    def ask(client: Any, service: str, *arguments: Any) -> None:
+        play(client, service, *arguments)
+        if service == "bag_player/resume":
+            client._supervisor._processes["gait_analyzer"].send_signal(signal.SIGSTOP)
+
+    monkeypatch.setattr(replay_client.ReplayClient, "_ask", ask)
+    options = SimpleNamespace(bag=BAG, rate=1.0, out=None, json=True)
+    with claimed_domain() as domain:
+        monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))  # undone, where replay sets it
+        with pytest.raises(replay_client.ReplayError, match="no answer of gait_analyzer/ready"):
+            replay_command.replay(options, domain)
 
 
 class Player:

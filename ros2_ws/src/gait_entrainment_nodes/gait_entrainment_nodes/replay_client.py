@@ -34,6 +34,8 @@ RESULTS = (STRIDES, PULSE_PHASES, ENTRAINMENT)
 PATIENCE = 60.0
 # How often a node is asked again: an answer is lost where the node does not know us yet [s].
 ASKING_PERIOD = 0.25
+# How often it is seen, while a bag is played, that nobody hangs [s].
+LOOKING_PERIOD = 1.0
 
 
 class ReplayError(Exception):
@@ -106,9 +108,14 @@ class ReplayClient:
         with tqdm(
             desc="replay", unit="stride", disable=True if quiet else None, leave=False
         ) as bar:
-            while "bag_player" not in self._supervisor.ended():
+            ask_at = time.monotonic()
+            while not self._played():
                 self._spin()
                 bar.update(len(self.results[STRIDES.name]) - bar.n)
+                if time.monotonic() > ask_at:  # who hangs holds up the player without an end
+                    for node in ("gait_analyzer", "bag_player"):
+                        self._ask(f"{node}/ready", lambda _: True, self._played)
+                    ask_at = time.monotonic() + LOOKING_PERIOD
         self._ask("gait_analyzer/finish")
         self._wait_until(self._complete, "the analyzer's last results", "gait_analyzer")
 
@@ -117,6 +124,10 @@ class ReplayClient:
         self._executor.shutdown()
         self._node.destroy_node()
         rclpy.try_shutdown()
+
+    def _played(self) -> bool:
+        """Whether the player has ended."""
+        return "bag_player" in self._supervisor.ended()
 
     def _all_listen(self, answer: Trigger.Response) -> bool:
         """Whether everyone who is to hear the analyzer's results will hear them."""
@@ -149,15 +160,20 @@ class ReplayClient:
         if message.node.rpartition("/")[2] == "gait_analyzer":
             self._counts = dict(zip(message.topics, message.counts, strict=True))
 
-    def _ask(self, service: str, good: Any = lambda answer: answer.success) -> None:
-        """Ask a node, again and again, until it gives a good answer."""
+    def _ask(
+        self,
+        service: str,
+        good: Any = lambda answer: answer.success,
+        needless: Any = lambda: False,
+    ) -> None:
+        """Ask a node, again and again, until it gives a good answer, or that is needless."""
         client = self._clients[service]
         answers: list[Any] = []
         asked_at = 0.0
 
         def answered() -> bool:
             nonlocal asked_at
-            if any(answer.done() and good(answer.result()) for answer in answers):
+            if needless() or any(a.done() and good(a.result()) for a in answers):
                 return True
             if time.monotonic() - asked_at > ASKING_PERIOD and client.service_is_ready():
                 asked_at = time.monotonic()
