@@ -143,7 +143,7 @@ def _entries(source: Path | str) -> Iterator[tuple[str, _Entry]]:
         name = str(source)
         try:
             text = Path(source).read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
+        except (OSError, ValueError) as error:  # a name with a null byte, or no UTF-8 in it
             reason = error.strerror if isinstance(error, OSError) else "is not UTF-8 text"
             raise ProtocolError(f"{name}: cannot be read: {reason}") from None
     try:

@@ -124,6 +124,8 @@ def read_run(
         timings = tuple(recorded_timings(path))
         onsets = {"commanded": record.onsets, "measured": [t.onset for t in timings]}
         live_onset = bag.custom_data.get("onset", "commanded")
+        if live_onset not in onsets:
+            raise BagError(f"{path}: its onset is {live_onset!r}; allowed: {', '.join(onsets)}")
         live, analysis = (
             analyze(record.events, onsets[kind], protocol.side, settings)
             for kind in (live_onset, onset or live_onset)
@@ -134,7 +136,6 @@ def read_run(
                 conductor.add_event(event)
         except ProtocolError:
             pass  # too few events are left to plan by: the periods stay unknown
-        lost = json.loads(bag.custom_data.get("messages_lost", "null"))
         return RecordedRun(
             protocol=protocol,
             events=tuple(record.events),
@@ -152,10 +153,23 @@ def read_run(
                 stamped=record.stamped,
             ),
             messages=bag.message_count,
-            lost=None if lost is None else sum(lost.values()),
+            lost=_lost(bag),
             real_time_factor=record.real_time_factor,
             ended_early=bag.custom_data.get(ENDED_EARLY, ""),
         )
+
+
+def _lost(bag: BagReader) -> int | None:
+    """Return how many messages the recorder missed; None where it does not say."""
+    told = bag.custom_data.get("messages_lost")
+    if told is None:
+        return None
+    try:
+        return sum(map(int, json.loads(told).values()))
+    except (ValueError, TypeError, AttributeError):
+        raise BagError(
+            f"{bag.path}: its messages_lost is {told!r}; allowed: a JSON object of counts by topic"
+        ) from None
 
 
 def drawn_strides(protocol: Protocol, analysis: Analysis) -> list[Stride]:

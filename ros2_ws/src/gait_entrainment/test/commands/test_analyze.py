@@ -27,6 +27,7 @@ from gait_entrainment.commands import main
 from gait_entrainment.report.recorded_run import read_run
 
 BAG = Path(__file__).parents[5] / "bags" / "paper_example"
+NEEDED = ("/gait_events", "/perturbation/torque_profile")
 pytestmark = pytest.mark.skipif(not BAG.exists(), reason="the repository's bag is not here")
 
 
@@ -47,11 +48,15 @@ def test_the_outcome_is_that_of_the_simulation(capsys):
     assert "the same to the last bit" in entrain(capsys, "analyze", BAG)[1]
 
 
-def copy(out, keep):
-    """Copy the bag; `keep` may change the bytes of a message, or leave it out with None."""
+def copy(out, keep, told=None):
+    """
+    Copy the bag; `keep` may change the bytes of a message, or leave it out with None.
+
+    `told` replaces custom data.
+    """
     with (
         BagReader(BAG) as bag,
-        BagWriter(out, ros_distro="jazzy", custom_data=bag.custom_data) as writer,
+        BagWriter(out, ros_distro="jazzy", custom_data=bag.custom_data | (told or {})) as writer,
     ):
         for topic in bag.topics.values():
             writer.add_topic(topic)
@@ -142,12 +147,22 @@ def test_the_bag_follows_every_rule_and_opens_without_ros_and_message_packages()
         ("nowhere", 2, "no such file"),
         ("foreign", 1, "holds no protocol"),
         ("text", 1, "not an MCAP"),
+        ("protocol=\0", 1, "its protocol cannot be read"),
+        ("onset=sideways", 1, "'sideways'; allowed: commanded, measured"),
+        ("messages_lost=oops", 1, "'oops'; allowed: a JSON object"),
+        ("messages_lost=[1]", 1, "'[1]'; allowed: a JSON object"),
     ],
 )
 def test_what_cannot_be_analyzed_is_one_line(capsys, tmp_path, name, expected, words):
     with BagWriter(tmp_path / "foreign", ros_distro="jazzy"):
         pass
     (tmp_path / "text").write_text("hello")
+    key, told, value = name.partition("=")
+    if told:  # what somebody else's tool has written into the custom data
+        name = "told"
+        copy(
+            tmp_path / name, lambda topic, _, data: data if topic in NEEDED else None, {key: value}
+        )
     code, out, err = entrain(capsys, "analyze", tmp_path / name)
     assert (code, out) == (expected, "")
     assert err.count("\n") == 1
