@@ -28,11 +28,11 @@ import statistics
 from bisect import bisect_left
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 
 from gait_entrainment.analysis.drift import drift_of
 from gait_entrainment.analysis.pulse_phase import PulsePhase
-from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, setting
 from gait_entrainment.events import Stride
 
 
@@ -58,85 +58,54 @@ class VerdictSettings:
 
     """
 
-    window: int = field(
-        default=20,
-        metadata={"meaning": "latest pulses judged at a time", "unit": "1", "range": (5, 1000)},
+    window: int = setting(20, "latest pulses judged at a time", "1", (5, 1000))
+    confidence: float = setting(
+        0.95, "two-sided confidence level of the drift's interval", "1", (0.5, 0.9999)
     )
-    confidence: float = field(
-        default=0.95,
-        metadata={
-            "meaning": "two-sided confidence level of the drift's interval",
-            "unit": "1",
-            "range": (0.5, 0.9999),
-        },
+    drift_margin: float = setting(
+        0.25,
+        "largest drift per stride of an entrained gait, as a fraction of the "
+        "difference between pulse period and unperturbed period",
+        "1",
+        (0.01, 1.0),
     )
-    drift_margin: float = field(
-        default=0.25,
-        metadata={
-            "meaning": "largest drift per stride of an entrained gait, as a fraction of the "
-            "difference between pulse period and unperturbed period",
-            "unit": "1",
-            "range": (0.01, 1.0),
-        },
+    period_margin: float = setting(
+        0.25,
+        "largest difference between mean stride period and pulse period of an "
+        "entrained gait, as a fraction of the difference between pulse period and "
+        "unperturbed period",
+        "1",
+        (0.01, 1.0),
     )
-    period_margin: float = field(
-        default=0.25,
-        metadata={
-            "meaning": "largest difference between mean stride period and pulse period of an "
-            "entrained gait, as a fraction of the difference between pulse period and "
-            "unperturbed period",
-            "unit": "1",
-            "range": (0.01, 1.0),
-        },
+    successive: int = setting(
+        5,
+        "successive strides with pulses that must pass before the gait is called entrained",
+        "1",
+        (1, 1000),
     )
-    successive: int = field(
-        default=5,
-        metadata={
-            "meaning": "successive strides with pulses that must pass before the gait is called "
-            "entrained",
-            "unit": "1",
-            "range": (1, 1000),
-        },
+    largest_autocorrelation: float = setting(
+        0.9, "upper bound of the lag-1 autocorrelation of the residuals", "1", (0.0, 0.99)
     )
-    largest_autocorrelation: float = field(
-        default=0.9,
-        metadata={
-            "meaning": "upper bound of the lag-1 autocorrelation of the residuals",
-            "unit": "1",
-            "range": (0.0, 0.99),
-        },
+    smallest_difference: float = setting(
+        0.002,
+        "smallest testable difference between pulse period and unperturbed period",
+        "s",
+        (0.0, 1.0),
     )
-    smallest_difference: float = field(
-        default=0.002,
-        metadata={
-            "meaning": "smallest testable difference between pulse period and unperturbed period",
-            "unit": "s",
-            "range": (0.0, 1.0),
-        },
+    smallest_difference_errors: float = setting(
+        2.0, "the same in standard errors of the unperturbed period", "1", (0.0, 100.0)
     )
-    smallest_difference_errors: float = field(
-        default=2.0,
-        metadata={
-            "meaning": "the same in standard errors of the unperturbed period",
-            "unit": "1",
-            "range": (0.0, 100.0),
-        },
+    stretch_tolerance: float = setting(
+        0.010,
+        "distance from the final lag within which a stride counts as entrained",
+        "s",
+        (0.0, 1.0),
     )
-    stretch_tolerance: float = field(
-        default=0.010,
-        metadata={
-            "meaning": "distance from the final lag within which a stride counts as entrained",
-            "unit": "s",
-            "range": (0.0, 1.0),
-        },
-    )
-    stretch_tolerance_deviations: float = field(
-        default=2.0,
-        metadata={
-            "meaning": "the same in standard deviations of the lag over the window, where larger",
-            "unit": "1",
-            "range": (0.0, 10.0),
-        },
+    stretch_tolerance_deviations: float = setting(
+        2.0,
+        "the same in standard deviations of the lag over the window, where larger",
+        "1",
+        (0.0, 10.0),
     )
 
     def __post_init__(self) -> None:

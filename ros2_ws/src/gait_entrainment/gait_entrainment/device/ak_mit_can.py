@@ -18,7 +18,7 @@ import time
 from dataclasses import dataclass, field
 from typing import Any
 
-from gait_entrainment.conventions import Side
+from gait_entrainment.conventions import Side, setting
 from gait_entrainment.device.ak_mit import (
     ENTER,
     EXIT,
@@ -43,9 +43,7 @@ class AkMitCanOptions(CanMotorOptions):
         default="AK80-9",
         metadata={"meaning": "type, which fixes the ranges", "unit": "", "choices": tuple(MOTORS)},
     )
-    motor_id: int = field(
-        default=1, metadata={"meaning": "id of the motor", "unit": "", "range": (1, 127)}
-    )
+    motor_id: int = setting(1, "id of the motor", "", (1, 127))
 
 
 class AkMitCanRobot(CanMotorRobot):

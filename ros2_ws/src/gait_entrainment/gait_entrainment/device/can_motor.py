@@ -20,7 +20,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, TypeVar
 
-from gait_entrainment.conventions import Side
+from gait_entrainment.conventions import Side, setting
 from gait_entrainment.device.can_bus import open_bus
 from gait_entrainment.device.faults import DeviceError, LimitError
 from gait_entrainment.device.host_loop import HostTimedRobot
@@ -42,42 +42,17 @@ class CanMotorOptions:
         default="socketcan", metadata={"meaning": "python-can interface", "unit": ""}
     )
     channel: str = field(default="can0", metadata={"meaning": "channel of the bus", "unit": ""})
-    port: int = field(
-        default=0,
-        metadata={
-            "meaning": "UDP port of udp_multicast; 0 is python-can's own",
-            "unit": "",
-            "range": (0, 65535),
-        },
+    port: int = setting(0, "UDP port of udp_multicast; 0 is python-can's own", "", (0, 65535))
+    bitrate: int = setting(1_000_000, "of the bus", "bit/s", (10_000, 1_000_000))
+    ratio: float = setting(
+        1.0,
+        "ankle torque per motor torque; negative where the motor turns against it",
+        "1",
+        (-20.0, 20.0),
     )
-    bitrate: int = field(
-        default=1_000_000,
-        metadata={"meaning": "of the bus", "unit": "bit/s", "range": (10_000, 1_000_000)},
-    )
-    ratio: float = field(
-        default=1.0,
-        metadata={
-            "meaning": "ankle torque per motor torque; negative where the motor turns against it",
-            "unit": "1",
-            "range": (-20.0, 20.0),
-        },
-    )
-    rate: float = field(
-        default=500.0,
-        metadata={"meaning": "torque commands per second", "unit": "Hz", "range": (50.0, 1000.0)},
-    )
-    silence: float = field(
-        default=0.05,
-        metadata={"meaning": "longest silence of the motor", "unit": "s", "range": (0.005, 1.0)},
-    )
-    lateness: float = field(
-        default=0.05,
-        metadata={
-            "meaning": "by which the loop may wake up late",
-            "unit": "s",
-            "range": (0.005, 1.0),
-        },
-    )
+    rate: float = setting(500.0, "torque commands per second", "Hz", (50.0, 1000.0))
+    silence: float = setting(0.05, "longest silence of the motor", "s", (0.005, 1.0))
+    lateness: float = setting(0.05, "by which the loop may wake up late", "s", (0.005, 1.0))
 
     def __post_init__(self) -> None:
         """Check what has no range of its own."""

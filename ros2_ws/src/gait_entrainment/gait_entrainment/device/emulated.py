@@ -35,12 +35,12 @@ once. Noise is white.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from gait_entrainment.conventions import Side
+from gait_entrainment.conventions import Side, setting
 from gait_entrainment.device.faults import DeviceError, LimitError
 from gait_entrainment.device.profile import TorqueProfile
 from gait_entrainment.device.pulse_train import PulseTrain
@@ -49,12 +49,6 @@ from gait_entrainment.device.robot import AnkleRobot, Capabilities, RobotState
 _TICK = 1_000_000  # of the device's torque loop [ns]
 # Bounds of random numbers drawn ahead at a time: a generator call per tick would be slow.
 _BLOCK = 1024
-
-
-def _option(default: float, meaning: str, unit: str, low: float, high: float) -> Any:
-    return field(
-        default=default, metadata={"meaning": meaning, "unit": unit, "range": (low, high)}
-    )
 
 
 @dataclass(frozen=True)
@@ -66,16 +60,16 @@ class EmulatedOptions:
     bandwidth of 20 Hz, and a chain from command to torque of 5 ms.
     """
 
-    bandwidth: float = _option(20.0, "torque bandwidth (-3 dB) of the lag", "Hz", 0.5, 300.0)
-    peak_torque: float = _option(25.0, "largest torque", "N m", 0.1, 200.0)
-    torque_rate: float = _option(2000.0, "steepest change of torque", "N m/s", 1.0, 1e6)
-    delay: float = _option(0.005, "from command to device", "s", 0.0, 0.5)
-    jitter: float = _option(0.002, "by which a pulse comes late at most", "s", 0.0, 0.1)
-    resolution: float = _option(0.01, "step of the torque command", "N m", 1e-4, 5.0)
-    noise: float = _option(0.1, "standard deviation of the measured torque", "N m", 0.0, 10.0)
-    bias: float = _option(0.0, "of the measured torque", "N m", -10.0, 10.0)
-    loss: float = _option(0.001, "share of the ticks whose command is lost", "1", 0.0, 0.9)
-    state_rate: float = _option(500.0, "states per second; a divisor of 1000", "Hz", 1.0, 1000.0)
+    bandwidth: float = setting(20.0, "torque bandwidth (-3 dB) of the lag", "Hz", (0.5, 300.0))
+    peak_torque: float = setting(25.0, "largest torque", "N m", (0.1, 200.0))
+    torque_rate: float = setting(2000.0, "steepest change of torque", "N m/s", (1.0, 1e6))
+    delay: float = setting(0.005, "from command to device", "s", (0.0, 0.5))
+    jitter: float = setting(0.002, "by which a pulse comes late at most", "s", (0.0, 0.1))
+    resolution: float = setting(0.01, "step of the torque command", "N m", (1e-4, 5.0))
+    noise: float = setting(0.1, "standard deviation of the measured torque", "N m", (0.0, 10.0))
+    bias: float = setting(0.0, "of the measured torque", "N m", (-10.0, 10.0))
+    loss: float = setting(0.001, "share of the ticks whose command is lost", "1", (0.0, 0.9))
+    state_rate: float = setting(500.0, "states per second; a divisor of 1000", "Hz", (1.0, 1000.0))
 
     def __post_init__(self) -> None:
         """Check what has no range of its own."""

@@ -15,17 +15,11 @@
 """Limits that every pulse train is held against before a robot sees it."""
 
 import math
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
+from gait_entrainment.conventions import setting
 from gait_entrainment.device.faults import LimitError
 from gait_entrainment.device.pulse_train import PulseTrain
-
-
-def _limit(default: float, meaning: str, unit: str, low: float, high: float) -> Any:
-    return field(
-        default=default, metadata={"meaning": meaning, "unit": unit, "range": (low, high)}
-    )
 
 
 @dataclass(frozen=True)
@@ -38,25 +32,27 @@ class DeviceLimits:
     is that of one pulse at both of its limits.
     """
 
-    torque: float = _limit(30.0, "largest magnitude of a pulse", "N m", 0.0, 200.0)
-    duration: float = _limit(0.5, "longest duration of a pulse", "s", 0.001, 10.0)
-    rate: float = _limit(
+    torque: float = setting(30.0, "largest magnitude of a pulse", "N m", (0.0, 200.0))
+    duration: float = setting(0.5, "longest duration of a pulse", "s", (0.001, 10.0))
+    rate: float = setting(
         0.0,
         "steepest flank of a pulse, which becomes a ramp; 0 leaves it square",
         "N m/s",
-        0.0,
-        1e6,
+        (0.0, 1e6),
     )
-    impulse: float = _limit(15.0, "largest angular impulse within a stride", "N m s", 0.0, 1e3)
-    stride: float = _limit(
-        1.0, "time that counts as a stride: no longer than the wearer's shortest", "s", 0.1, 10.0
+    impulse: float = setting(15.0, "largest angular impulse within a stride", "N m s", (0.0, 1e3))
+    stride: float = setting(
+        1.0, "time that counts as a stride: no longer than the wearer's shortest", "s", (0.1, 10.0)
     )
-    duty: float = _limit(0.9, "largest share of the time with torque", "1", 0.0, 1.0)
-    overshoot: float = _limit(
-        0.2, "share by which delivered torque and impulse may exceed their limits", "1", 0.0, 1.0
+    duty: float = setting(0.9, "largest share of the time with torque", "1", (0.0, 1.0))
+    overshoot: float = setting(
+        0.2, "share by which delivered torque and impulse may exceed their limits", "1", (0.0, 1.0)
     )
-    silence: float = _limit(
-        1.0, "longest silence of the experiment while torque may come (real time)", "s", 0.05, 60.0
+    silence: float = setting(
+        1.0,
+        "longest silence of the experiment while torque may come (real time)",
+        "s",
+        (0.05, 60.0),
     )
 
     def check_pulse(self, torque: float, duration: float) -> None:

@@ -16,10 +16,10 @@
 
 import math
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
-from gait_entrainment.conventions import Side
+from gait_entrainment.conventions import Side, setting
 from gait_entrainment.device.can_motor import ANSWER_TIMEOUT, CanMotorOptions, CanMotorRobot
 from gait_entrainment.device.faults import DeviceError
 from gait_entrainment.device.host_loop import Reading
@@ -49,16 +49,12 @@ from gait_entrainment.device.odrive import (
 class OdriveCanOptions(CanMotorOptions):
     """Bus, axis and transmission."""
 
-    node_id: int = field(
-        default=0, metadata={"meaning": "node id of the axis", "unit": "", "range": (0, 62)}
-    )
-    motor_torque: float = field(
-        default=18.0,
-        metadata={
-            "meaning": "peak torque of the motor: the axis's current limit times torque constant",
-            "unit": "N m",
-            "range": (0.01, 200.0),
-        },
+    node_id: int = setting(0, "node id of the axis", "", (0, 62))
+    motor_torque: float = setting(
+        18.0,
+        "peak torque of the motor: the axis's current limit times torque constant",
+        "N m",
+        (0.01, 200.0),
     )
 
 
