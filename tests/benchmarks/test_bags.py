@@ -166,7 +166,8 @@ def one_hour(folder: Path) -> Path:
                 ("/joint_states", states.fill(stamps, position=angle)),
                 ("/ankle_torque", torques.fill(stamps, intrinsic=angle[:, :2])),
             ):
-                writer.write_batch(name, messages, stamps.tolist(), end)
+                for message, stamp in zip(messages, stamps.tolist(), strict=True):
+                    writer.write(name, message, stamp, end)
     return folder
 
 

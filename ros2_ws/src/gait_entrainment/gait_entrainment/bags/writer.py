@@ -25,10 +25,9 @@ import shutil
 import tempfile
 import threading
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from io import FileIO
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
@@ -146,12 +145,7 @@ class BagWriter:
     def __enter__(self) -> "BagWriter":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def add_topic(self, topic: TopicInfo) -> None:
@@ -203,41 +197,25 @@ class BagWriter:
             Writing failed for another reason; `recover` rescues what reached the disk.
 
         """
-        self._write(topic, (data,), (log_time,), publish_time)
-
-    def write_batch(
-        self, topic: str, datas: Iterable[bytes], log_times: Iterable[int], publish_time: int
-    ) -> None:
-        """Record messages that came together; as `write` for each of them."""
-        self._write(topic, datas, log_times, publish_time)
-
-    def _write(
-        self, topic: str, datas: Iterable[bytes], log_times: Iterable[int], publish_time: int
-    ) -> None:
         self._require_open()
         channel = self._channels.get(topic)
         if channel is None:
             raise BagError(f"{topic}: not announced by add_topic")
-        add_message = self._writer.add_message
-        written = 0
+        if not (0 <= log_time < TIME_END and 0 <= publish_time < TIME_END):
+            raise BagError(
+                f"{topic}: a time lies outside of 0 to 2**64 - 1 ns: "
+                f"log time {log_time}, publish time {publish_time}"
+            )
         try:
-            for data, log_time in zip(datas, log_times, strict=True):
-                if not (0 <= log_time < TIME_END and 0 <= publish_time < TIME_END):
-                    raise BagError(
-                        f"{topic}: a time lies outside of 0 to 2**64 - 1 ns: "
-                        f"log time {log_time}, publish time {publish_time}"
-                    )
-                add_message(channel, log_time, data, publish_time)
-                written += 1
-                if log_time > self._last:
-                    self._last = log_time
-                if log_time < self._first:
-                    self._first = log_time
+            self._writer.add_message(channel, log_time, data, publish_time)
         except OSError as error:
             raise self._failure(error) from None
-        finally:
-            self._count += written
-            self.counts[topic] += written
+        self._count += 1
+        self.counts[topic] += 1
+        if log_time > self._last:
+            self._last = log_time
+        if log_time < self._first:
+            self._first = log_time
         self._after_write()
 
     def _after_write(self) -> None:

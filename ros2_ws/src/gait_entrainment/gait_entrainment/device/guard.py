@@ -106,11 +106,6 @@ class GuardedRobot:
         return self._active
 
     @property
-    def active(self) -> bool:
-        """Whether the device is enabled and no fault is latched."""
-        return self._active and not self.faults
-
-    @property
     def armed(self) -> bool:
         """Whether torque is allowed; a device in simulated time needs no arming."""
         return self._armed
@@ -120,11 +115,6 @@ class GuardedRobot:
         """Whether some pulse of the train has not been promised to its end."""
         train = self.train
         return train is not None and train.end(train.count - 1) > self.promised_until
-
-    @property
-    def committed(self) -> bool:
-        """Whether torque may still come: of a train under way, or promised and not yet over."""
-        return self.train is not None
 
     # Lifecycle
 
@@ -378,7 +368,7 @@ class GuardedRobot:
         """Stop the torque where the experiment falls silent while torque may come."""
         while self._watching.is_set():
             silence = time.monotonic() - self._last_heard
-            if self.committed and silence > self.limits.silence:
+            if self.train is not None and silence > self.limits.silence:
                 self.stop(EXPERIMENT_SILENT)
                 return
             time.sleep(_WATCH_PERIOD)

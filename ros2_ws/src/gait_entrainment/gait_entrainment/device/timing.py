@@ -40,9 +40,9 @@ LONGEST_GAP = 20_000_000
 
 def measured_onset(
     stamps: Sequence[int], torques: Sequence[float], height: float, fraction: float = CROSSING
-) -> int | None:
+) -> tuple[int, int] | None:
     """
-    Return the instant [ns] at which a torque first rises through a fraction of a pulse's height.
+    Find where a torque first rises through a fraction of a pulse's height.
 
     Parameters
     ----------
@@ -57,19 +57,12 @@ def measured_onset(
 
     Returns
     -------
-    int or None
-        Interpolated linearly between two states; None where the torque never gets there. A
+    (int, int) or None
+        Index of the first state past the crossing, and the instant of the crossing [ns],
+        interpolated linearly between two states; None where the torque never gets there. A
         torque that is over the threshold from the first state on has no onset in view.
 
     """
-    found = _crossing(stamps, torques, height, fraction)
-    return found[1] if found is not None else None
-
-
-def _crossing(
-    stamps: Sequence[int], torques: Sequence[float], height: float, fraction: float
-) -> tuple[int, int] | None:
-    """Return the index of the first state past the crossing, and the instant of the crossing."""
     before: tuple[int, float] | None = None
     for index, (stamp, torque) in enumerate(zip(stamps, torques, strict=True)):
         level = torque / height
@@ -156,7 +149,7 @@ class TimingAudit:
         seen = [*before[-1:], *during]
         sent = next((s.stamp for s in during if s.commanded / pulse.height > 0), None)
         stamps, torques = [s.stamp for s in seen], [s.measured for s in seen]
-        found = _crossing(stamps, torques, pulse.height, CROSSING)
+        found = measured_onset(stamps, torques, pulse.height)
         measured = None if found is None else found[1]
         if found is not None and seen[found[0]].measured == seen[found[0]].commanded:
             # Equal to the last bit: not measured but computed, and known at each of its jumps.

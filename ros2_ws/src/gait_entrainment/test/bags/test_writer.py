@@ -174,19 +174,6 @@ def test_what_the_caller_did_wrong_is_named_and_costs_nothing(tmp_path: Path) ->
         assert [message.log_time for message in reader.messages()] == [1, 2**64 - 1]
 
 
-def test_batch_is_the_same_as_single_messages(tmp_path: Path) -> None:
-    for name in ("single", "batch"):
-        with BagWriter(tmp_path / name, ros_distro="jazzy") as writer:
-            writer.add_topic(NOISE)
-            if name == "single":
-                for number in range(10):
-                    writer.write("/noise", bytes([number]), number, 99)
-            else:
-                writer.write_batch("/noise", [bytes([n]) for n in range(10)], range(10), 99)
-    with BagReader(tmp_path / "single") as single, BagReader(tmp_path / "batch") as batch:
-        assert list(single.messages()) == list(batch.messages())
-
-
 def test_custom_data_may_be_completed_until_the_end(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "walk", ros_distro="jazzy", custom_data={"a": "1"}) as writer:
         writer.custom_data["lost"] = "0"

@@ -128,7 +128,7 @@ def test_a_silent_motor_is_a_fault_and_ends_the_train():
         pulses(robot, duration=0.3)
         _, states = follow(robot, 5.0)
         assert [fault.name for fault in robot.faults] == ["device_silent"]
-        assert not robot.committed
+        assert robot.train is None
         assert states[-1].commanded == 0.0 or robot.read()[-1].commanded == 0.0
 
 
@@ -247,7 +247,7 @@ def test_a_missing_bus_or_motor_is_told_in_one_line(options, words):
     with pytest.raises(DeviceError, match=words) as error:
         robot.configure()
     assert "\n" not in str(error.value)
-    assert not robot.active
+    assert not robot.enabled
 
 
 def test_another_motors_id_is_named():

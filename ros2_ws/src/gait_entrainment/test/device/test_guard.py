@@ -83,7 +83,7 @@ def test_a_train_outside_the_limits_never_reaches_the_driver(limits, changes, wo
     with pytest.raises(LimitError, match=words):
         guard.schedule(train(**changes))
     assert "schedule" not in driver.calls
-    assert not guard.committed
+    assert guard.train is None
     assert not guard.faults
 
 
@@ -94,7 +94,7 @@ def test_a_train_outside_the_limits_never_reaches_the_driver(limits, changes, wo
 def test_a_train_at_its_limits_is_accepted(limits):
     guard, _ = ready(DeviceLimits(**limits))
     guard.schedule(train())
-    assert guard.committed
+    assert guard.train is not None
 
 
 def test_a_rate_makes_ramps():
@@ -244,7 +244,7 @@ def test_a_stop_that_meets_a_schedule_wins():
     with pytest.raises(DeviceError, match="latched"):
         guard.schedule(train())
     assert driver.calls[-1] == "stop"
-    assert not guard.committed
+    assert guard.train is None
 
 
 def test_a_silent_experiment_stops_a_real_device():

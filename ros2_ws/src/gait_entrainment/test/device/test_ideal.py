@@ -117,7 +117,7 @@ def test_what_it_must_not_deliver_is_refused_and_changes_nothing(changes, words)
     robot.promise(SECOND)
     with pytest.raises(LimitError, match=words):
         robot.schedule(train(**changes))
-    assert not robot.committed
+    assert robot.train is None
     assert robot.promise(20 * SECOND).torques == (0.0,)
 
 

@@ -45,7 +45,8 @@ MS = 1_000_000
 def test_a_linear_flank_is_crossed_exactly_between_samples(onset, rise, height, step, fraction):
     times = [k * step for k in range(1, int(150 / step))]  # [ms]
     torques = [height * min(max((t - onset) / rise, 0.0), 1.0) for t in times]
-    found = measured_onset([round(t * MS) for t in times], torques, height, fraction)
+    index, found = measured_onset([round(t * MS) for t in times], torques, height, fraction)
+    assert times[index] * MS >= found - 1
     crossing = onset + fraction * rise
     # On the flank's own line the interpolation is exact; else it lies within its sample.
     earlier = max(t for t in times if t < crossing)
@@ -63,7 +64,7 @@ def test_what_never_rises_or_was_never_low_has_no_onset():
 
 
 def test_a_torque_that_is_known_only_where_it_jumps_is_not_interpolated():
-    assert measured_onset([0, 500 * MS], [0.0, 10.0], 10.0) == 500 * MS
+    assert measured_onset([0, 500 * MS], [0.0, 10.0], 10.0) == (1, 500 * MS)
 
 
 def test_the_audit_of_an_emulated_robot_finds_its_delay_and_lag():
