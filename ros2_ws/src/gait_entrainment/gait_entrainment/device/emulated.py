@@ -151,16 +151,9 @@ class EmulatedAnkleRobot(AnkleRobot):
                     torques.append(torque)
                 last = torque
             self._tick += 1
-        onsets = []
-        if train is not None:
-            for number in range(max(train.latest(begin), 0), train.count):
-                onset = train.onset(number)
-                if onset >= until:
-                    break
-                if onset >= begin:
-                    onsets.append(onset)
         self._promised = until
-        return TorqueProfile(self._side, tuple(times), tuple(torques), tuple(onsets), until)
+        onsets = train.onsets_within(begin, until) if train is not None else ()
+        return TorqueProfile(self._side, tuple(times), tuple(torques), onsets, until)
 
     def read(self) -> Sequence[RobotState]:
         """Return the states that were due."""

@@ -181,12 +181,9 @@ class HostTimedRobot(AnkleRobot):
                 torques.append(torque)
         self._held = torques[-1]
         self._promised = end
-        train, onsets = self._train, []
-        if train is not None:
-            first, last = train.latest(begin), train.latest(end - 1)
-            numbers = range(max(first, 0), last + 1)
-            onsets = [o for o in map(train.onset, numbers) if begin <= o < end]
-        return TorqueProfile(self._side, tuple(times), tuple(torques), tuple(onsets), end)
+        train = self._train
+        onsets = train.onsets_within(begin, end) if train is not None else ()
+        return TorqueProfile(self._side, tuple(times), tuple(torques), onsets, end)
 
     def read(self) -> Sequence[RobotState]:
         """Return one state for each command that was answered, and each tick without an answer."""

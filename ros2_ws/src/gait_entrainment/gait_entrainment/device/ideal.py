@@ -81,23 +81,21 @@ class IdealAnkleRobot(AnkleRobot):
 
     def promise(self, until: int) -> TorqueProfile:
         """Return the torque from the last promise up to ``until`` [ns]."""
-        begin = self._promised
-        times, torques, onsets = [begin], [0.0], []
-        for onset, pieces in self._pulses(begin, until):
-            for instant, value in pieces:
-                if instant <= begin:
-                    torques[0] = value
-                elif instant < until:
-                    times.append(instant)
-                    torques.append(value)
-            if onset >= begin:
-                onsets.append(onset)
+        begin, train = self._promised, self._train
+        times, torques = [begin], [0.0]
+        for instant, value in _changes(train, begin, until) if train is not None else ():
+            if instant <= begin:
+                torques[0] = value
+            elif instant < until:
+                times.append(instant)
+                torques.append(value)
         self._promised = until
         self._states += [
             RobotState(instant, torque, torque, math.nan)
             for instant, torque in zip(times, torques, strict=True)
         ]
-        return TorqueProfile(self._side, tuple(times), tuple(torques), tuple(onsets), until)
+        onsets = train.onsets_within(begin, until) if train is not None else ()
+        return TorqueProfile(self._side, tuple(times), tuple(torques), onsets, until)
 
     def read(self) -> Sequence[RobotState]:
         """Return one state for each change of torque."""
@@ -117,18 +115,15 @@ class IdealAnkleRobot(AnkleRobot):
         """Drop the train."""
         self._train = None
 
-    def _pulses(self, begin: int, until: int) -> Iterator[tuple[int, list[tuple[int, float]]]]:
-        """Yield onset and torque changes of every pulse that is on somewhere in [begin, until)."""
-        train = self._train
-        if train is None:
-            return
-        # The pulse that began last may still be on at the beginning of this stretch.
-        for number in range(max(train.latest(begin), 0), train.count):
-            onset, end = train.onset(number), train.end(number)
-            if onset >= until:
-                return
-            if end > begin:
-                yield onset, [*_pieces(train, onset, end), (end, 0.0)]
+
+def _changes(train: PulseTrain, begin: int, until: int) -> Iterator[tuple[int, float]]:
+    """Yield the changes of torque of every pulse that is on somewhere in [begin, until)."""
+    # The pulse that began last may still be on at the beginning of this stretch.
+    for number in range(max(train.latest(begin), 0), train.latest(until - 1) + 1):
+        onset, end = train.onset(number), train.end(number)
+        if end > begin:
+            yield from _pieces(train, onset, end)
+            yield end, 0.0
 
 
 def _pieces(train: PulseTrain, onset: int, end: int) -> Iterator[tuple[int, float]]:

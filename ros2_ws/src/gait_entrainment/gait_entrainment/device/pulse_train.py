@@ -54,6 +54,11 @@ class PulseTrain:
             number -= 1
         return number
 
+    def onsets_within(self, begin: int, end: int) -> tuple[int, ...]:
+        """Return the onsets [ns] that lie in [begin, end)."""
+        numbers = range(max(self.latest(begin), 0), self.latest(end - 1) + 1)
+        return tuple(onset for onset in map(self.onset, numbers) if begin <= onset)
+
     def torque_at(self, instant: int) -> float:
         """Return the torque [N m] asked for at an instant [ns]."""
         number = self.latest(instant)
