@@ -20,7 +20,6 @@ subscriptions have been matched, so that nothing of the start is lost. It is the
 /clock: ticks lie at fixed instants of the bag, the same at every rate.
 """
 
-import importlib
 import math
 import struct
 import sys
@@ -48,7 +47,8 @@ from gait_entrainment.bags import (
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment_msgs.srv import Burst, GetRate, IsPaused, Play, Seek, SetRate
 from gait_entrainment_nodes.lateness import Lateness
-from gait_entrainment_nodes.node import Participant, declare, run_node
+from gait_entrainment_nodes.node import Participant, declare, declare_texts, run_node
+from gait_entrainment_nodes.raw_messages import message_class
 from gait_entrainment_nodes.stamps import to_nanoseconds
 from gait_entrainment_nodes.topics import CLOCK, Topic
 
@@ -77,27 +77,25 @@ class BagPlayer(Participant, Node):
             1.0,
             "seconds of the bag per second; 0 for as fast as it goes",
             unit="1",
-            minimum=0.0,
-            maximum=1e6,
+            within=(0.0, 1e6),
             read_only=False,
         )
         loop = declare(self, "loop", False, "begin again at the end")
         paused = declare(self, "start_paused", False, "start paused")
         start_offset = _seconds(self, "start_offset", 0.0, "where in the bag to start")
         duration = _seconds(self, "duration", 0.0, "how much of it to play; 0: all")
-        topics = _texts(self, "topics", "topics to play, * for any text; empty plays all")
-        excluded = _texts(self, "exclude", "topics to leave out, * for any text")
-        remaps = _texts(self, "remap", "other names for topics: /from:=/to")
+        topics = declare_texts(self, "topics", "topics to play, * for any text; empty plays all")
+        excluded = declare_texts(self, "exclude", "topics to leave out, * for any text")
+        remaps = declare_texts(self, "remap", "other names for topics: /from:=/to")
         clock_rate = declare(
             self,
             "clock",
             40.0,
             "ticks of /clock per second of the bag; 0: none, a recorded /clock is played",
             unit="Hz",
-            minimum=0.0,
-            maximum=1000.0,
+            within=(0.0, 1000.0),
         )
-        self.expected = _texts(
+        self.expected = declare_texts(
             self,
             "expect",
             "topics that must have a subscription before the first message; one that must have "
@@ -177,8 +175,7 @@ class BagPlayer(Participant, Node):
                 continue
             try:
                 installed = find_definition(topic.type)
-                package, kind, message = topic.type.split("/")
-                message_type = getattr(importlib.import_module(f"{package}.{kind}"), message)
+                message_type = message_class(topic.type)
             except (DefinitionMissingError, ImportError, AttributeError) as error:
                 self.get_logger().error(f"{name} is not played: {error}")
                 continue
@@ -392,14 +389,9 @@ def clock_message(instant: int) -> bytes:
     return _CDR_LITTLE_ENDIAN + struct.pack("<iI", sec, nanosec)
 
 
-def _texts(node: Node, name: str, description: str) -> list[str]:
-    """Declare a parameter that holds texts; ROS cannot tell the type of an empty list."""
-    return [text for text in declare(node, name, [""], description) if text]
-
-
 def _seconds(node: Node, name: str, default: float, description: str) -> float:
     """Declare a parameter that holds a length of time."""
-    return float(declare(node, name, default, description, unit="s", minimum=0.0, maximum=1e9))
+    return float(declare(node, name, default, description, unit="s", within=(0.0, 1e9)))
 
 
 def _split_remap(remap: str) -> tuple[str, str]:

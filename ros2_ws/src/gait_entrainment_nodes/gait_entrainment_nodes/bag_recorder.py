@@ -21,7 +21,6 @@ against those of the publishers. Where the disk is full the recording ends, clos
 the run goes on unless the record is required.
 """
 
-import importlib
 import json
 import os
 import struct
@@ -52,7 +51,8 @@ from gait_entrainment.bags import (
 from gait_entrainment.bags import QosProfile as OfferedQos
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment_msgs.msg import Progress, PublishedCounts
-from gait_entrainment_nodes.node import Participant, declare, run_node
+from gait_entrainment_nodes.node import Participant, declare, declare_texts, run_node
+from gait_entrainment_nodes.raw_messages import message_class
 from gait_entrainment_nodes.topics import (
     ANKLE_TORQUE,
     GAIT_EVENTS,
@@ -86,20 +86,10 @@ class BagRecorder(Participant, Node):
         output = declare(self, "output", "", "folder of the bag, which must not exist yet")
         if not output:
             raise ValueError("output: is empty; give the folder of the bag to make")
-        chosen = declare(
-            self,
-            "topics",
-            [""],
-            "topics to record, fully qualified; empty records all below the node's namespace",
-        )
-        self.chosen = {topic for topic in chosen if topic}
-        expected = declare(
-            self,
-            "publishers",
-            [""],
-            "nodes whose final counts end the recording; empty records until stopped",
-        )
-        self.expected = {name for name in expected if name}
+        chosen = "topics to record, fully qualified; empty records all below the node's namespace"
+        self.chosen = set(declare_texts(self, "topics", chosen))
+        expected = "nodes whose final counts end the recording; empty records until stopped"
+        self.expected = set(declare_texts(self, "publishers", expected))
         custom_data = declare(
             self, "custom_data", "{}", "what else belongs to the record: a JSON object of texts"
         )
@@ -109,8 +99,7 @@ class BagRecorder(Participant, Node):
             0,
             "begin a new file once one is so large; 0: never",
             unit="byte",
-            minimum=0,
-            maximum=2**62,
+            within=(0, 2**62),
         )
         max_duration = declare(
             self,
@@ -118,8 +107,7 @@ class BagRecorder(Participant, Node):
             0.0,
             "begin a new file once one spans so much ROS time; 0: never",
             unit="s",
-            minimum=0.0,
-            maximum=1e9,
+            within=(0.0, 1e9),
         )
         self.required = declare(
             self, "required", False, "end, and with it the run, where nothing more can be written"
@@ -182,7 +170,7 @@ class BagRecorder(Participant, Node):
             self.seen.add(name)
             try:
                 definition = find_definition(types[0])
-                message_type = _message_type(types[0])
+                message_type = message_class(types[0])
             except (DefinitionMissingError, ImportError, AttributeError) as error:
                 self.get_logger().error(f"{name} is not recorded: {error}")
                 continue
@@ -403,12 +391,6 @@ def _texts(custom_data: str) -> dict[str, str]:
     if not isinstance(texts, dict) or not all(isinstance(text, str) for text in texts.values()):
         raise ValueError(f"custom_data: {custom_data!r}; allowed: a JSON object of texts")
     return texts
-
-
-def _message_type(name: str) -> Any:
-    """Return the Python class of a message type such as sensor_msgs/msg/JointState."""
-    package, kind, message = name.split("/")
-    return getattr(importlib.import_module(f"{package}.{kind}"), message)
 
 
 def _first_field(schema_text: str) -> str:

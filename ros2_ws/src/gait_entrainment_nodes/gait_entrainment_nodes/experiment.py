@@ -90,8 +90,7 @@ class Experiment(Participant, Node):
             "upper bound of the horizon's lead, which never exceeds a stride; "
             "short in real time, so that more can be decided late",
             unit="s",
-            minimum=0.05,
-            maximum=10.0,
+            within=(0.05, 10.0),
             read_only=False,
         )
         declare(
@@ -100,8 +99,7 @@ class Experiment(Participant, Node):
             3.0,
             "a participant that owes an answer for so long ends the run",
             unit="s",
-            minimum=0.1,
-            maximum=60.0,
+            within=(0.1, 60.0),
             read_only=False,
         )
         declare(
@@ -110,8 +108,7 @@ class Experiment(Participant, Node):
             30.0,
             "how long to wait for the participants before a run",
             unit="s",
-            minimum=1.0,
-            maximum=600.0,
+            within=(1.0, 600.0),
             read_only=False,
         )
         self.protocol = declare(

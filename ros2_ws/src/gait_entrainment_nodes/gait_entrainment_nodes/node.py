@@ -345,8 +345,7 @@ def declare(
     description: str,
     *,
     unit: str = "",
-    minimum: float | None = None,
-    maximum: float | None = None,
+    within: tuple[float, float] | None = None,
     choices: Sequence[str] = (),
     read_only: bool = True,
 ) -> Any:
@@ -364,16 +363,15 @@ def declare(
     allowed = f"a value like {default!r}"
     if choices:
         allowed = descriptor.additional_constraints = ", ".join(choices)
-    if minimum is not None and maximum is not None:
-        allowed = f"{minimum:g} to {maximum:g}" + (f" {unit}" if unit not in ("", "1") else "")
+    if within is not None:
+        low, high = within
+        allowed = f"{low:g} to {high:g}" + (f" {unit}" if unit not in ("", "1") else "")
         if isinstance(default, int):
-            descriptor.integer_range = [
-                IntegerRange(from_value=int(minimum), to_value=int(maximum))
-            ]
+            whole = IntegerRange(from_value=int(low), to_value=int(high))
+            descriptor.integer_range = [whole]
         else:
-            descriptor.floating_point_range = [
-                FloatingPointRange(from_value=float(minimum), to_value=float(maximum))
-            ]
+            real = FloatingPointRange(from_value=float(low), to_value=float(high))
+            descriptor.floating_point_range = [real]
     try:
         return node.declare_parameter(name, default, descriptor).value
     except (InvalidParameterValueException, InvalidParameterTypeException):
@@ -381,6 +379,11 @@ def declare(
         if isinstance(default, float) and type(given) is int:
             allowed = f"a number with a decimal point, such as {float(given)!r}"
         raise ValueError(f"{name}: {given!r}; allowed: {allowed}") from None
+
+
+def declare_texts(node: Node, name: str, description: str) -> list[str]:
+    """Declare a parameter that holds texts; ROS cannot tell the type of an empty list."""
+    return [text for text in declare(node, name, [""], description) if text]
 
 
 def declare_side(node: Node, name: str, description: str) -> None:
@@ -402,15 +405,13 @@ def declare_fields(node: Node, dataclass_type: Any, prefix: str = "") -> None:
     The fields' metadata say meaning, unit and range.
     """
     for f in fields(dataclass_type):
-        low, high = f.metadata["range"]
         declare(
             node,
             prefix + f.name,
             f.default,
             f.metadata["meaning"],
             unit=f.metadata["unit"],
-            minimum=low,
-            maximum=high,
+            within=f.metadata["range"],
             read_only=False,
         )
 

@@ -89,8 +89,7 @@ class Perturbator(Participant, LifecycleNode):
             0,
             "seed of a driver that draws random numbers",
             unit="1",
-            minimum=0,
-            maximum=2**32 - 1,
+            within=(0, 2**32 - 1),
             read_only=False,
         )
         declare(

@@ -24,6 +24,7 @@ is serialized by ROS itself with marked numbers, the marks are found in its byte
 on a whole stretch of samples becomes one array of bytes.
 """
 
+import importlib
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from typing import Any
@@ -54,6 +55,12 @@ _SIZES = {
 }
 # Clears the gaps of one value in the bytes, from a place on; returns the place behind the value.
 _Clear = Callable[[bytearray, int, Any], int]
+
+
+def message_class(name: str) -> Any:
+    """Return the Python class of a message type such as sensor_msgs/msg/JointState."""
+    package, kind, message = name.split("/")
+    return getattr(importlib.import_module(f"{package}.{kind}"), message)
 
 
 def serialize(message: Any) -> bytes:

@@ -74,23 +74,18 @@ class WalkerDisplay(Participant, Node):
 
     def __init__(self) -> None:
         super().__init__("walker_display")
-        leg_length = declare(
-            self, "leg_length", 1.0, "leg length", unit="m", minimum=0.1, maximum=10.0
-        )
+        leg_length = declare(self, "leg_length", 1.0, "leg length", unit="m", within=(0.1, 10.0))
         foot_length = declare(
-            self, "foot_length", 0.2, "foot length", unit="m", minimum=0.01, maximum=10.0
+            self, "foot_length", 0.2, "foot length", unit="m", within=(0.01, 10.0)
         )
-        rate = declare(
-            self, "rate", 50.0, "pictures per second", unit="Hz", minimum=10.0, maximum=1000.0
-        )
+        rate = declare(self, "rate", 50.0, "pictures per second", unit="Hz", within=(10.0, 1000.0))
         self.scale = declare(
             self,
             "torque_scale",
             0.035,
             "angle of an arc per torque",
             unit="rad/(N m)",
-            minimum=0.0,
-            maximum=1.0,
+            within=(0.0, 1.0),
         )
         self.frame_prefix = declare(
             self, "frame_prefix", "", "of every frame but world, such as walker_1/"

@@ -89,8 +89,7 @@ class WalkerSim(Participant, Node):
             200.0,
             "rate of the sampled topics; 0 samples at gait events only",
             unit="Hz",
-            minimum=0.0,
-            maximum=1000.0,
+            within=(0.0, 1000.0),
             read_only=False,
         )
         self.real_time = declare(self, "real_time", False, "pace by the wall clock")
@@ -100,8 +99,7 @@ class WalkerSim(Participant, Node):
             0.0,
             "real time: wall time minus the instant that is sent",
             unit="s",
-            minimum=0.0,
-            maximum=1.0,
+            within=(0.0, 1.0),
             read_only=False,
         )
         self.acknowledged = declare(
