@@ -50,13 +50,7 @@ def diagnostics_of(bag):
 def test_verdict_and_locked_lag_agree_with_the_simulation(real_time_run):
     bag, outcome = real_time_run
     simulation = simulate(protocol_of(*OPTIONS))
-    expected = outcome_of(
-        simulation.protocol,
-        simulation.analysis,
-        simulation.events,
-        simulation.measured_period,
-        simulation.train.period,
-    )
+    expected = outcome_of(simulation)
     assert expected["verdict"] == outcome["verdict"] == "entrained"
     # What came late or not at all is the timing error that the run itself states.
     values = diagnostics_of(bag)

@@ -19,6 +19,7 @@ Conductor, ankle robot and walker are the objects that the nodes hold, driven in
 which a lock-step run drives them. So both give the same events to the nanosecond.
 """
 
+import math
 from dataclasses import dataclass
 
 from gait_entrainment.analysis import Analysis, VerdictSettings, analyze
@@ -48,6 +49,11 @@ class Simulation:
     measured_period: float  # mean stride period over the baseline [s]; NaN without a plan
     ending: Ending | None  # fall or fly-off; None where every stride was walked
     analysis: Analysis
+
+    @property
+    def pulse_period(self) -> float:
+        """Period of the pulses as planned [s]; NaN without a plan."""
+        return self.train.period if self.train is not None else math.nan
 
 
 def simulate(

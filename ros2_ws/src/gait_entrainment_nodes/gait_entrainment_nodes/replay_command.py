@@ -150,14 +150,7 @@ def report(
     differing, compared = differences(options.bag, results)
     names = ("strides", "pulse phases", "verdicts")
     counts = dict(zip(names, (len(messages) for messages in results.values()), strict=True))
-    outcome = outcome_of(
-        recorded.protocol,
-        recorded.analysis,
-        recorded.events,
-        recorded.measured_period,
-        recorded.pulse_period,
-    )
-    outcome |= {
+    outcome = outcome_of(recorded) | {
         "bag": str(options.bag),
         "replayed": counts,
         "as_published_live": not differing if compared else None,

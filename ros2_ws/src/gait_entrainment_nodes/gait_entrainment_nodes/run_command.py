@@ -16,7 +16,6 @@
 
 import argparse
 import json
-import math
 import os
 import shutil
 import signal
@@ -297,26 +296,12 @@ def walker_timing(bag: Path) -> dict[str, float]:
 
 def report(bag: Path, options: argparse.Namespace) -> int:
     """Print the outcome from the bag and draw its figures."""
-    from gait_entrainment.report.pulse_timing import timing_outcome, timing_summary
+    from gait_entrainment.report.pulse_timing import timing_summary
     from gait_entrainment.report.recorded_run import read_run
-    from gait_entrainment.report.summary import outcome_of, summary
+    from gait_entrainment.report.summary import messages_line, recorded_outcome, summary
 
     recorded = read_run(bag)
-    outcome = outcome_of(
-        recorded.protocol,
-        recorded.analysis,
-        recorded.events,
-        recorded.measured_period,
-        recorded.pulse_period,
-    )
-    factor = recorded.real_time_factor
-    outcome |= {
-        "bag": str(bag),
-        "messages": recorded.messages,
-        "lost": recorded.lost,
-        "real_time_factor": None if math.isnan(factor) else factor,
-        "pulse_timing": timing_outcome(recorded.timings, recorded.measured_period),
-    }
+    outcome = recorded_outcome(recorded, bag)
     timing = walker_timing(bag)
     lateness = {
         name: timing[f"publish_late_{name}_ms"]
@@ -337,7 +322,7 @@ def report(bag: Path, options: argparse.Namespace) -> int:
         return 0
     for line in (summary(outcome), *timing_summary(outcome["pulse_timing"])):
         print(line)
-    if not math.isnan(factor):
+    if (factor := outcome["real_time_factor"]) is not None:
         print(f"speed            {factor:.0f} times real time")
     if lateness:
         print(
@@ -350,10 +335,7 @@ def report(bag: Path, options: argparse.Namespace) -> int:
             f" {timing['late_ms']:.1f} ms in all, {timing['starved_stretches']:.0f} stretches of"
             f" {timing['starved_ms']:.1f} ms walked without torque: not reproducible"
         )
-    left_out = f", {recorded.lost} lost"
-    if recorded.ended_early:
-        left_out = f"; the recording ended early: {recorded.ended_early}"
-    print(f"messages         {recorded.messages} recorded{left_out}")
+    print(messages_line(recorded))
     print(f"bag              {bag}")
     for figure in figures:
         print(f"figure           {figure}")

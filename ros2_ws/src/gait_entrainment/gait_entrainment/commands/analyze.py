@@ -16,7 +16,6 @@
 
 import argparse
 import json
-import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -50,9 +49,9 @@ def run(options: argparse.Namespace) -> int:
     """Analyze and print; 1 where the bag cannot be analyzed, 2 where there is none."""
     # Imported here: other commands do without the readers.
     from gait_entrainment.bags import BagError
-    from gait_entrainment.report.pulse_timing import timing_outcome, timing_summary
+    from gait_entrainment.report.pulse_timing import timing_summary
     from gait_entrainment.report.recorded_run import read_run
-    from gait_entrainment.report.summary import outcome_of, summary
+    from gait_entrainment.report.summary import messages_line, recorded_outcome, summary
 
     if not options.bag.exists():
         print(f"entrain analyze: {options.bag}: no such file or folder", file=sys.stderr)
@@ -61,7 +60,6 @@ def run(options: argparse.Namespace) -> int:
     try:
         drawn = options.figures is not None
         recorded = read_run(options.bag, torques=drawn, onset=options.onset)
-        timing = timing_outcome(recorded.timings, recorded.measured_period)
         if drawn:
             from gait_entrainment.report.figures import draw_figures
 
@@ -70,33 +68,18 @@ def run(options: argparse.Namespace) -> int:
     except (BagError, OSError) as error:
         print(f"entrain analyze: {error}", file=sys.stderr)
         return 1
-    factor = recorded.real_time_factor
-    outcome = outcome_of(
-        recorded.protocol,
-        recorded.analysis,
-        recorded.events,
-        recorded.measured_period,
-        recorded.pulse_period,
-    ) | {
-        "bag": str(options.bag),
-        "messages": recorded.messages,
-        "lost": recorded.lost,
+    outcome = recorded_outcome(recorded, options.bag) | {
         "ended_early": recorded.ended_early or None,
-        "pulse_timing": timing,
-        "real_time_factor": None if math.isnan(factor) else factor,
         "as_published_live": (None if recorded.differences is None else not recorded.differences),
         "differences": list(recorded.differences or ()),
     }
     if options.json:
         print(json.dumps(outcome))
         return 0
-    for line in (summary(outcome), *timing_summary(timing)):
+    for line in (summary(outcome), *timing_summary(outcome["pulse_timing"])):
         print(line)
     print(f"live analysis    {_comparison(recorded.differences)}")
-    left_out = "" if recorded.lost is None else f", {recorded.lost} lost"
-    if recorded.ended_early:
-        left_out = f"; the recording ended early: {recorded.ended_early}"
-    print(f"messages         {recorded.messages} recorded{left_out}")
+    print(messages_line(recorded))
     for figure in figures:
         print(f"figure           {figure}")
     return 0

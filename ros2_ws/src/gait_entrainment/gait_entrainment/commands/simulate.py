@@ -16,7 +16,6 @@
 
 import argparse
 import json
-import math
 import sys
 from typing import Any
 
@@ -59,13 +58,7 @@ def run(options: argparse.Namespace) -> int:
     except (ProtocolError, LimitError, DeviceError) as error:
         print(f"entrain simulate: {error}", file=sys.stderr)
         return 2 if isinstance(error, ProtocolError) else 1
-    outcome = outcome_of(
-        protocol,
-        simulation.analysis,
-        simulation.events,
-        simulation.measured_period,
-        simulation.train.period if simulation.train else math.nan,
-    )
+    outcome = outcome_of(simulation)
     outcome["pulse_timing"] = timing_outcome(simulation.timings, simulation.measured_period)
     lines = [summary(outcome), *timing_summary(outcome["pulse_timing"])]
     print(json.dumps(outcome) if options.json else "\n".join(lines))

@@ -18,37 +18,25 @@ import math
 import statistics
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from gait_entrainment.analysis import Analysis, Verdict
+from gait_entrainment.analysis import Verdict
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind
 from gait_entrainment.events import GaitEvent
-from gait_entrainment.protocol import Protocol
+from gait_entrainment.report.pulse_timing import timing_outcome
+
+if TYPE_CHECKING:
+    from gait_entrainment.report.recorded_run import RecordedRun
+    from gait_entrainment.simulation import Simulation
 
 # Pulses whose lags make up the final one: the paper's locked gait repeats itself exactly.
 FINAL_PULSES = 5
 
 
-def outcome_of(
-    protocol: Protocol,
-    analysis: Analysis,
-    events: Sequence[GaitEvent],
-    measured_period: float,
-    pulse_period: float,
-) -> dict[str, Any]:
-    """
-    Return what ``--json`` prints; times in seconds, None where something is not known.
-
-    Parameters
-    ----------
-    protocol
-        What was conducted.
-    analysis, events
-        What came of it.
-    measured_period, pulse_period
-        Stride period over the baseline and period of the pulses [s], NaN where never planned.
-
-    """
+def outcome_of(run: "Simulation | RecordedRun") -> dict[str, Any]:
+    """Return what ``--json`` prints; times in seconds, None where something is not known."""
+    protocol, analysis = run.protocol, run.analysis
     strides = [s for s in analysis.strides if s.number <= protocol.strides]
     start = strides[0].start if strides else 0
     last = analysis.entrainments[-1] if analysis.entrainments else None
@@ -61,8 +49,8 @@ def outcome_of(
     parameters["pulses"]["torque"] = protocol.pulse_torque
     outcome: dict[str, Any] = _without_nan(
         {
-            "unperturbed_stride_period": measured_period,
-            "perturbation_period": pulse_period,
+            "unperturbed_stride_period": run.measured_period,
+            "perturbation_period": run.pulse_period,
             "stride_period": [stride.period for stride in strides],
             "pulses": [
                 {
@@ -76,11 +64,31 @@ def outcome_of(
             "entrained": entrained,
             "entrained_since_stride": last.entrained_since_stride if last and entrained else None,
             "final_phase_lag": statistics.median(lags) if lags else math.nan,
-            "double_stance": _double_stance(events, toe_off),
+            "double_stance": _double_stance(run.events, toe_off),
             "parameters": parameters,
         }
     )
     return outcome
+
+
+def recorded_outcome(run: "RecordedRun", bag: Path) -> dict[str, Any]:
+    """Return the outcome of a run, and what its bag tells of how it went."""
+    factor = run.real_time_factor
+    return outcome_of(run) | {
+        "bag": str(bag),
+        "messages": run.messages,
+        "lost": run.lost,
+        "real_time_factor": None if math.isnan(factor) else factor,
+        "pulse_timing": timing_outcome(run.timings, run.measured_period),
+    }
+
+
+def messages_line(run: "RecordedRun") -> str:
+    """Say how many messages were recorded, and what is missing."""
+    left_out = "" if run.lost is None else f", {run.lost} lost"
+    if run.ended_early:
+        left_out = f"; the recording ended early: {run.ended_early}"
+    return f"messages         {run.messages} recorded{left_out}"
 
 
 def summary(outcome: dict[str, Any]) -> str:

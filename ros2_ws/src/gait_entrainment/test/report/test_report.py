@@ -27,7 +27,7 @@ from gait_entrainment.protocol import Protocol, PulsePlan
 from gait_entrainment.report.figures import draw_figures
 from gait_entrainment.report.recorded_run import AnkleTorques, RecordedRun
 from gait_entrainment.report.summary import outcome_of, summary
-from gait_entrainment.simulation import simulate
+from gait_entrainment.simulation import Simulation, simulate
 
 
 @pytest.fixture(scope="module")
@@ -35,19 +35,8 @@ def simulation():
     return simulate(Protocol())
 
 
-def outcome(simulation):
-    train = simulation.train
-    return outcome_of(
-        simulation.protocol,
-        simulation.analysis,
-        simulation.events,
-        simulation.measured_period,
-        train.period if train else math.nan,
-    )
-
-
 def test_the_final_lag_is_told_with_its_place_in_double_stance(simulation):
-    told = outcome(simulation)
+    told = outcome_of(simulation)
     pulse = simulation.analysis.pulses[-1]
     # Of the perturbed leg's toe-off and the other leg's strike before it, straight from events.
     strike = max(e.stamp for e in simulation.events if not e.kind and e.stamp < pulse.toe_off)
@@ -59,7 +48,8 @@ def test_the_final_lag_is_told_with_its_place_in_double_stance(simulation):
 
 def test_what_is_not_known_is_null_in_json():
     protocol = Protocol(baseline=2, washout=0, pulses=PulsePlan(count=1))
-    told = outcome_of(protocol, analyze([], [], Side.RIGHT), [], math.nan, math.nan)
+    nothing = analyze([], [], Side.RIGHT)
+    told = outcome_of(Simulation(protocol, (), (), (), None, math.nan, None, nothing))
     text = json.dumps(told, allow_nan=False)
     assert json.loads(text)["unperturbed_stride_period"] is None
     assert json.loads(text)["verdict"] == "undecided"
