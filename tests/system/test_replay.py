@@ -73,8 +73,8 @@ def offline(bag: Path) -> dict[str, list[bytes]]:
     """Analyze without ROS; return what a node would have published of it."""
     run = read_run(bag, torques=False)
     node: Any = SimpleNamespace(run_number=1, side=run.protocol.side)
-    strides = (GaitAnalyzerNode.stride_message(node, s) for s in run.analysis.strides)
-    pulses = (GaitAnalyzerNode.pulse_message(node, p) for p in run.analysis.pulses)
+    strides = (GaitAnalyzerNode.message_of(node, s) for s in run.analysis.strides)
+    pulses = (GaitAnalyzerNode.message_of(node, p) for p in run.analysis.pulses)
     return {
         "/gait/strides": [serialize(message) for message in strides],
         "/gait/pulse_phases": [serialize(message) for message in pulses],

@@ -54,3 +54,8 @@ def nanoseconds(seconds: float) -> int:
     the start stamp.
     """
     return round(seconds * NANOSECONDS_PER_SECOND)
+
+
+def stamp_nanoseconds(stamp: Any) -> int:
+    """Return a ROS stamp or duration, decoded by whatever reader, as integer nanoseconds."""
+    return int(stamp.sec) * NANOSECONDS_PER_SECOND + int(stamp.nanosec)

@@ -27,7 +27,13 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-from gait_entrainment.analysis import Entrainment, GaitAnalyzer, PulsePhase, VerdictSettings
+from gait_entrainment.analysis import (
+    Entrainment,
+    GaitAnalyzer,
+    PulsePhase,
+    VerdictSettings,
+    published_values,
+)
 from gait_entrainment.analysis.analyzer import Result
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.device import MeasuredOnsets, RobotState
@@ -52,9 +58,16 @@ from gait_entrainment_nodes.topics import (
     STRIDES,
     TORQUE_PROFILE,
     WALKER_PROGRESS,
+    Topic,
 )
 
 ONSETS = ("commanded", "measured")
+# Where each kind of result is published.
+RESULTS: dict[type, Topic] = {
+    Stride: STRIDES,
+    PulsePhase: PULSE_PHASES,
+    Entrainment: ENTRAINMENT,
+}
 
 
 class GaitAnalyzerNode(Participant, Node):
@@ -74,9 +87,7 @@ class GaitAnalyzerNode(Participant, Node):
             raise ValueError(f"onset: {self.onset!r}; allowed: {', '.join(ONSETS)}")
         declare_fields(self, VerdictSettings, "verdict.")
         self.begin_participation()
-        self.strides = self.publisher(STRIDES)
-        self.pulse_phases = self.publisher(PULSE_PHASES)
-        self.entrainment = self.publisher(ENTRAINMENT)
+        self.result_publishers = {kind: self.publisher(topic) for kind, topic in RESULTS.items()}
         self.begin_run(0)
         self.subscription(GAIT_EVENTS, self.on_event)
         self.subscription(TORQUE_PROFILE, self.on_profile)
@@ -224,58 +235,15 @@ class GaitAnalyzerNode(Participant, Node):
     def publish(self, results: list[Result]) -> None:
         """Publish results in the order in which the core gave them."""
         for result in results:
-            if isinstance(result, Stride):
-                self.strides.publish(self.stride_message(result))
-            elif isinstance(result, PulsePhase):
-                self.pulse_phases.publish(self.pulse_message(result))
-            else:
-                self.entrainment.publish(self.entrainment_message(result))
+            self.result_publishers[type(result)].publish(self.message_of(result))
 
-    def stride_message(self, stride: Stride) -> msg.Stride:
-        """Convert a stride."""
-        return msg.Stride(
-            header=header(stride.end),
-            run=self.run_number,
-            side=stride.side,
-            number=stride.number,
-            start=to_time(stride.start),
-            period=stride.period,
-            step_periods=stride.step_periods,
-        )
-
-    def pulse_message(self, pulse: PulsePhase) -> msg.PulsePhase:
-        """Convert a pulse phase; the lag is NaN where the toe-off is missing."""
-        return msg.PulsePhase(
-            header=header(pulse.onset),
-            run=self.run_number,
-            side=self.side,
-            number=pulse.number,
-            stride=pulse.stride,
-            phase=pulse.phase,
-            phase_lag=pulse.phase_lag,
-            unwrapped_lag=pulse.unwrapped_lag,
-            toe_off=to_time(pulse.toe_off or 0),
-        )
-
-    def entrainment_message(self, entrainment: Entrainment) -> msg.Entrainment:
-        """Convert a verdict."""
-        return msg.Entrainment(
-            header=header(entrainment.stamp),
-            run=self.run_number,
-            side=self.side,
-            verdict=entrainment.verdict,
-            stride=entrainment.stride,
-            since_stride=entrainment.since_stride,
-            unperturbed_period=entrainment.unperturbed_period,
-            unperturbed_period_error=entrainment.unperturbed_period_error,
-            pulse_period=entrainment.pulse_period,
-            mean_period=entrainment.mean_period,
-            drift=entrainment.drift,
-            drift_interval=entrainment.drift_interval,
-            autocorrelation=entrainment.autocorrelation,
-            phase_locking_value=entrainment.phase_locking_value,
-            entrained_since_stride=entrainment.entrained_since_stride or 0,
-        )
+    def message_of(self, result: Result) -> Any:
+        """Convert a result."""
+        values = published_values(result, self.side) | {"run": self.run_number}
+        values["header"] = header(values["header"])
+        for name in values.keys() & {"start", "toe_off"}:
+            values[name] = to_time(values[name])
+        return RESULTS[type(result)].type(**values)
 
 
 def main() -> int:

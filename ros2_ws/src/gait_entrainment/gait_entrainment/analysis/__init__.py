@@ -16,10 +16,12 @@
 
 from gait_entrainment.analysis.analyzer import Analysis, GaitAnalyzer, PulseCounts, analyze
 from gait_entrainment.analysis.drift import Drift, drift_of
+from gait_entrainment.analysis.published import published_values
 from gait_entrainment.analysis.pulse_phase import PulsePhase
 from gait_entrainment.analysis.verdict import Entrainment, Verdict, VerdictSettings
 
 __all__ = [
+    "published_values",
     "Analysis",
     "Drift",
     "Entrainment",

@@ -31,7 +31,7 @@ from gait_entrainment.bags.definitions import BUILT_IN_TYPES, schema_parts
 from gait_entrainment.bags.errors import BagError, BagExistsError, BagWriteError
 from gait_entrainment.bags.metadata import TopicInfo, first_line
 from gait_entrainment.bags.reader import BagReader
-from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
+from gait_entrainment.conventions import stamp_nanoseconds
 
 FORMATS = ("csv", "parquet")
 
@@ -251,7 +251,7 @@ def _element_columns(
     example: Any,
 ) -> Iterator[Column]:
     if type_name in _INSTANTS:
-        yield Column(path, "ns", "int", lambda message: _nanoseconds(value(message)))
+        yield Column(path, "ns", "int", lambda message: stamp_nanoseconds(value(message)))
     elif type_name in BUILT_IN_TYPES:
         kind = _kind(type_name)
         yield Column(path, unit if kind == "float" else "", kind, value)
@@ -262,7 +262,10 @@ def _element_columns(
 def _list_column(type_name: str, path: str, unit: str, value: Callable[[Any], Any]) -> Column:
     if type_name in _INSTANTS:
         return Column(
-            path, "ns", "ints", lambda message: [_nanoseconds(item) for item in value(message)]
+            path,
+            "ns",
+            "ints",
+            lambda message: [stamp_nanoseconds(item) for item in value(message)],
         )
     kind = _kind(type_name) if type_name in BUILT_IN_TYPES else "text"
     if kind in ("float", "int", "uint"):
@@ -280,10 +283,6 @@ def _kind(type_name: str) -> str:
     if type_name == "uint64":
         return "uint"
     return "bool" if type_name == "bool" else "int"
-
-
-def _nanoseconds(instant: Any) -> int:
-    return int(instant.sec) * NANOSECONDS_PER_SECOND + int(instant.nanosec)
 
 
 def _plain(value: Any) -> Any:

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
+from gait_entrainment.conventions import stamp_nanoseconds
 from gait_entrainment.device import MeasuredOnsets, PulseTiming, RobotState
 from gait_entrainment.device.timing import distribution
 
@@ -49,7 +49,7 @@ def recorded_timings(path: Path | str) -> list[PulseTiming]:
             found = sorted(bag.messages(names), key=lambda m: m.place) if names else []
             for raw in found:
                 message = bag.decoder(raw.topic)(raw.data)
-                instant = _nanoseconds(message.header.stamp)
+                instant = stamp_nanoseconds(message.header.stamp)
                 if suffix == _PULSES:
                     onsets.add_pulse(instant, message.torque, message.duration)
                 elif suffix == _STATES:
@@ -58,8 +58,8 @@ def recorded_timings(path: Path | str) -> list[PulseTiming]:
                 elif message.stop:
                     onsets.stop(instant)
                 else:
-                    named = [_nanoseconds(onset) for onset in message.onsets]
-                    onsets.add_promise(named, _nanoseconds(message.valid_until))
+                    named = [stamp_nanoseconds(onset) for onset in message.onsets]
+                    onsets.add_promise(named, stamp_nanoseconds(message.valid_until))
     onsets.finish()
     return onsets.timings
 
@@ -100,10 +100,6 @@ def timing_summary(outcome: dict[str, Any]) -> list[str]:
             f"{figures['worst_percent']:.2f} % of a stride){missing}"
         )
     return lines
-
-
-def _nanoseconds(stamp: Any) -> int:
-    return int(stamp.sec) * NANOSECONDS_PER_SECOND + int(stamp.nanosec)
 
 
 def _late(commanded: int, onset: int | None) -> float | None:

@@ -23,16 +23,17 @@ import json
 import math
 import struct
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gait_entrainment.analysis import Analysis, Entrainment, PulsePhase, VerdictSettings, analyze
+from gait_entrainment.analysis import Analysis, VerdictSettings, analyze, published_values
+from gait_entrainment.analysis.analyzer import Result
 from gait_entrainment.bags import ENDED_EARLY, BagError, BagMessage, BagReader
-from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
+from gait_entrainment.conventions import EventKind, Side, stamp_nanoseconds
 from gait_entrainment.device import PulseTiming
 from gait_entrainment.events import GaitEvent, Stride
 from gait_entrainment.experiment import Conductor
@@ -218,7 +219,7 @@ class _Record:
         self.real_time_factor = _real_time_factor(clocks)
 
     def _add(self, suffix: str, message: BagMessage, content: Any) -> None:
-        stamp = _nanoseconds(content.header.stamp)
+        stamp = stamp_nanoseconds(content.header.stamp)
         if suffix == _EVENTS:
             self.stamped &= message.log_time == stamp
             try:
@@ -230,7 +231,7 @@ class _Record:
             if content.stop:
                 self.onsets = [onset for onset in self.onsets if onset < stamp]
             else:
-                self.onsets += [_nanoseconds(onset) for onset in content.onsets]
+                self.onsets += [stamp_nanoseconds(onset) for onset in content.onsets]
         else:
             self._published[suffix].append(content)
 
@@ -238,16 +239,16 @@ class _Record:
         """Return how the published results differ from an analysis; None where there are none."""
         if not self._published:
             return None
-        anew = {
-            _STRIDES: [_stride_values(stride) for stride in analysis.strides],
-            _PULSES: [_pulse_values(pulse, side) for pulse in analysis.pulses],
-            _VERDICTS: [_verdict_values(verdict, side) for verdict in analysis.entrainments],
+        results: dict[str, Sequence[Result]] = {
+            _STRIDES: analysis.strides,
+            _PULSES: analysis.pulses,
+            _VERDICTS: analysis.entrainments,
         }
-        return tuple(
-            difference
-            for suffix, contents in self._published.items()
-            if (difference := _difference(suffix, contents, anew[suffix]))
-        )
+        differences = []
+        for suffix, contents in self._published.items():
+            anew = [published_values(result, side) for result in results[suffix]]
+            differences.append(_difference(suffix, contents, anew))
+        return tuple(filter(None, differences))
 
 
 def _find(bag: BagReader, suffix: str) -> str | None:
@@ -261,42 +262,6 @@ def _find(bag: BagReader, suffix: str) -> str | None:
         ),
         None,
     )
-
-
-# What the analyzer publishes, by the fields of its messages; instants in nanoseconds.
-
-
-def _stride_values(stride: Stride) -> dict[str, Any]:
-    return {
-        "header": stride.end,
-        "side": stride.side,
-        "number": stride.number,
-        "start": stride.start,
-        "period": stride.period,
-        "step_periods": stride.step_periods,
-    }
-
-
-def _pulse_values(pulse: PulsePhase, side: Side) -> dict[str, Any]:
-    return {
-        "header": pulse.onset,
-        "side": side,
-        "number": pulse.number,
-        "stride": pulse.stride,
-        "phase": pulse.phase,
-        "phase_lag": pulse.phase_lag,
-        "unwrapped_lag": pulse.unwrapped_lag,
-        "toe_off": pulse.toe_off or 0,
-    }
-
-
-def _verdict_values(verdict: Entrainment, side: Side) -> dict[str, Any]:
-    # All of its fields but one are published, and all but the stamp under the same name.
-    unnamed = {"stamp", "effective_pulses"}
-    values = {f.name: getattr(verdict, f.name) for f in fields(verdict) if f.name not in unnamed}
-    values |= {"header": verdict.stamp, "side": side}
-    values["entrained_since_stride"] = verdict.entrained_since_stride or 0
-    return values
 
 
 def _difference(suffix: str, published: Sequence[Any], anew: Sequence[dict[str, Any]]) -> str:
@@ -320,16 +285,12 @@ def _bits(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [_bits(item) for item in value]
     if hasattr(value, "stamp"):
-        return _nanoseconds(value.stamp)
-    return _nanoseconds(value) if hasattr(value, "nanosec") else int(value)
+        return stamp_nanoseconds(value.stamp)
+    return stamp_nanoseconds(value) if hasattr(value, "nanosec") else int(value)
 
 
 def _told(value: Any) -> Any:
     return _bits(value) if hasattr(value, "stamp") or hasattr(value, "nanosec") else value
-
-
-def _nanoseconds(stamp: Any) -> int:
-    return int(stamp.sec) * NANOSECONDS_PER_SECOND + int(stamp.nanosec)
 
 
 def _real_time_factor(clocks: Sequence[BagMessage]) -> float:
@@ -362,7 +323,7 @@ def _torque_rows(
 ) -> Iterator[tuple[int, float, float, float]]:
     for _, message in bag.decoded([name], start, end):
         yield (
-            _nanoseconds(message.header.stamp),
+            stamp_nanoseconds(message.header.stamp),
             message.intrinsic[side],
             message.delivered[side],
             message.effective_perturbation[side],
