@@ -108,19 +108,11 @@ class WalkerRun:
         self._promised = profile.valid_until
         late = max(min(self.reached, profile.valid_until) - begin, 0)
         self.late += late
-        if profile.valid_until <= self.reached:
-            return late
-        times, torques = list(profile.times), list(profile.torques)
-        if late:
+        if profile.valid_until > self.reached:
             # What is over stays as it was walked, without torque; the rest keeps its instants.
-            first = max(i for i, instant in enumerate(times) if instant <= self.reached)
-            times, torques = [begin, self.reached, *times[first + 1 :]], [0.0, *torques[first:]]
-        self._walker.extend_torque(
-            profile.side,
-            np.array(times, np.int64),
-            np.array(torques, float),
-            profile.valid_until,
-        )
+            self._walker.extend_torque(
+                profile.side, profile.times, profile.torques, profile.valid_until
+            )
         return late
 
     def stop(self, stamp: int) -> None:
