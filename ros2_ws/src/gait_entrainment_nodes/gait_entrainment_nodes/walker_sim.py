@@ -120,20 +120,7 @@ class WalkerSim(Participant, Node):
         # for.
         WalkerRun(self.parameters, self.first_heel_strike, 100.0).advance(NANOSECONDS_PER_SECOND)
 
-        self.run_number = 0
-        self.start = 0  # instant of heel strike 0 [ns since 1970]
-        self.steady_offset = 0  # steady time at which instant 0 is due [ns]
-        self.grant = 0
-        self.acknowledged_grants = 0
-        self.granted: deque[tuple[int, bool]] = deque()  # lock-step: (until, last), not yet walked
-        self.end_of_run: int | None = None  # end of the run [ns since its start], once known
-        self.reproducible = True
-        self.late = 0  # [ns] of promises that came after their instant
-        self.late_stretches = self.starved_stretches = 0  # how many there were of each
-        self.starving = False  # the stretch walked last had no promise
-        self.lateness = Lateness()  # real time: of samples, from due to published
-        self.next_progress = 0  # [ns since the start]
-
+        self.begin_run(0)
         self.subscription(TORQUE_PROFILE, self.on_profile)
         if self.acknowledged and not self.real_time:
             self.subscription(RECORDER_PROGRESS, self.on_acknowledgement)
@@ -158,6 +145,22 @@ class WalkerSim(Participant, Node):
 
     # Start, reset
 
+    def begin_run(self, run: int) -> None:
+        """Forget the run before."""
+        self.run_number = run
+        self.start = 0  # instant of heel strike 0 [ns since 1970]
+        self.steady_offset = 0  # steady time at which instant 0 is due [ns]
+        self.grant = 0
+        self.acknowledged_grants = 0
+        self.granted: deque[tuple[int, bool]] = deque()  # lock-step: (until, last), not yet walked
+        self.end_of_run: int | None = None  # end of the run [ns since its start], once known
+        self.reproducible = True
+        self.late = 0  # [ns] of promises that came after their instant
+        self.late_stretches = self.starved_stretches = 0  # how many there were of each
+        self.starving = False  # the stretch walked last had no promise
+        self.lateness = Lateness()  # real time: of samples, from due to published
+        self.next_progress = 0  # [ns since the start]
+
     def on_start(self, request: StartRun.Request, response: StartRun.Response) -> Any:
         """Start a run, once, after which the walker follows the promises."""
         if self.run is not None:
@@ -168,7 +171,7 @@ class WalkerSim(Participant, Node):
             response.message = f"walker_sim waits for {waiting}"
             return response
         self.run = WalkerRun(self.parameters, self.first_heel_strike, self.sample_rate)
-        self.run_number = request.run
+        self.begin_run(request.run)
         if self.real_time:
             self.start = time.time_ns() + START_DELAY
             # Deadlines are met on steady time; its offset to the stamps is fixed here, once.
@@ -176,11 +179,6 @@ class WalkerSim(Participant, Node):
             self.steady_offset = time.monotonic_ns() + delay
         else:
             self.start = LOCK_STEP_START * NANOSECONDS_PER_SECOND
-        self.grant = self.acknowledged_grants = 0
-        self.end_of_run, self.reproducible, self.late, self.next_progress = None, True, 0, 0
-        self.late_stretches = self.starved_stretches = 0
-        self.starving = False
-        self.lateness = Lateness()
         self.note_state(DiagnosticStatus.OK, f"run {request.run} goes on")
         response.success, response.start = True, to_time(self.start)
         return response
