@@ -20,6 +20,7 @@ readers that are in use; docs/bags.md lists them.
 """
 
 import enum
+import re
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -68,6 +69,7 @@ class Finding:
         return f"{self.severity.value}: {self.rule}: {self.detail}: {self.consequence}"
 
 
+_TYPE_HASH = re.compile("RIHS01_[0-9a-f]{64}")
 _ERROR, _WARNING = Severity.ERROR, Severity.WARNING
 
 RULES: dict[str, tuple[Severity, str]] = {
@@ -336,7 +338,7 @@ def _check_channels(path: Path, stock: Contents, report: _Report) -> None:
             _check_qos_spelling(where, qos, version, report)
         except UnreadableBagError as error:
             report.add("offered-qos", f"{path}: {error}")
-        if not _is_type_hash(channel.metadata.get("topic_type_hash")):
+        if not _TYPE_HASH.fullmatch(channel.metadata.get("topic_type_hash", "")):
             report.add("type-hash", f"{where}: no topic_type_hash RIHS01_ and 64 hex digits")
 
 
@@ -360,11 +362,6 @@ def _check_qos_spelling(where: str, qos: str, version: Any, report: _Report) -> 
             "offered-qos",
             f"{where}: policies are numbers, which rosbag2 takes for unknown in version {version}",
         )
-
-
-def _is_type_hash(value: Any) -> bool:
-    digits = str(value).removeprefix("RIHS01_")
-    return digits != value and len(digits) == 64 and set(digits) <= set("0123456789abcdef")
 
 
 def _check_metadata_file(path: Path, stocks: dict[str, Contents], report: _Report) -> None:

@@ -22,7 +22,7 @@ which holds the same map without its root key. The form is that of rosbag2's Jaz
 
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -65,6 +65,7 @@ QOS_POLICIES: dict[str, dict[int, str]] = {
         5: "best_available",
     },
 }
+_QOS_DURATIONS = ("deadline", "lifespan", "liveliness_lease_duration")
 
 
 @dataclass(frozen=True)
@@ -97,17 +98,8 @@ class QosProfile:
 
     def as_map(self) -> dict[str, Any]:
         """Give the map of nine keys that rosbag2 writes."""
-        return {
-            "history": self.history,
-            "depth": self.depth,
-            "reliability": self.reliability,
-            "durability": self.durability,
-            "deadline": _duration(self.deadline),
-            "lifespan": _duration(self.lifespan),
-            "liveliness": self.liveliness,
-            "liveliness_lease_duration": _duration(self.liveliness_lease_duration),
-            "avoid_ros_namespace_conventions": self.avoid_ros_namespace_conventions,
-        }
+        durations = {name: _duration(getattr(self, name)) for name in _QOS_DURATIONS}
+        return asdict(self) | durations
 
 
 def _duration(nanoseconds: int) -> dict[str, int]:
@@ -237,7 +229,7 @@ def _parse_qos_profile(entry: object, where: str) -> QosProfile:
             value = entry[name]
             if name in QOS_POLICIES and isinstance(value, int):
                 value = QOS_POLICIES[name].get(value, value)
-            elif name in ("deadline", "lifespan", "liveliness_lease_duration"):
+            elif name in _QOS_DURATIONS:
                 value = int(value["sec"]) * NANOSECONDS_PER_SECOND + int(value["nsec"])
             values[name] = value
         return QosProfile(**values)

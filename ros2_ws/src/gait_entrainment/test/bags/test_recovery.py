@@ -32,7 +32,7 @@ from gait_entrainment.bags import (
     check,
     recover,
 )
-from gait_entrainment.bags.mcap_file import McapFile
+from gait_entrainment.bags.mcap_file import Chunk, McapFile
 
 NOISE = TopicInfo("/noise", "p/msg/Noise", "uint8[] bytes\n", "RIHS01_" + "1" * 64)
 
@@ -92,9 +92,9 @@ def test_killed_recording_loses_nothing_that_was_flushed(tmp_path: Path, chunk_s
         ]
 
 
-def test_every_whole_chunk_of_a_cut_recording_is_rescued(tmp_path: Path) -> None:
-    folder = tmp_path / "walk"
-    with BagWriter(folder, ros_distro="jazzy", chunk_size=300) as writer:
+def record_chunks(folder: Path, compression: str) -> tuple[Path, list[Chunk], list[int]]:
+    """Record small chunks; return the file, its chunks, and the messages in each."""
+    with BagWriter(folder, ros_distro="jazzy", chunk_size=300, compression=compression) as writer:
         writer.add_topic(NOISE)
         for number in range(40):
             writer.write("/noise", bytes(40), number, number)
@@ -103,6 +103,11 @@ def test_every_whole_chunk_of_a_cut_recording_is_rescued(tmp_path: Path) -> None
     chunks = file.scan().chunks
     counts = [len(file.messages(chunk, 0, {1: "/noise"})) for chunk in chunks]
     file.close()
+    return path, chunks, counts
+
+
+def test_every_whole_chunk_of_a_cut_recording_is_rescued(tmp_path: Path) -> None:
+    path, chunks, counts = record_chunks(tmp_path / "walk", "zstd")
     assert len(chunks) > 5
     for number in reversed(range(len(chunks))):
         end = chunks[number].offset + chunks[number].length
@@ -158,16 +163,7 @@ def test_damage_costs_no_more_than_its_chunk(small_bag: Path, tmp_path: Path) ->
 def test_a_broken_length_in_an_unfinished_file_costs_one_chunk(
     tmp_path: Path, compression: str
 ) -> None:
-    folder = tmp_path / "walk"
-    with BagWriter(folder, ros_distro="jazzy", chunk_size=300, compression=compression) as writer:
-        writer.add_topic(NOISE)
-        for number in range(40):
-            writer.write("/noise", bytes(40), number, number)
-    path = folder / "walk_0.mcap"
-    file = McapFile(path)
-    chunks = file.scan().chunks
-    counts = [len(file.messages(chunk, 0, {1: "/noise"})) for chunk in chunks]
-    file.close()
+    path, chunks, counts = record_chunks(tmp_path / "walk", compression)
     whole = path.read_bytes()[: chunks[-1].offset + chunks[-1].length]  # as after a crash
     for place in (3, 8):  # of the length, which then leads far beyond the end of the file
         data = bytearray(whole)
