@@ -21,6 +21,7 @@ onsets, promised or measured, however their messages interleave.
 
 import sys
 from collections.abc import Callable
+from dataclasses import asdict
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -217,15 +218,8 @@ class GaitAnalyzerNode(Participant, Node):
 
     def report_doubts(self, stamp: int) -> None:
         """Say on /diagnostics when events are missing, doubled, late or contradictory."""
-        counts = self.analyzer.event_counts
-        doubts = {
-            "repeated": counts.repeated,
-            "out_of_order": counts.out_of_order,
-            "late": counts.late,
-            "contradictory": counts.contradictory,
-            "missing": counts.missing,
-            "missed_strides": counts.missed_strides,
-        }
+        doubts = asdict(self.analyzer.event_counts)
+        del doubts["accepted"]
         if any(doubts.values()) and doubts != self.doubts:
             self.doubts = doubts
             self.diagnose(

@@ -47,19 +47,7 @@ HELD_UP = 1.0
 
 
 class RunClient:
-    """
-    Conducts one protocol through the experiment node.
-
-    Parameters
-    ----------
-    supervisor
-        The processes to watch meanwhile.
-    protocol
-        What is conducted, for the length of the progress bar.
-    quiet
-        Show no progress.
-
-    """
+    """Conducts one protocol through the experiment node, and watches the processes meanwhile."""
 
     def __init__(self, supervisor: Supervisor, protocol: Protocol, quiet: bool) -> None:
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)

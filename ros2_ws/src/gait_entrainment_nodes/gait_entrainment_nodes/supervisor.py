@@ -38,17 +38,7 @@ _PR_SET_PDEATHSIG = 1
 
 
 class Supervisor:
-    """
-    Runs one process per node.
-
-    Parameters
-    ----------
-    folder
-        Where the logs go.
-    environment
-        Of every process.
-
-    """
+    """Runs one process per node, all in one environment; their logs go to a folder."""
 
     def __init__(self, folder: Path, environment: Mapping[str, str]) -> None:
         self._folder = folder

@@ -75,20 +75,8 @@ class GaitAnalyzer:
     never on how events and promises interleave. (A stop is not bound by this: it happens when it
     happens.)
 
-    Pulses outside every complete stride are counted, not published; they keep their number.
-
-    Parameters
-    ----------
-    side
-        The perturbed leg.
-    settings
-        The numbers in the verdict.
-
-    Attributes
-    ----------
-    pulse_counts
-        What became of the onsets received so far.
-
+    Pulses outside every complete stride are counted in ``pulse_counts``, not published; they keep
+    their number.
     """
 
     def __init__(self, side: Side, settings: VerdictSettings | None = None) -> None:
@@ -214,19 +202,9 @@ def analyze(
     settings: VerdictSettings | None = None,
 ) -> Analysis:
     """
-    Analyze a whole run offline, with the very class that runs online.
+    Analyze a whole run of one perturbed leg offline, with the very class that runs online.
 
-    Parameters
-    ----------
-    events
-        Gait events in the order in which they were received.
-    onsets
-        Pulse onsets [ns].
-    side
-        The perturbed leg.
-    settings
-        The numbers in the verdict.
-
+    Events come in the order in which they were received; onsets [ns] in any.
     """
     analyzer = GaitAnalyzer(side, settings)
     results = [result for event in events for result in analyzer.add_event(event)]

@@ -122,16 +122,11 @@ RULES: dict[str, tuple[Severity, str]] = {
 
 def check(path: Path | str) -> list[Finding]:
     """
-    Hold a bag against rosbag2's rules; its own writer's bags give no finding.
+    Hold a bag, a folder or an ``.mcap`` file, against rosbag2's rules.
 
     Never raises for what is wrong with the bag: that is what the findings are for. A rule that
-    is broken many times gives one finding, with the first place and the number of places.
-
-    Parameters
-    ----------
-    path
-        Folder or ``.mcap`` file.
-
+    is broken many times gives one finding, with the first place and the number of places. Bags
+    of this project's writer give none.
     """
     path = Path(path)
     report = _Report()

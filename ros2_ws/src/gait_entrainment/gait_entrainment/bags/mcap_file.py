@@ -431,10 +431,7 @@ class McapFile:
         """
         Give opcode, offset and length of the content of every record of the data section.
 
-        Parameters
-        ----------
-        offset
-            Where to begin; with the first record after the header if None.
+        It begins at an offset, or with the first record after the header.
 
         Raises
         ------

@@ -41,12 +41,7 @@ from gait_entrainment.bags.metadata import (
 
 class BagReader:
     """
-    A bag opened for reading: a folder, or a single MCAP file.
-
-    Parameters
-    ----------
-    path
-        Folder or ``.mcap`` file.
+    A bag opened for reading: a folder, or a single ``.mcap`` file.
 
     Raises
     ------

@@ -49,14 +49,7 @@ class Recovery:
 
 def recover(path: Path | str, out: Path | str) -> Recovery:
     """
-    Write all that can be read of a bag into a new one.
-
-    Parameters
-    ----------
-    path
-        Folder or ``.mcap`` file.
-    out
-        Folder to make.
+    Write all that can be read of a bag, a folder or an ``.mcap`` file, into a new folder.
 
     Raises
     ------

@@ -160,17 +160,7 @@ class _ChangedNamesError(Exception):
 
 
 def columns_of(topic: TopicInfo, example: Any) -> list[Column]:
-    """
-    Lay out the columns of a topic.
-
-    Parameters
-    ----------
-    topic
-        With the definition of its type.
-    example
-        A decoded message; where a message names its elements the columns are named after them.
-
-    """
+    """Lay out the columns of a topic; an example of a message may name those of its elements."""
     parts = schema_parts(topic.type, topic.schema_text)
     return list(_columns(parts, _short_name(topic.type), "", "", lambda message: message, example))
 

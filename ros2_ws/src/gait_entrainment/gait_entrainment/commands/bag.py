@@ -138,12 +138,9 @@ def _guarded(name: str, action: Any) -> Any:
                 return 2
         try:
             return int(action(options))
-        except BagExistsError as error:
-            print(f"entrain bag {name}: {error}", file=sys.stderr)
-            return 2
         except BagError as error:
             print(f"entrain bag {name}: {error}", file=sys.stderr)
-            return 1
+            return 2 if isinstance(error, BagExistsError) else 1
 
     return run
 

@@ -36,19 +36,7 @@ from gait_entrainment.device.motor_emulator import (
 
 
 class EmulatedAkMotor(EmulatedMotor):
-    """
-    A motor that any frame feeds, and whose watchdog drops the command.
-
-    Parameters
-    ----------
-    motor, motor_id
-        Ranges and id.
-    bandwidth, timeout
-        As of any emulated motor.
-    reply_bytes
-        6 or 8.
-
-    """
+    """A motor that any frame feeds, and whose watchdog drops the command; it always replies."""
 
     def __init__(
         self, motor: AkMotor, motor_id: int, bandwidth: float, timeout: float, reply_bytes: int

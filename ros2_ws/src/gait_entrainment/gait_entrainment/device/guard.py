@@ -60,16 +60,7 @@ _T = TypeVar("_T")
 
 class GuardedRobot:
     """
-    An ankle robot behind the safety envelope.
-
-    Parameters
-    ----------
-    robot
-        The driver. Nobody else may keep it.
-    side
-        The ankle on which the robot sits.
-    limits
-        What may be asked of it.
+    An ankle robot behind the safety envelope; nobody else may keep the driver.
 
     Attributes
     ----------

@@ -49,17 +49,7 @@ _HEARTBEAT_PERIOD = 0.1  # [s]
 
 
 class EmulatedOdrive(EmulatedMotor):
-    """
-    An axis that an error disarms until it is cleared, and that torque commands feed.
-
-    Parameters
-    ----------
-    node
-        Its id.
-    bandwidth, timeout
-        As of any emulated motor.
-
-    """
+    """An axis that an error disarms until it is cleared, and that torque commands feed."""
 
     def __init__(self, node: int, bandwidth: float, timeout: float) -> None:
         super().__init__(bandwidth, timeout)
