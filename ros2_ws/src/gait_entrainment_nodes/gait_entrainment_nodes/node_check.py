@@ -415,20 +415,10 @@ def check_node(
     name: str, side: Side, tolerances: Tolerances, *, real_time: bool = False, arm: bool = False
 ) -> Iterator[Result]:
     """
-    Run every check on a node; yields each result as it is there.
+    Run every check on a node whose robot sits on a side; yields each result as it is there.
 
-    Parameters
-    ----------
-    name
-        Of the node.
-    side
-        The ankle on which its robot sits.
-    tolerances
-        What is put up with.
-    real_time
-        Send stamps of the wall clock, as the node of a real robot needs them.
-    arm
-        Call its service ``~/arm`` after each activation: it may deliver torque.
+    In ``real_time`` stamps are of the wall clock, as the node of a real robot needs them. To
+    ``arm`` is to call its service ``~/arm`` after each activation: it may deliver torque.
 
     Raises
     ------

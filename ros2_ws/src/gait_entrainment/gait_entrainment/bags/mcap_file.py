@@ -356,16 +356,9 @@ class McapFile:
 
     def messages(self, chunk: Chunk, rank: int, topics: Mapping[int, str]) -> list[BagMessage]:
         """
-        Read messages of a chunk, in the order of the file.
+        Read messages of a chunk, in the order of the file, of these topics (by channel).
 
-        Parameters
-        ----------
-        chunk
-            Where they lie.
-        rank
-            Place of the chunk among all those of the bag.
-        topics
-            Topics to read, by channel.
+        The rank is the place of the chunk among all those of the bag.
 
         Raises
         ------

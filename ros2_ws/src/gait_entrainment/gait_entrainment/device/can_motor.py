@@ -67,17 +67,7 @@ class CanMotorRobot(HostTimedRobot):
     A subclass says how it is called in messages, opens the bus first of all in ``_open``, and
     implements ``_enable``, ``_exchange`` and ``_disable``; ``_disable`` must bring zero torque.
 
-    Parameters
-    ----------
-    side
-        The ankle on which the robot sits.
-    options
-        Bus, transmission and loop.
-    name
-        The motor, in messages.
-    motor_torque
-        Its peak torque [N m], before the transmission.
-
+    ``name`` is the motor's, in messages; ``motor_torque`` its peak [N m] before the transmission.
     """
 
     PROTOCOL: ClassVar[str]  # as in "motor 1 does not answer PROTOCOL on can0"

@@ -172,15 +172,7 @@ def distribution(
     """
     Return how late pulses came against their commanded onsets; None where no pulse shows it.
 
-    Parameters
-    ----------
-    timings
-        Of the pulses.
-    kind
-        "sent" or "measured".
-    stride
-        Stride period [s]; percentages are of it.
-
+    The kind of onset is "sent" or "measured"; percentages are of a stride [s].
     """
     late = lateness_ms(timings, kind)
     if not late:

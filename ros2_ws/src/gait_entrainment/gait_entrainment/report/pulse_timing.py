@@ -65,17 +65,7 @@ def recorded_timings(path: Path | str) -> list[PulseTiming]:
 
 
 def timing_outcome(timings: Sequence[PulseTiming], stride: float) -> dict[str, Any]:
-    """
-    Return what ``--json`` prints of the pulses' timing.
-
-    Parameters
-    ----------
-    timings
-        Of the pulses.
-    stride
-        Unperturbed stride period [s]: percentages are of it.
-
-    """
+    """Return what ``--json`` prints of the pulses' timing; percentages are of a stride [s]."""
     return {
         "sent": distribution(timings, "sent", stride),
         "measured": distribution(timings, "measured", stride),
