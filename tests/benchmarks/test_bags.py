@@ -92,7 +92,7 @@ def test_recording_without_a_loss(tmp_path: Path) -> None:
         environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
         recorder = subprocess.Popen(
             [
-                *(sys.executable, "-m", "gait_entrainment_nodes.bag_recorder", "--ros-args"),
+                *("bag_recorder", "--ros-args"),
                 *("-p", f"output:={tmp_path / 'bag'}", "-p", "publishers:=[left, right]"),
             ],
             env=environment,

@@ -266,7 +266,7 @@ from gait_entrainment_nodes.node import run_node
 class Broken(perturbator.Perturbator):
     {fault}
 
-sys.exit(run_node(Broken, sys.argv))
+sys.exit(run_node(Broken))
 """
 FAULTS = {
     "stop without effect": (

@@ -192,7 +192,7 @@ class Player:
         self.log = folder / "player.log"
         with self.log.open("wb") as log:
             self.process = subprocess.Popen(
-                [sys.executable, "-m", "gait_entrainment_nodes.bag_player", *arguments],
+                ["bag_player", *arguments],
                 stdout=log,
                 stderr=subprocess.STDOUT,
                 env={**os.environ, "ROS_DOMAIN_ID": str(domain)},

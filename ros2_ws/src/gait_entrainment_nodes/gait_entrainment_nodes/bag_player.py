@@ -22,7 +22,6 @@ subscriptions have been matched, so that nothing of the start is lost. It is the
 
 import math
 import struct
-import sys
 import time
 from collections.abc import Callable
 from typing import Any
@@ -422,8 +421,4 @@ def _offer(topic: TopicInfo) -> QoSProfile:
 
 def main() -> int:
     """Run the node."""
-    return run_node(BagPlayer, sys.argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    return run_node(BagPlayer)

@@ -24,7 +24,6 @@ the run goes on unless the record is required.
 import json
 import os
 import struct
-import sys
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -419,8 +418,4 @@ def _offered(profile: QoSProfile) -> OfferedQos:
 
 def main() -> int:
     """Run the node."""
-    return run_node(BagRecorder, sys.argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    return run_node(BagRecorder)

@@ -22,7 +22,6 @@ is waited for, and for how long, is decided here.
 """
 
 import contextlib
-import sys
 import time
 from collections.abc import Callable
 from typing import Any
@@ -587,8 +586,4 @@ class Experiment(Participant, Node):
 
 def main() -> int:
     """Run the node."""
-    return run_node(Experiment, sys.argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    return run_node(Experiment)

@@ -19,7 +19,6 @@ A listener: nothing waits for it. What it publishes is a pure function of the ev
 onsets, promised or measured, however their messages interleave.
 """
 
-import sys
 from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
@@ -242,8 +241,4 @@ class GaitAnalyzerNode(Participant, Node):
 
 def main() -> int:
     """Run the node."""
-    return run_node(GaitAnalyzerNode, sys.argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    return run_node(GaitAnalyzerNode)

@@ -433,7 +433,7 @@ def refuse_unknown_parameters(node: Any) -> None:
         raise ValueError(f"{unknown[0]}: unknown parameter; allowed: {known}")
 
 
-def run_node(make_node: Callable[[], Any], arguments: Sequence[str]) -> int:
+def run_node(make_node: Callable[[], Any]) -> int:
     """
     Run a node until it is finished, it fails, or SIGINT or SIGTERM arrives.
 
@@ -456,6 +456,7 @@ def run_node(make_node: Callable[[], Any], arguments: Sequence[str]) -> int:
     # rclpy's own handlers shut the context down at once: no last message could be sent.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, request_stop)
+    arguments = sys.argv
     name = arguments[0].rpartition("/")[2]
     try:
         try:

@@ -27,7 +27,6 @@ afterwards, in real time: what it has measured is promised every few millisecond
 horizon.
 """
 
-import sys
 import time
 from collections.abc import Callable
 from typing import Any
@@ -517,8 +516,4 @@ class Perturbator(Participant, LifecycleNode):
 
 def main() -> int:
     """Run the node."""
-    return run_node(Perturbator, sys.argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    return run_node(Perturbator)

@@ -27,7 +27,6 @@ robot's arc and the ball at the ankle are red while its torque acts and grey whi
 
 import math
 import struct
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -226,8 +225,4 @@ def draw_arc(marker: Marker, radius: float, begin: float, end: float) -> None:
 
 def main() -> int:
     """Run the node."""
-    return run_node(WalkerDisplay, sys.argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    return run_node(WalkerDisplay)

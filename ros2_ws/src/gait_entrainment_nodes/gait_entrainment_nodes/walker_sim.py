@@ -20,7 +20,6 @@ is computed and sent at once; in real time the instant t is sent at wall time t 
 delay, and a stretch for which no promise came in time is walked without torque and counted.
 """
 
-import sys
 import time
 from collections import deque
 from collections.abc import Callable
@@ -420,8 +419,4 @@ def _in_space(forces: np.ndarray) -> np.ndarray:
 
 def main() -> int:
     """Run the node."""
-    return run_node(WalkerSim, sys.argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    return run_node(WalkerSim)
