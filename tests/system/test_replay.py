@@ -18,7 +18,6 @@ import json
 import os
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -264,7 +263,7 @@ def test_a_player_whose_reader_hangs_says_so_and_obeys_a_signal(player: Any) -> 
     process, listener = player("topics:=[/gait_events]", "expect:=[/gait_events]", "rate:=0.0")
     domain = str(listener.node.context.get_domain_id())
     reader = subprocess.Popen(
-        [sys.executable, "-m", "gait_entrainment_nodes.gait_analyzer"],
+        ["gait_analyzer"],
         env={**os.environ, "ROS_DOMAIN_ID": domain},
     )
     try:
