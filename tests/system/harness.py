@@ -324,7 +324,7 @@ class Session:
         domain: int,
         options: Sequence[str],
         real_time: bool,
-        participants: Sequence[str],
+        participants: Sequence[str] = (),
     ) -> None:
         self.bag = folder / "bag"
         self.protocol = protocol_of(*options)
