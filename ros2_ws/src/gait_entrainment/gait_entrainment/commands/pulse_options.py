@@ -63,11 +63,18 @@ def check_at_least(name: str, value: int, least: int) -> None:
 
 
 def check_period_offset(offset: float, gait: "PulsedGait") -> None:
-    """Raise ValueError where pulses at this period [s] off the unperturbed one would overlap."""
+    """Raise ValueError where pulses would overlap, or stay in place without a lock."""
+    from gait_entrainment.locking.walked import CREEP
+
     least = gait.width - gait.unperturbed_period
     if not least < offset < math.inf:
         raise ValueError(
             f"period_offset {offset:g} s is out of range; allowed: above {least:.4g} s"
+        )
+    if abs(offset) <= CREEP:
+        raise ValueError(
+            f"period_offset {offset:g} s is the stride period itself, where a pulse in swing stays"
+            f" without a lock; allowed: more than {CREEP:g} s off it"
         )
 
 

@@ -84,6 +84,7 @@ def test_existence_gives_the_range_and_the_map(capsys, tmp_path):
         (["lock", "--width", "1.2"], "width 1.2 s is out of range"),
         (["lock", "--period-offset", "-1.9"], "period_offset -1.9 s"),
         (["lock", "--period-offset", "nan"], "period_offset nan s"),
+        (["lock", "--period-offset", "0"], "period_offset 0 s is the stride period itself"),
         (["lock", "--phases", "0"], "phases 0 is out of range; allowed: at least 1"),
         (["lock", "--torque", "nan"], "torque nan N m is not a finite number"),
         (["phase-response", "--period-offset", "nan"], "period_offset nan s is out of range"),
