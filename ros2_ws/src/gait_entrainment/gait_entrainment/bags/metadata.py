@@ -235,7 +235,7 @@ def _parse_qos_profile(entry: object, where: str) -> QosProfile:
         return QosProfile(**values)
     except KeyError as error:
         raise UnreadableBagError(f"{where}: key {error} is missing") from None
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise UnreadableBagError(f"{where}: {error}") from None
 
 
@@ -255,6 +255,12 @@ def load_yaml(text: str, where: str) -> Any:
 
     """
     try:
+        depth = 0
+        for event in yaml.parse(text, Loader=_LOADER):
+            depth += isinstance(event, yaml.CollectionStartEvent)
+            depth -= isinstance(event, yaml.CollectionEndEvent)
+            if depth > _DEEPEST:
+                raise RecursionError(f"nested more than {_DEEPEST} deep")
         return yaml.load(text, Loader=_LOADER)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise UnreadableBagError(f"{where}: not valid YAML: {first_line(error)}") from None
@@ -266,5 +272,7 @@ def first_line(error: Exception) -> str:
 
 
 # PyYAML's own C parser, ten times faster, is absent only where PyYAML was built without libyaml.
+# Its loader calls itself for each level, and 30,000 of them end the process.
+_DEEPEST = 100
 _DUMPER: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)

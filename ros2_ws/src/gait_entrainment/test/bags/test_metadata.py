@@ -12,6 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -78,6 +79,8 @@ def test_policies_may_be_integers_as_before_version_9() -> None:
         ("- 1", "not a map"),
         ("- {history: keep_last}", "'depth' is missing"),
         ("- [", "not valid YAML"),
+        ("[" * 100_000, "nested more than"),
+        ([QosProfile().as_map() | {"deadline": {"sec": math.inf, "nsec": 0}}], "infinity"),
         (3, "not a YAML sequence"),
         ([QosProfile().as_map() | {"history": "sometimes"}], "sometimes"),
         ([QosProfile().as_map() | {"reliability": 77}], "77"),
