@@ -28,7 +28,12 @@ from typing import Any, Protocol
 
 from gait_entrainment.bags.decoding import decoder_for
 from gait_entrainment.bags.definitions import BUILT_IN_TYPES, schema_parts
-from gait_entrainment.bags.errors import BagError, BagExistsError, BagWriteError
+from gait_entrainment.bags.errors import (
+    BagError,
+    BagExistsError,
+    BagWriteError,
+    UnreadableBagError,
+)
 from gait_entrainment.bags.metadata import TopicInfo, first_line
 from gait_entrainment.bags.reader import BagReader
 from gait_entrainment.conventions import stamp_nanoseconds
@@ -107,6 +112,8 @@ def export(
             topics = [name for name, count in reader.counts.items() if count]
         if missing := set(topics) - reader.topics.keys():
             raise BagError(f"{path}: no topic {', '.join(sorted(missing))} in the bag")
+        if silent := [name for name in topics if not reader.counts[name]]:
+            raise BagError(f"{path}: no messages on {', '.join(silent)}: leave it out of --topics")
         if format_name == "parquet":
             _require_pyarrow()
         try:
@@ -136,15 +143,19 @@ def _write_table(reader: BagReader, topic: TopicInfo, file: Path) -> None:
     columns: list[Column] = []
     while batch := list(islice(messages, _ROWS_AT_ONCE)):
         decoded = [decode(message.data) for message in batch]
-        if table is None:
-            columns = columns_of(topic, decoded[0])
-            table = (_CsvTable if file.suffix == ".csv" else _ParquetTable)(file, columns)
         values = [
             [message.log_time for message in batch],
             [message.publish_time for message in batch],
         ]
         try:
+            if table is None:
+                columns = columns_of(topic, decoded[0])
+                table = (_CsvTable if file.suffix == ".csv" else _ParquetTable)(file, columns)
             values += [[column.value(message) for message in decoded] for column in columns]
+        except IndexError:  # the decoder gives fewer bytes than an array has where a message ends
+            raise UnreadableBagError(
+                f"{topic.name}: not a {topic.type} in CDR: an array of fixed length is too short"
+            ) from None
         except _ChangedNamesError:
             raise BagError(
                 f"{topic.name}: the names of its elements change, so that no table of one column "
@@ -187,6 +198,16 @@ def _columns(
         field.name == "name" and field.type == "string" and field.length == -1 for field in fields
     ):
         names = list(example.name)
+
+    def has_column_per_name(field: _Field) -> bool:
+        return (
+            field.length == -1
+            and field.type == "float64"
+            and bool(names)
+            and len(getattr(example, field.name)) == len(names)
+        )
+
+    named = any(map(has_column_per_name, fields))
     for field in fields:
         unit = field.unit or inherited_unit
         path = f"{prefix}{field.name}"
@@ -207,12 +228,12 @@ def _columns(
                     _item(value, number),
                     inner[number],
                 )
-        elif names and field.type == "float64" and len(inner) == len(names):
+        elif has_column_per_name(field):
             for number, name in enumerate(names):
                 yield Column(
                     f"{path}.{name}", unit, "float", _named_item(get, value, names, number)
                 )
-        elif not (names and field.name == "name"):
+        elif not (named and field.name == "name"):
             yield _list_column(field.type, path, unit, value)
 
 

@@ -13,6 +13,7 @@
 # limitations under the License.
 
 import csv
+import json
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -161,7 +162,30 @@ def test_nothing_is_overwritten_and_nothing_half_written_stays(
             writer.write("/joint_states", joint_state(1, positions), 1, 1)
     with pytest.raises(BagError, match="/joint_states: the names of its elements change"):
         export(tmp_path / "odd", tmp_path / "out", "csv")
+    with pytest.raises(BagError, match="no messages on /silent"):
+        export(bag, tmp_path / "out", "csv", ["/silent"])
+    with BagWriter(tmp_path / "short", ros_distro="jazzy") as writer:
+        writer.add_topic(TopicInfo("/id", "p/msg/Id", "uint8[4] id\n"))
+        writer.write("/id", bytes([0, 1, 0, 0, 1, 2, 3]), 1, 1)
+    with pytest.raises(BagError, match="/id: not a p/msg/Id in CDR"):
+        export(tmp_path / "short", tmp_path / "out", "csv")
     assert not (tmp_path / "out").exists()
+
+
+def test_names_without_a_value_each_stay_in_the_table(
+    tmp_path: Path,
+) -> None:
+    from mcap_ros2._dynamic import serialize_dynamic
+
+    text = "string[] name\nT stamp\n" + "=" * 80 + "\nMSG: p/msg/T\nint32 sec\n"
+    encode = serialize_dynamic("p/msg/Found", text.replace("p/msg/T", "p/T"))["p/msg/Found"]
+    with BagWriter(tmp_path / "walk", ros_distro="jazzy") as writer:
+        writer.add_topic(TopicInfo("/found", "p/msg/Found", text))
+        writer.write("/found", encode({"name": ["l_hip", "ü"], "stamp": {"sec": 3}}), 1, 1)
+    files = export(tmp_path / "walk", tmp_path / "out", "csv")
+    (row,) = rows_of(files["/found"])
+    assert json.loads(row["name"]) == ["l_hip", "ü"]
+    assert row["stamp.sec"] == "3"
 
 
 def test_parquet_without_pyarrow_says_what_is_missing(
