@@ -261,6 +261,8 @@ class McapFile:
             return None
         if statistics.message_count and not contents.chunks:
             return None
+        if statistics.schema_count and not contents.schemas:
+            return None
         for channel, topic in contents.topics.items():
             count = statistics.channel_message_counts.get(channel, 0)
             contents.counts[topic] = contents.counts.get(topic, 0) + count

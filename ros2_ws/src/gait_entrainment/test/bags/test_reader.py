@@ -111,6 +111,7 @@ def write_by_mcap_library(path: Path, compression: CompressionType, **options: o
         {"use_chunking": False},
         {"use_statistics": False},
         {"repeat_channels": False, "repeat_schemas": False},
+        {"repeat_schemas": False},
         {"enable_crcs": False},
         {
             "index_types": IndexType.NONE,
