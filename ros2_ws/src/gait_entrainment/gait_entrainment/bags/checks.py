@@ -38,11 +38,13 @@ from gait_entrainment.bags.metadata import (
     METADATA_FILE,
     METADATA_VERSION,
     RECORD_NAME,
+    TopicInfo,
     load_yaml,
     parse_qos_profiles,
 )
 from gait_entrainment.bags.reader import (
     bag_files,
+    differing_types,
     read_metadata_file,
     recorded_description,
     topic_of,
@@ -305,7 +307,7 @@ def _check_summary(path: Path, summary: Contents, stock: Contents, report: _Repo
 
 
 def _check_channels(path: Path, stock: Contents, report: _Report) -> None:
-    types: dict[str, str] = {}
+    known: dict[str, TopicInfo] = {}
     version = recorded_description(stock).get("version", METADATA_VERSION)
     for schema in stock.schemas.values():
         where = f"{path}: {schema.name}"
@@ -319,10 +321,10 @@ def _check_channels(path: Path, stock: Contents, report: _Report) -> None:
         where = f"{path}: {channel.topic}"
         if channel.schema_id not in stock.schemas:
             report.add("schema", f"{where}: schema {channel.schema_id} is not in the file")
-        elif (name := stock.schemas[channel.schema_id].name) != types.setdefault(
-            channel.topic, name
-        ):
-            report.add("one-type", f"{where}: is {types[channel.topic]} and {name}")
+        else:
+            topic = topic_of(channel, stock.schemas)
+            if difference := differing_types(known.setdefault(topic.name, topic), topic):
+                report.add("one-type", f"{where}: has {difference}")
         if channel.message_encoding != "cdr":
             report.add("message-encoding", f"{where}: {channel.message_encoding!r}, not 'cdr'")
         qos = channel.metadata.get("offered_qos_profiles")
@@ -404,7 +406,7 @@ def _check_metadata_topics(
             types[topic.name] = topic.type
             counts.setdefault(topic.name, 0)
         for name, count in stock.counts.items():
-            counts[name] += count
+            counts[name] = counts.get(name, 0) + count
     said: dict[str, tuple[str, int]] = {}
     for entry in found["topics_with_message_count"]:
         topic = entry["topic_metadata"]
@@ -419,7 +421,7 @@ def _check_metadata_topics(
             parse_qos_profiles(qos, where)
         except UnreadableBagError as error:
             report.add("metadata-qos", str(error))
-    true = {name: (types[name], count) for name, count in counts.items()}
+    true = {name: (types.get(name, ""), count) for name, count in counts.items()}
     for name in sorted(said.keys() | true.keys()):
         if said.get(name) != true.get(name):
             report.add(

@@ -20,6 +20,7 @@ message package, and takes 9 microseconds for a JointState of four joints (`rosb
 reads neither wide strings nor the names of messages inside services and actions.
 """
 
+import contextlib
 import struct
 from collections.abc import Callable
 from functools import cache
@@ -29,6 +30,14 @@ from gait_entrainment.bags.errors import BagError, UnreadableBagError
 from gait_entrainment.bags.metadata import TopicInfo, first_line
 
 CDR_HEADER_SIZE = 4
+_NOT_DECODED = (
+    struct.error,
+    ValueError,
+    IndexError,
+    NotImplementedError,
+    MemoryError,
+    RecursionError,  # a definition that contains itself
+)
 
 
 @cache
@@ -50,7 +59,9 @@ def decoder_for(topic: TopicInfo) -> Callable[[bytes], Any]:
 
     schema = Schema(1, topic.schema_text.encode(), "ros2msg", topic.type)
     try:
-        decode = DecoderFactory().decoder_for("cdr", schema)
+        # The parser prints what it raises.
+        with contextlib.redirect_stderr(None):
+            decode = DecoderFactory().decoder_for("cdr", schema)
     except Exception as error:  # its parser raises whatever a line of text leads it to
         raise BagError(
             f"{topic.name}: the definition of {topic.type} cannot be used: {first_line(error)}"
@@ -61,7 +72,7 @@ def decoder_for(topic: TopicInfo) -> Callable[[bytes], Any]:
     def decode_or_say(data: bytes) -> Any:
         try:
             return decode(data)
-        except (struct.error, ValueError, IndexError, NotImplementedError, MemoryError) as error:
+        except _NOT_DECODED as error:
             raise UnreadableBagError(
                 f"{topic.name}: not a {topic.type} in CDR: {first_line(error)}"
             ) from None

@@ -188,8 +188,14 @@ def schema_parts(type_name: str, schema_text: str) -> dict[str, str]:
     parts = {_short(type_name): root}
     for other in others:
         name, _, text = other.partition("\n")
-        parts[name.strip()] = text
+        parts[name.strip().replace("/msg/", "/")] = text
     return parts
+
+
+def definition_lines(schema_text: str) -> list[list[str]]:
+    """Return the words of a definition: what is left without comments and empty lines."""
+    lines = (line.partition("#")[0].split() for line in schema_text.splitlines())
+    return [words for words in lines if words]
 
 
 def missing_definitions(type_name: str, schema_text: str) -> list[str]:

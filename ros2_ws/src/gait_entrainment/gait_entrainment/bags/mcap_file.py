@@ -285,10 +285,16 @@ class McapFile:
         """Enter a record of the summary or of the data section, other than messages."""
         if opcode == Opcode.SCHEMA:
             schema: Schema = self._parse_bytes(Schema.read, content, offset)
+            known_schema = contents.schemas.get(schema.id, schema)
             contents.schemas[schema.id] = schema
+            if known_schema != schema:
+                raise self.damage(offset, f"schema {schema.id} is there twice, and differs")
         elif opcode == Opcode.CHANNEL:
             channel: Channel = self._parse_bytes(Channel.read, content, offset)
+            known_channel = contents.channels.get(channel.id, channel)
             contents.channels[channel.id] = channel
+            if known_channel != channel:
+                raise self.damage(offset, f"channel {channel.id} is there twice, and differs")
         elif opcode == Opcode.STATISTICS:
             contents.statistics = self._parse_bytes(Statistics.read, content, offset)
         elif opcode == Opcode.METADATA:
@@ -353,7 +359,9 @@ class McapFile:
             if name == b"lz4":
                 return bytes(lz4.frame.decompress(data))
         except (zstandard.ZstdError, RuntimeError, MemoryError, ValueError) as error:
-            raise self.damage(offset, f"the chunk cannot be decompressed: {error}") from None
+            raise self.damage(
+                offset, f"the chunk cannot be decompressed: {first_line(error)}"
+            ) from None
         raise self.damage(offset, f"the chunk's compression {name!r} is not zstd, lz4 or none")
 
     def messages(self, chunk: Chunk, rank: int, topics: Mapping[int, str]) -> list[BagMessage]:

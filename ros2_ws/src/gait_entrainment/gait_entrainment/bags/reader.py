@@ -25,6 +25,7 @@ from typing import Any
 from mcap.records import Channel, Schema
 
 from gait_entrainment.bags.decoding import decoder_for
+from gait_entrainment.bags.definitions import definition_lines
 from gait_entrainment.bags.errors import BagError, UnreadableBagError
 from gait_entrainment.bags.mcap_file import BagMessage, Chunk, Contents, McapFile
 from gait_entrainment.bags.metadata import (
@@ -110,10 +111,8 @@ class BagReader:
         for channel in summary.channels.values():
             topic = topic_of(channel, summary.schemas)
             known = self.topics.setdefault(topic.name, topic)
-            if known.type != topic.type:
-                raise UnreadableBagError(
-                    f"{path}: {topic.name} has two types, {known.type} and {topic.type}"
-                )
+            if difference := differing_types(known, topic):
+                raise UnreadableBagError(f"{path}: {topic.name} has {difference}")
             self.counts.setdefault(topic.name, 0)
         for name, count in summary.counts.items():
             self.counts[name] += count
@@ -272,6 +271,15 @@ def topic_of(channel: Channel, schemas: dict[int, Schema]) -> TopicInfo:
         type_hash=channel.metadata.get("topic_type_hash", ""),
         qos_profiles=qos,
     )
+
+
+def differing_types(one: TopicInfo, other: TopicInfo) -> str:
+    """Say how the types of two channels of a topic differ; an empty text where they do not."""
+    if one.type != other.type:
+        return f"two types, {one.type} and {other.type}"
+    if definition_lines(one.schema_text) != definition_lines(other.schema_text):
+        return f"two definitions of {one.type}"
+    return ""
 
 
 def recorded_description(contents: Contents) -> dict[str, Any]:

@@ -24,6 +24,7 @@ from gait_entrainment.bags.mcap_file import BagMessage, Chunk, Contents, McapFil
 from gait_entrainment.bags.metadata import TopicInfo
 from gait_entrainment.bags.reader import (
     bag_files,
+    differing_types,
     read_metadata_file,
     recorded_description,
     topic_of,
@@ -135,11 +136,8 @@ class _Rescue:
         for channel in contents.channels.values():
             topic = topic_of(channel, contents.schemas)
             known = self._topics.setdefault(topic.name, topic)
-            if known.type != topic.type:
-                self.refused[topic.name] = (
-                    f"{topic.name} has two types, {known.type} and {topic.type}: the rest of it "
-                    "is lost"
-                )
+            if difference := differing_types(known, topic):
+                self.refused[topic.name] = f"{topic.name} has {difference}: the rest of it is lost"
             if topic.name in self.writer.counts or topic.name in self.refused:
                 continue
             if is_type_name(topic.type):

@@ -119,7 +119,7 @@ class BagWriter:
         self._max_bytes = max_bytes
         self._max_span = round(max_duration * NANOSECONDS_PER_SECOND)
         self._topics: dict[str, TopicInfo] = {}
-        self._schemas: dict[str, int] = {}  # of the present file: id by type
+        self._schemas: dict[tuple[str, str], int] = {}  # of the present file: id by type and text
         self._channels: dict[str, int] = {}  # of the present file: id by topic
         self._files: list[FileInformation] = []  # the last one is the present file
         self._first = self._last = 0  # log times of the present file
@@ -319,13 +319,14 @@ class BagWriter:
         self._writer.add_metadata(RECORD_NAME, self._description().as_record())
 
     def _register(self, topic: TopicInfo) -> None:
-        if topic.type not in self._schemas:
+        schema = (topic.type, topic.schema_text)
+        if schema not in self._schemas:
             text = topic.schema_text.encode()
-            self._schemas[topic.type] = self._writer.register_schema(topic.type, "ros2msg", text)
+            self._schemas[schema] = self._writer.register_schema(topic.type, "ros2msg", text)
         self._channels[topic.name] = self._writer.register_channel(
             topic.name,
             "cdr",
-            self._schemas[topic.type],
+            self._schemas[schema],
             {
                 "offered_qos_profiles": offered_qos_text(topic.qos_profiles),
                 "topic_type_hash": topic.type_hash,

@@ -97,6 +97,29 @@ def test_message_that_reaches_beyond_its_chunk(tmp_path: Path) -> None:
             list(reader.messages(topics))
 
 
+@pytest.mark.parametrize("kind", ["schema", "channel"])
+def test_a_number_that_stands_for_two_things(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "bag.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream, use_chunking=False, enable_crcs=False, use_statistics=False)
+        writer.start("ros2")
+        for number, text in enumerate((b"int32 x\n", b"float32 y\n"), start=1):
+            schema = writer.register_schema("p/msg/T", "ros2msg", text)
+            channel = writer.register_channel(f"/{number}", "cdr", schema)
+            writer.add_message(channel, number, bytes(8), number)
+        writer.finish()
+    data = path.read_bytes()
+    if kind == "schema":
+        data = data.replace(b"\2\0\7\0\0\0p/msg/T", b"\1\0\7\0\0\0p/msg/T")
+    else:
+        data = data.replace(b"\2\0\2\0\2\0\0\0/2", b"\1\0\2\0\2\0\0\0/2")
+    path.write_bytes(data)
+    with pytest.raises(UnreadableBagError, match=f"{kind} 1 is there twice, and differs"):
+        BagReader(path)
+    assert "intact" in [finding.rule for finding in check(path)]
+    assert f"{kind} 1 is there twice" in recover(path, tmp_path / "rescued").losses[0]
+
+
 @settings(derandomize=True, deadline=None, max_examples=150)
 @given(data=st.data())
 def test_bytes_replaced_at_random(

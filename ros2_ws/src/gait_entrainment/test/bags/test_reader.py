@@ -29,8 +29,11 @@ from gait_entrainment.bags import (
     QosProfile,
     TopicInfo,
     UnreadableBagError,
+    check,
     info,
+    recover,
 )
+from gait_entrainment.bags.decoding import decoder_for
 from gait_entrainment.bags.mcap_file import McapFile
 
 TOPICS = ("/a", "/b/c", "/d")
@@ -292,6 +295,42 @@ def test_what_is_no_bag_is_named(tmp_path: Path, kind: str, reason: str) -> None
     with pytest.raises(UnreadableBagError, match=reason) as caught:
         BagReader(path)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("other", "refused"), [("int32 x # [m]\n\n", False), ("float32 x\n", True)]
+)
+def test_a_topic_with_two_definitions_is_decoded_by_neither(
+    tmp_path: Path, other: str, refused: bool
+) -> None:
+    path = tmp_path / "merged.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start("ros2")
+        for number, text in enumerate(("int32 x\n", other)):
+            schema = writer.register_schema("p/msg/T", "ros2msg", text.encode())
+            channel = writer.register_channel("/a", "cdr", schema, {"number": str(number)})
+            writer.add_message(channel, number, bytes([0, 1, 0, 0, number, 0, 0, 0]), number)
+        writer.finish()
+    if refused:
+        with pytest.raises(UnreadableBagError, match="/a has two definitions of p/msg/T"):
+            BagReader(path)
+        assert "one-type" in [finding.rule for finding in check(path)]
+        assert "/a has two definitions" in recover(path, tmp_path / "rescued").losses[0]
+    else:
+        with BagReader(path) as reader:
+            assert [message.x for _, message in reader.decoded()] == [0, 1]
+
+
+def test_a_definition_that_contains_itself_is_named(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    decode = decoder_for(TopicInfo("/a", "p/msg/T", "T again\n"))
+    with pytest.raises(UnreadableBagError, match="/a: not a p/msg/T in CDR"):
+        decode(bytes([0, 1, 0, 0]))
+    with pytest.raises(BagError, match="/a: the definition of p/msg/T cannot be used"):
+        decoder_for(TopicInfo("/a", "p/msg/T", "int32 x y z\n"))
+    assert capfd.readouterr().err == ""
 
 
 def test_broken_metadata_file_does_not_keep_from_reading(small_bag: Path, tmp_path: Path) -> None:

@@ -217,6 +217,16 @@ def test_topic_without_a_type_is_named(tmp_path: Path) -> None:
     assert found.losses == ("/nameless: lost, its type '/nameless' is none",)
 
 
+def test_topics_of_one_type_keep_their_own_definitions(tmp_path: Path) -> None:
+    texts = {"/old": "int32 x\n", "/new": "float32 x\n"}
+    with BagWriter(tmp_path / "walk", ros_distro="jazzy") as writer:
+        for name, text in texts.items():
+            writer.add_topic(TopicInfo(name, "p/msg/T", text))
+    recover(tmp_path / "walk", tmp_path / "rescued")
+    with BagReader(tmp_path / "rescued") as reader:
+        assert {name: topic.schema_text for name, topic in reader.topics.items()} == texts
+
+
 def test_qos_and_hash_survive(tmp_path: Path, topic: Callable[..., TopicInfo]) -> None:
     odd = QosProfile(history="keep_all", durability="transient_local", lifespan=5)
     before = topic("/clock", "rosgraph_msgs/msg/Clock", odd, QosProfile())
