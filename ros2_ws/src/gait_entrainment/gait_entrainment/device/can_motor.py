@@ -153,7 +153,6 @@ class CanMotorRobot(HostTimedRobot):
             if abs(torque) <= 0.05 * self.capabilities.peak_torque:
                 return
             if time.monotonic() > give_up:
-                self._disable()
                 raise DeviceError(
                     f"{self._name} shows {torque:g} N m at zero command: {doubt} "
                     "is the joint free?"

@@ -137,12 +137,14 @@ class GuardedRobot:
         Raises
         ------
         DeviceError
-            where it is not configured, is latched, or cannot be enabled.
+            where it is not configured, is latched, is active already, or cannot be enabled.
 
         """
         if not self._configured:
             raise DeviceError("the device is not configured; configure it first")
         self._refuse_latched()
+        if self._active:
+            raise DeviceError("the device is active already; deactivate it first")
         self._call(self._robot.activate)
         self._active = True
         self._armed = self.capabilities.simulated

@@ -128,7 +128,13 @@ class HostTimedRobot(AnkleRobot):
 
     def activate(self) -> None:
         """Enable the device and start to stream zero torque."""
-        self._enable()
+        try:
+            self._enable()
+        except BaseException:
+            # How far it got is not known, and no loop will disable it.
+            with contextlib.suppress(Exception):
+                self._disable()
+            raise
         self._ending.clear()
         self._promised = 0
         self._thread = threading.Thread(target=self._run, name="torque loop", daemon=True)

@@ -65,6 +65,7 @@ def ready(limits=None, simulated=True):
     ("limits", "changes", "words"),
     [
         ({}, {"torque": 20.1}, "more than the device can deliver.*-20 to 20"),
+        ({}, {"torque": -20.1}, "more than the device can deliver"),
         ({"torque": 12.0}, {}, "torque: 13 N m.*-12 to 12"),
         ({"torque": 12.0}, {"torque": -13.0}, "torque"),
         ({}, {"torque": math.nan}, "torque: nan"),
@@ -72,7 +73,9 @@ def ready(limits=None, simulated=True):
         ({"duration": 0.09}, {}, "width: 0.1 s"),
         ({"rate": 200.0}, {}, "rate: a pulse of 0.1 s does not reach 13 N m at 200 N m/s"),
         ({"impulse": 1.2}, {}, "impulse: 1.3 N m s within 1 s.*at most 1.2"),
+        ({"rate": 200.0}, {"torque": -13.0}, "rate"),
         ({"impulse": 1.5}, {"period": 0.5}, "impulse: 2.6 N m s"),
+        ({"impulse": 1.5}, {"period": 0.5, "torque": -13.0}, "impulse: 2.6 N m s"),
         ({"duty": 0.05}, {}, "duty: 0.0526.*at most 0.05"),
         ({}, {"first_onset": -1}, "already promised"),
         ({}, {"side": Side.RIGHT}, "other ankle"),
@@ -97,9 +100,47 @@ def test_a_train_at_its_limits_is_accepted(limits):
     assert guard.train is not None
 
 
-def test_a_rate_makes_ramps():
+def test_the_devices_peak_and_the_end_of_what_is_promised_are_allowed():
+    guard, _ = ready()
+    guard.promise(SECOND)
+    guard.schedule(train(torque=-20.0, first_onset=SECOND))
+    assert guard.train is not None
+
+
+def test_one_train_at_a_time_until_it_is_cancelled_or_the_run_begins_anew():
+    guard, driver = ready()
+    for over in (guard.cancel, lambda: guard.begin(0)):
+        guard.schedule(train())
+        with pytest.raises(LimitError, match="under way"):
+            guard.schedule(train())
+        over()
+        assert guard.train is None
+    assert driver.calls.count("schedule") == 2
+
+
+def test_each_activation_and_each_run_begins_anew():
+    guard, driver = ready()
+    with pytest.raises(DeviceError, match="active already; deactivate"):
+        guard.activate()
+    assert driver.calls.count("activate") == 1
+    guard.close()
+    guard.configure()
+    guard.activate()
+    with pytest.raises(DeviceError, match="begin one first"):
+        guard.schedule(train())
+
+
+def test_a_single_pulse_is_held_against_the_impulse_before_anything_moves():
+    limits = DeviceLimits(impulse=1.2)
+    limits.check_pulse(-11.9, 0.1)
+    with pytest.raises(LimitError, match=r"impulse: 1\.3 N m s"):
+        limits.check_pulse(-13.0, 0.1)
+
+
+@pytest.mark.parametrize("torque", [-13.0, 13.0])
+def test_a_rate_makes_ramps(torque):
     guard, driver = ready(DeviceLimits(rate=520.0))
-    guard.schedule(train())
+    guard.schedule(train(torque=torque))
     assert driver.train.ramp == pytest.approx(0.025)
 
 

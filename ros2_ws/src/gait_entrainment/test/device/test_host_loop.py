@@ -20,17 +20,18 @@ import time
 from dataclasses import dataclass
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.device import Capabilities, PulseTrain
+from gait_entrainment.device import Capabilities, DeviceError, Fault, PulseTrain
 from gait_entrainment.device.guard import GuardedRobot, contract_breach
 from gait_entrainment.device.host_loop import HostTimedRobot, Reading
 
 from .emulator_process import until
 
 SECOND = 1_000_000_000
+OVERHEATED = Fault("overheated", "The motor is too hot.")
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,9 @@ class Echo(HostTimedRobot):
         self.gate = threading.Event()
         self.gate.set()
         self.failing = False
+        self.share = 1.0  # of the torque asked for that it measures
+        self.left = 0  # ticks for which torque is still there once zero is asked for
+        self.shut = False
 
     def _open(self):
         pass
@@ -63,13 +67,16 @@ class Echo(HostTimedRobot):
         if self.failing:
             raise OSError("bus gone")
         self.sent.append(torque)
-        return Reading(torque, 0.0)
+        if torque == 0.0 and any(self.sent) and self.left:
+            self.left -= 1
+            return Reading(-20.0, 0.0)
+        return Reading(self.share * torque, 0.0)
 
     def _disable(self):
         self.disabled_after = self.sent[-3:]
 
     def _shut(self):
-        pass
+        self.shut = True
 
 
 def guarded(device):
@@ -86,6 +93,7 @@ def push(robot):
     robot.schedule(PulseTrain(Side.LEFT, onset, 2.0, 1, 5.0, 0.5))
 
 
+@example(gaps=[5] * 6, torques=[1, 2, 3, 1, 2, 3] + [0] * 24, cuts=[15, 20])
 @settings(derandomize=True, deadline=None, max_examples=100)
 @given(
     gaps=st.lists(st.integers(1, 5), min_size=1, max_size=30),
@@ -165,3 +173,68 @@ def test_zero_torque_is_sent_before_disabling(leave):
     getattr(robot, leave)()
     assert device.disabled_after == [0.0, 0.0, 0.0]
     robot.close()
+
+
+def test_what_is_told_is_what_was_measured():
+    device = Echo()
+    device.share = 0.5
+    with guarded(device) as robot:
+        push(robot)
+        until(lambda: any(device.sent))
+        told = set()
+        until(lambda: told.update(robot.promise(time.time_ns()).torques) or 2.5 in told)
+        assert told == {0.0, 2.5}
+    assert device.shut
+
+
+@pytest.mark.parametrize("halt", ["stop", "fault"])
+def test_no_train_brings_torque_after_a_stop_or_a_fault_until_configured(halt):
+    device = Echo()
+    device.configure()
+    device.activate()
+    device.begin(time.time_ns())
+    device.stop() if halt == "stop" else device._fault(OVERHEATED)
+    device.schedule(PulseTrain(Side.LEFT, time.time_ns() + 1_000_000, 2.0, 1, 5.0, 0.5))
+    count = len(device.sent)
+    until(lambda: len(device.sent) > count + 20)
+    assert not any(device.sent)
+    device.close()
+    with guarded(device) as robot:
+        push(robot)
+        until(lambda: any(device.sent))
+        robot.read()
+        assert robot.faults == ()
+
+
+@pytest.mark.parametrize("ticks", [30, 10**6])
+def test_torque_runs_down_before_disabling_but_nobody_waits_for_ever(ticks):
+    device = Echo()
+    robot = guarded(device)
+    push(robot)
+    until(lambda: any(device.sent))
+    device.left = ticks
+    robot.close()
+    assert device.shut
+    assert device.disabled_after == [0.0, 0.0, 0.0]
+    assert (device.left == 0) is (ticks == 30)
+
+
+def test_a_device_that_cannot_be_enabled_is_disabled():
+    device = Echo()
+    device._enable = lambda: device._exchange(math.nan, 0.0) and 1 / 0
+    robot = GuardedRobot(device, Side.LEFT)
+    robot.configure()
+    with pytest.raises(DeviceError, match="ZeroDivisionError"):
+        robot.activate()
+    assert device.disabled_after is not None
+    assert not robot.enabled
+
+
+def test_a_loop_that_failed_is_told_where_the_device_is_deactivated():
+    device = Echo()
+    device.configure()
+    device.activate()
+    device.failing = True
+    until(lambda: device._faults)
+    with pytest.raises(DeviceError, match="loop failed"):
+        device.deactivate()

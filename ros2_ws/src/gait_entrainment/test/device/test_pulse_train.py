@@ -14,6 +14,8 @@
 
 """Pulse trains: what is asked for at an instant, and the impulse in a window, by brute force."""
 
+from fractions import Fraction
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -62,3 +64,20 @@ def test_impulse_in_a_window_is_the_largest_of_all_windows(period, share, count,
     sums = np.concatenate([[0.0], np.cumsum(on)])
     largest = (sums[window:] - sums[:-window]).max()
     assert abs(train.impulse_within(window / 1e3) - 2.0 * largest / 1e3) < 1e-9
+
+
+@settings(derandomize=True, deadline=None, max_examples=300)
+@given(
+    first=st.integers(0, 2**62),
+    period=st.floats(0.02, 3.0),
+    number=st.integers(0, 20_000),
+    share=st.floats(0.01, 0.99),
+)
+def test_each_pulse_begins_and_ends_at_its_nanosecond(first, period, number, share):
+    train = PulseTrain(Side.LEFT, first, period, 20_001, 5.0, period * share)
+    onset, end = train.onset(number), train.end(number)
+    assert abs(onset - first - Fraction(period) * number * 10**9) <= Fraction(51, 100)
+    assert (train.latest(onset - 1), train.latest(onset)) == (number - 1, number)
+    assert train.onsets_within(onset, onset + 1) == (onset,)
+    assert onset not in train.onsets_within(onset - 5, onset)
+    assert (train.torque_at(end - 1), train.torque_at(end)) == (5.0, 0.0)
