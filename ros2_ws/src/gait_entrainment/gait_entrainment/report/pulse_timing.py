@@ -14,7 +14,8 @@
 
 """When the pulses of a run really came: distribution for outcome and summary, and from a bag."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,7 @@ def recorded_timings(path: Path | str) -> list[PulseTiming]:
     Raises
     ------
     BagError
-        where it is no bag, or is damaged.
+        where it is no bag, is damaged, or its messages lack a field.
 
     """
     # Imported here: a simulation has no bag, and does without the readers.
@@ -48,20 +49,37 @@ def recorded_timings(path: Path | str) -> list[PulseTiming]:
             # In the order of reception: a stop voids only what was promised before it.
             found = sorted(bag.messages(names), key=lambda m: m.place) if names else []
             for raw in found:
-                message = bag.decoder(raw.topic)(raw.data)
-                instant = stamp_nanoseconds(message.header.stamp)
-                if suffix == _PULSES:
-                    onsets.add_pulse(instant, message.torque, message.duration)
-                elif suffix == _STATES:
-                    torques = message.commanded_torque, message.measured_torque
-                    onsets.add_state(RobotState(instant, *torques, message.angle))
-                elif message.stop:
-                    onsets.stop(instant)
-                else:
-                    named = [stamp_nanoseconds(onset) for onset in message.onsets]
-                    onsets.add_promise(named, stamp_nanoseconds(message.valid_until))
+                with fields_expected(raw.topic):
+                    _add(onsets, suffix, bag.decoder(raw.topic)(raw.data))
     onsets.finish()
     return onsets.timings
+
+
+def _add(onsets: MeasuredOnsets, suffix: str, message: Any) -> None:
+    instant = stamp_nanoseconds(message.header.stamp)
+    if suffix == _PULSES:
+        onsets.add_pulse(instant, message.torque, message.duration)
+    elif suffix == _STATES:
+        torques = message.commanded_torque, message.measured_torque
+        onsets.add_state(RobotState(instant, *torques, message.angle))
+    elif message.stop:
+        onsets.stop(instant)
+    else:
+        named = [stamp_nanoseconds(onset) for onset in message.onsets]
+        onsets.add_promise(named, stamp_nanoseconds(message.valid_until))
+
+
+@contextmanager
+def fields_expected(topic: str) -> Iterator[None]:
+    """Raise BagError where a message lacks a field: the bag may define it otherwise."""
+    from gait_entrainment.bags import BagError
+
+    try:
+        yield
+    except AttributeError as error:
+        raise BagError(
+            f"{topic}: its messages have no field {error.name}: recorded by another version"
+        ) from None
 
 
 def timing_outcome(timings: Sequence[PulseTiming], stride: float) -> dict[str, Any]:

@@ -38,7 +38,7 @@ from gait_entrainment.device import PulseTiming
 from gait_entrainment.events import GaitEvent, Stride
 from gait_entrainment.experiment import Conductor
 from gait_entrainment.protocol import Protocol, ProtocolError, read_protocol
-from gait_entrainment.report.pulse_timing import recorded_timings
+from gait_entrainment.report.pulse_timing import fields_expected, recorded_timings
 
 # Strides of which the ankle torque is read: more would not be told apart in a figure.
 STRIDES_DRAWN = 24
@@ -215,7 +215,8 @@ class _Record:
         decoded.sort(key=lambda message: message.place)
         decode = {name: bag.decoder(name) for name in suffixes}
         for message in decoded:
-            self._add(suffixes[message.topic], message, decode[message.topic](message.data))
+            with fields_expected(message.topic):
+                self._add(suffixes[message.topic], message, decode[message.topic](message.data))
         self.real_time_factor = _real_time_factor(clocks)
 
     def _add(self, suffix: str, message: BagMessage, content: Any) -> None:
@@ -247,7 +248,8 @@ class _Record:
         differences = []
         for suffix, contents in self._published.items():
             anew = [published_values(result, side) for result in results[suffix]]
-            differences.append(_difference(suffix, contents, anew))
+            with fields_expected(suffix):
+                differences.append(_difference(suffix, contents, anew))
         return tuple(filter(None, differences))
 
 
@@ -322,9 +324,11 @@ def _torque_rows(
     bag: BagReader, name: str, side: Side, start: int, end: float
 ) -> Iterator[tuple[int, float, float, float]]:
     for _, message in bag.decoded([name], start, end):
-        yield (
-            stamp_nanoseconds(message.header.stamp),
-            message.intrinsic[side],
-            message.delivered[side],
-            message.effective_perturbation[side],
-        )
+        with fields_expected(name):
+            row = (
+                stamp_nanoseconds(message.header.stamp),
+                message.intrinsic[side],
+                message.delivered[side],
+                message.effective_perturbation[side],
+            )
+        yield row

@@ -15,9 +15,11 @@
 """The bag that comes with the project holds what was recorded live over the nodes."""
 
 import json
+import re
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -48,18 +50,20 @@ def test_the_outcome_is_that_of_the_simulation(capsys):
     assert "the same to the last bit" in entrain(capsys, "analyze", BAG)[1]
 
 
-def copy(out, keep, told=None):
+def copy(out, keep, told=None, renamed=("", "")):
     """
     Copy the bag; `keep` may change the bytes of a message, or leave it out with None.
 
-    `told` replaces custom data.
+    `told` replaces custom data; a field of a topic is `renamed`.
     """
     with (
         BagReader(BAG) as bag,
         BagWriter(out, ros_distro="jazzy", custom_data=bag.custom_data | (told or {})) as writer,
     ):
         for topic in bag.topics.values():
-            writer.add_topic(topic)
+            name, field = renamed
+            text = re.sub(rf"(?m)^(\S+ ){field}\b", r"\1other", topic.schema_text)
+            writer.add_topic(replace(topic, schema_text=text) if topic.name == name else topic)
         number = dict.fromkeys(bag.topics, 0)
         for message in sorted(bag.messages(), key=lambda message: message.place):
             data = keep(message.topic, number[message.topic], message.data)
@@ -167,3 +171,23 @@ def test_what_cannot_be_analyzed_is_one_line(capsys, tmp_path, name, expected, w
     assert (code, out) == (expected, "")
     assert err.count("\n") == 1
     assert words in err
+
+
+@pytest.mark.parametrize(
+    "renamed",
+    [
+        ("/gait_events", "kind"),
+        ("/perturbation/torque_profile", "onsets"),
+        ("/perturbation/pulses", "torque"),
+        ("/gait/strides", "number"),
+    ],
+)
+def test_messages_of_another_version_are_named(capsys, tmp_path, renamed):
+    topics = {*NEEDED, renamed[0]}
+    bag = copy(
+        tmp_path / "old", lambda topic, _, data: data if topic in topics else None, {}, renamed
+    )
+    code, out, err = entrain(capsys, "analyze", bag)
+    assert (code, out) == (1, "")
+    assert err.count("\n") == 1
+    assert f"{renamed[0].strip('/')}: its messages have no field {renamed[1]}" in err
