@@ -58,6 +58,10 @@ class OdriveCanOptions(CanMotorOptions):
     )
 
 
+# An axis that does not send its heartbeat this often [s] is asked for it: it can be switched off.
+HEARTBEAT_PERIOD = 0.15
+
+
 class OdriveCanRobot(CanMotorRobot):
     """See the module's docstring; docs/drivers.md has wiring and hazards."""
 
@@ -68,6 +72,7 @@ class OdriveCanRobot(CanMotorRobot):
     def __init__(self, side: Side, options: OdriveCanOptions, seed: int) -> None:  # noqa: ARG002
         super().__init__(side, options, f"ODrive {options.node_id}", options.motor_torque)
         self._heartbeat = Heartbeat(0, IDLE)
+        self._beat_at = 0.0  # when it came [s, steady]
         self._angle = math.nan  # of the motor [rad]
 
     def _open(self) -> None:
@@ -82,7 +87,8 @@ class OdriveCanRobot(CanMotorRobot):
     def _exchange(self, torque: float, patience: float) -> Reading | None:
         options = self._options
         self._command(SET_TORQUE, pack_torque(torque / options.ratio, options.motor_torque))
-        for question in (ENCODER, TORQUES):
+        overdue = time.monotonic() - self._beat_at > HEARTBEAT_PERIOD
+        for question in (HEARTBEAT, ENCODER, TORQUES) if overdue else (ENCODER, TORQUES):
             self._command(question, remote=True)
         measured = self._answer(self._torque, time.monotonic() + patience)
         if measured is None:
@@ -131,7 +137,7 @@ class OdriveCanRobot(CanMotorRobot):
         if node != self._options.node_id:
             self._others.add(node)
         elif command == HEARTBEAT and (heartbeat := unpack_heartbeat(data)) is not None:
-            self._heartbeat = heartbeat
+            self._heartbeat, self._beat_at = heartbeat, time.monotonic()
             return heartbeat
         elif command == ENCODER and (estimates := unpack_pair(data)) is not None:
             self._angle = 2 * math.pi * estimates[0]

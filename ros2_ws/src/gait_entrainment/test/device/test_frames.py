@@ -20,7 +20,7 @@ import can
 import pytest
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.device import DeviceError
+from gait_entrainment.device import DeviceError, odrive_can
 from gait_entrainment.device.ak_mit import (
     ENTER,
     EXIT,
@@ -40,6 +40,7 @@ from gait_entrainment.device.odrive import (
     ENCODER,
     HEARTBEAT,
     IDLE,
+    STOP,
     TORQUE_MODE,
     TORQUES,
     Heartbeat,
@@ -129,6 +130,15 @@ def test_angle_and_torque_are_the_ankles(ratio):
     reading = robot._exchange(7.0, 0.01)
     assert reading.angle == pytest.approx(math.pi / 2 / ratio)
     assert reading.torque == pytest.approx(2.0 * ratio)  # the estimate, not the target
+
+
+def test_an_odrive_whose_heartbeat_is_switched_off_is_asked_for_it(monkeypatch):
+    monkeypatch.setattr(odrive_can, "HEARTBEAT_PERIOD", 0.0)
+    robot, wire = odrive()  # this bus carries answers only
+    robot._enable()
+    assert robot._exchange(1.0, 0.01).faults == ()
+    wire.motor.obey(frame_id(0, STOP), b"", remote=False, now=wire.now)
+    assert [fault.name for fault in robot._exchange(1.0, 0.01).faults] == ["emergency_stop"]
 
 
 class Telling:
