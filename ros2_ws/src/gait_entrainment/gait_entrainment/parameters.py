@@ -95,8 +95,15 @@ class WalkerParameters:
                     f" {item.metadata['unit']}"
                 )
             object.__setattr__(self, item.name, float(value))
-        self._check_linkage()
-        self._check_gait()
+        try:
+            self._check_linkage()
+            self._check_gait()
+        except ParameterError:
+            raise
+        except (ArithmeticError, ValueError):  # an overflow, a root or angle that is none
+            raise ParameterError(
+                "the values are too large, too small or too far apart to calculate with"
+            ) from None
 
     def _check_linkage(self) -> None:
         """Refuse angles at which the feet do not separate or the toe cannot leave the ground."""
@@ -130,13 +137,13 @@ class WalkerParameters:
     def _check_gait(self) -> None:
         """Refuse a stiffness with which the period-one gait falls or flies off."""
         least, most = self.just_vault_over_stiffness, self.just_fly_off_stiffness
-        if least >= most:
+        if not least < most:  # also where one of them is not a number
             raise ParameterError(
                 f"leg_angle {self.leg_angle:.6g} rad with max_plantarflexion"
                 f" {self.max_plantarflexion:.6g} rad leaves no gait: the walker falls below an"
                 f" ankle_stiffness of {least:.4g} N m/rad and flies off above {most:.4g} N m/rad"
             )
-        allowed = f"allowed: {least:.4g} to {most:.4g} N m/rad"
+        allowed = f"allowed: {least:.6g} to {most:.6g} N m/rad"
         if self.ankle_stiffness <= least:
             raise ParameterError(
                 f"ankle_stiffness {self.ankle_stiffness:g} N m/rad is not above the"

@@ -69,7 +69,7 @@ def test_message_says_by_how_much_the_walker_falls():
     angle = math.pi / 6 + 2.576 - math.pi / 2
     missing = (67.4792 - 60) * angle**2 / 2 / 0.75
     assert f"for want of {missing:.3g} J" in str(refused.value)
-    assert "allowed: 67.48 to 111.9 N m/rad" in str(refused.value)
+    assert "allowed: 67.4792 to 111.878 N m/rad" in str(refused.value)
     assert "\n" not in str(refused.value)
 
 
@@ -114,6 +114,19 @@ def test_impossible_walkers_are_refused_by_the_field_to_change(changed, name):
     with pytest.raises(ParameterError, match=f"^{name} ") as refused:
         WalkerParameters(**changed)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"leg_length": 1e200},
+        {"leg_length": 1e-200, "foot_length": 2e-201},
+        {"gravity": 1e200, "mass": 1e200, "leg_length": 1e50, "foot_length": 1e49},
+    ],
+)
+def test_values_beyond_floating_point_are_refused_too(changed):
+    with pytest.raises(ParameterError):
+        WalkerParameters(**changed)
 
 
 @settings(derandomize=True, deadline=None, max_examples=60)

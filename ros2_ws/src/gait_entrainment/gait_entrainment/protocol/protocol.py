@@ -22,7 +22,7 @@ peak ankle torque, at a period 50 ms below the walker's own stride period.
 import math
 from dataclasses import dataclass, field
 
-from gait_entrainment.conventions import Side
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side, nanoseconds
 from gait_entrainment.parameters import WalkerParameters
 
 
@@ -62,7 +62,8 @@ class PulsePlan:
         else:
             assert self.period_offset is not None
             period = measured_period + self.period_offset
-        if not period > self.width:
+        # In stamps: successive onsets are at least the whole nanoseconds of a period apart.
+        if not period * NANOSECONDS_PER_SECOND >= nanoseconds(self.width) + 1:
             raise ProtocolError(
                 f"pulses.width: {self.width:g} s makes the pulses overlap at a pulse period of "
                 f"{period:.6g} s; allowed: below the period"

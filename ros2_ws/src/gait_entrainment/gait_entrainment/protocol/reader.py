@@ -20,6 +20,7 @@ PyYAML's node graph keeps the line of every key, which its loaded dictionaries d
 
 import contextlib
 import math
+import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -65,17 +66,19 @@ class _Range:
         return (" and ".join(bounds) or "any finite number") + unit
 
 
-# Counts end where a run would last for days: a million strides are three weeks of walking.
+# Counts end where a run would last for days: a million strides are three weeks of walking. A pulse
+# shorter than a nanosecond has no stamps, and a run is promised in steps of at most a pulse period
+# until the stride period is known.
 _COUNT = _Range(1, 1_000_000)
 _RANGES = {
     "baseline": _COUNT,
     "washout": _Range(0, 1_000_000),
     "seed": _Range(0, 2**63 - 1),
     "pulses.count": _COUNT,
-    "pulses.width": _Range(0, 10, low_open=True, unit="s"),
+    "pulses.width": _Range(1e-9, 10, unit="s"),
     "pulses.torque": _Range(unit="N m"),
     "pulses.torque_fraction": _Range(-1, 1, unit="of the peak ankle torque"),
-    "pulses.period": _Range(0, 100, low_open=True, unit="s"),
+    "pulses.period": _Range(1e-3, 100, unit="s"),
     "pulses.period_offset": _Range(-100, 100, unit="s"),
     "pulses.initial_phase": _Range(0, 1, high_open=True),
 }
@@ -111,12 +114,12 @@ def read_protocol(
 
     """
     entries = dict(_entries(source)) if source is not None else {}
-    for key, (value, where) in (overrides or {}).items():
-        for pair in _ALTERNATIVES:
-            if key in pair:
-                for alternative in pair:
-                    entries.pop(alternative, None)
-        entries[key] = _Entry(value, where)
+    overrides = overrides or {}
+    for pair in _ALTERNATIVES:
+        if any(key in overrides for key in pair):
+            for alternative in pair:
+                entries.pop(alternative, None)
+    entries |= {key: _Entry(*given) for key, given in overrides.items()}
     for pair in _ALTERNATIVES:
         if all(key in entries for key in pair):
             where = entries[pair[1]].where
@@ -153,6 +156,8 @@ def _entries(source: Path | str) -> Iterator[tuple[str, _Entry]]:
         line = f":{mark.line + 1}" if mark else ""
         problem = getattr(error, "problem", None) or "unreadable"
         raise ProtocolError(f"{name}{line}: not valid YAML: {problem}") from None
+    except RecursionError:
+        raise ProtocolError(f"{name}: nested too deeply for a protocol") from None
     if root is not None:
         yield from _walk(root, name, "")
 
@@ -172,7 +177,7 @@ def _walk(node: yaml.Node, name: str, prefix: str) -> Iterator[tuple[str, _Entry
         seen.add(key)
         if key in ("pulses", "walker"):
             yield from _walk(value_node, name, key + ".")
-        elif key not in _FIELDS:
+        elif key not in _FIELDS or "." in str(key_node.value):  # a section's field has one place
             known = ", ".join(
                 sorted(f[len(prefix) :] for f in _FIELDS if f.startswith(prefix) and f != prefix)
                 if prefix
@@ -182,7 +187,12 @@ def _walk(node: yaml.Node, name: str, prefix: str) -> Iterator[tuple[str, _Entry
         elif not isinstance(value_node, yaml.ScalarNode):
             raise ProtocolError(f"{where}: {key}: must be a single value")
         else:
-            value = yaml.SafeLoader("").construct_object(value_node)
+            try:
+                value = yaml.SafeLoader("").construct_object(value_node)
+            except Exception:  # an unknown tag, a month 13: PyYAML lets pass what it runs into
+                raise ProtocolError(
+                    f"{where}: {key}: {value_node.value[:40]!r} cannot be read as a value"
+                ) from None
             yield key, _Entry(value, where)
 
 
@@ -223,18 +233,21 @@ def _checked(key: str, entry: _Entry) -> object:
             raise ProtocolError(f"{entry.where}: side: {value!r}; allowed: left, right")
         return Side[str(value).upper()]
     if key in _TEXTS:
-        # The name becomes a folder's: no separators, nothing hidden, nothing empty.
-        if not isinstance(value, str) or not value or "/" in value or value.startswith("."):
+        # The name becomes a folder's: no separators, nothing hidden, nothing empty or unseen.
+        plain = isinstance(value, str) and value.isprintable() and value.strip()
+        if not plain or "/" in str(value) or str(value).startswith("."):
             raise ProtocolError(f"{entry.where}: {key}: {value!r}; allowed: a plain name")
         return value
     allowed = _RANGES.get(key, _Range())
     if isinstance(value, str):  # YAML 1.1 reads 1e-3, which has no dot, as text
         with contextlib.suppress(ValueError):
             value = float(value)
+    elif isinstance(value, int) and abs(value) > sys.float_info.max:
+        value = math.copysign(math.inf, 1 if value > 0 else -1)
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ProtocolError(f"{entry.where}: {key}: {value!r} is not a number; allowed: {allowed}")
     if key in _INTEGERS and not isinstance(value, int):
         raise ProtocolError(f"{entry.where}: {key}: {value!r}; allowed: a whole number {allowed}")
     if value not in allowed:
-        raise ProtocolError(f"{entry.where}: {key}: {value:g}; allowed: {allowed}")
+        raise ProtocolError(f"{entry.where}: {key}: {value}; allowed: {allowed}")
     return value if key in _INTEGERS else float(value)

@@ -89,10 +89,11 @@ def test_options_reach_the_walker(capsys):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--width", "-0.1"], ["--width", "pulses.width", "above 0"]),
+        (["--width", "-0.1"], ["--width", "pulses.width", "at least 1e-09"]),
         (["--width", "nan"], ["--width", "nan"]),
-        (["--ankle-stiffness", "60"], ["--ankle-stiffness", "67.48 to 111.9"]),
+        (["--ankle-stiffness", "60"], ["--ankle-stiffness", "67.4792 to 111.878"]),
         (["--period", "0.05"], ["overlap"]),
+        (["--torque", "5", "--torque-fraction", "0.1"], ["--torque-fraction", "not both"]),
         (["--period-offset", "-1.9"], ["overlap"]),
         (["--baseline", "1"], ["--baseline", "at least 2"]),
         (["no_such_file.yaml"], ["no_such_file.yaml", "cannot be read"]),

@@ -87,8 +87,18 @@ def test_what_is_written_reads_back_the_same(
         ("washout: -1", ("washout", "at least 0")),
         ("side: middle", ("side", "left, right")),
         ("name: ../x", ("name", "plain name")),
+        ('name: "a\\nb"', ("name", "plain name")),
+        ('driver: " "', ("driver", "plain name")),
         ("pulses: 3", ("pulses", "mapping")),
-        ("pulses: {width: -0.1}", ("pulses.width", "-0.1", "above 0", "s")),
+        ("pulses: {width: -0.1}", ("pulses.width", "-0.1", "at least 1e-09", "s")),
+        ("pulses: {width: 1e-10}", ("pulses.width", "1e-10", "at least 1e-09")),
+        ("pulses: {period: 1e-9}", ("pulses.period", "1e-09", "at least 0.001")),
+        ("pulses: {width: !!int abc}", ("pulses.width", "'abc' cannot be read")),
+        ("pulses: {width: !unknown 3}", ("pulses.width", "cannot be read")),
+        (f"pulses: {{width: {'9' * 5000}}}", ("pulses.width", "cannot be read")),
+        (f"pulses: {{torque: 1{'0' * 400}}}", ("pulses.torque", "inf", "finite")),
+        ("pulses.width: 0.2", ("pulses.width", "unknown field", "pulses")),
+        ("baseline: 1000001", ("baseline", "1000001", "at most")),
         ("pulses: {width: .nan}", ("pulses.width", "nan")),
         ("pulses: {width: abc}", ("pulses.width", "not a number")),
         ("pulses: {width: [1]}", ("pulses.width", "single value")),
@@ -98,7 +108,8 @@ def test_what_is_written_reads_back_the_same(
         ("pulses: {initial_phase: 1}", ("pulses.initial_phase", "below 1")),
         ("pulses: {torque: 5, torque_fraction: 0.1}", ("torque_fraction", "not both")),
         ("pulses: {period: 2, period_offset: 0.1}", ("period_offset", "not both")),
-        ("walker: {ankle_stiffness: 60}", ("ankle_stiffness", "67.48 to 111.9")),
+        ("walker: {ankle_stiffness: 60}", ("ankle_stiffness", "67.4792 to 111.878")),
+        ("walker: {leg_length: 1e200}", ("walker", "too large")),
         ("walker: {mass: .nan}", ("mass",)),
         ("walker: {weight: 3}", ("walker.weight", "unknown field", "mass")),
         ("seed: 1\nseed: 2", ("seed", "twice")),
@@ -127,6 +138,9 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path):
     broken.write_text("name: x\npulses: {width: 1\n")
     with pytest.raises(ProtocolError, match=r"broken\.yaml:3: not valid YAML"):
         read_protocol(broken)
+    broken.write_text("{a: " * 3000)
+    with pytest.raises(ProtocolError, match=r"broken\.yaml: nested too deeply"):
+        read_protocol(broken)
 
 
 def test_an_empty_file_is_the_default(tmp_path):
@@ -142,6 +156,9 @@ def test_an_option_replaces_the_file_and_its_alternative():
     assert protocol.pulses.torque is None
     assert protocol.pulses.torque_fraction == 0.2
     assert protocol.pulses.period == 2.0
+    both = {"pulses.period": (1.8, "--period"), "pulses.period_offset": (-0.1, "--period-offset")}
+    with pytest.raises(ProtocolError, match=r"^--period-offset: .* not both"):
+        read_protocol(None, both)
     with pytest.raises(ProtocolError, match=r"^--width: pulses.width: -1"):
         read_protocol(None, {"pulses.width": (-1.0, "--width")})
 
@@ -154,4 +171,7 @@ def test_pulses_that_would_overlap_at_the_measured_period_are_refused():
     with pytest.raises(ProtocolError, match="overlap"):
         PulsePlan(width=0.1, period_offset=-1.9).period_for(1.93)
     assert PulsePlan(period_offset=-0.05).period_for(2.0) == 1.95
+    # The width rounds up to 3 ns, and some of the onsets are only 2 ns apart.
+    with pytest.raises(ProtocolError, match="overlap"):
+        PulsePlan(width=2.6e-9, period_offset=0.0).period_for(2.7e-9)
     assert math.isnan(PulsePlan(period_offset=0.0).period_for(1.0)) is False
