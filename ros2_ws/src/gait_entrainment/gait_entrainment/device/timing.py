@@ -147,6 +147,8 @@ class TimingAudit:
         during = [s for s in self._states if pulse.onset <= s.stamp <= end]
         self._states = [*before[-1:], *(s for s in self._states if s.stamp >= pulse.onset)]
         seen = [*before[-1:], *during]
+        if pulse.height == 0:  # of no height, a sham: no state can show it
+            return PulseTiming(pulse.onset, None, None)
         sent = next((s.stamp for s in during if s.commanded / pulse.height > 0), None)
         stamps, torques = [s.stamp for s in seen], [s.measured for s in seen]
         found = measured_onset(stamps, torques, pulse.height)
@@ -172,7 +174,8 @@ def distribution(
     """
     Return how late pulses came against their commanded onsets; None where no pulse shows it.
 
-    The kind of onset is "sent" or "measured"; percentages are of a stride [s].
+    The kind of onset is "sent" or "measured"; percentages are of a stride [s], None where that is
+    NaN: unknown.
     """
     late = lateness_ms(timings, kind)
     if not late:
@@ -182,7 +185,10 @@ def distribution(
         "pulses": len(late),
         "missing": len(timings) - len(late),
         **{f"{name}_ms": value for name, value in figures.items()},
-        **{f"{name}_percent": value / stride / 10 for name, value in figures.items()},
+        **{
+            f"{name}_percent": None if math.isnan(stride) else value / stride / 10
+            for name, value in figures.items()
+        },
     }
 
 

@@ -69,7 +69,8 @@ class Conductor:
     train
         The planned pulses; None until the strike that starts the last baseline stride.
     measured_period, measured_period_error
-        Mean stride period over the baseline [s] and its standard error; NaN until known.
+        Mean stride period over the baseline [s] and its standard error; NaN while, or where, no
+        complete stride tells it.
 
     """
 
@@ -143,9 +144,9 @@ class Conductor:
         """Plan the pulses at the strike [ns] that starts the last baseline stride."""
         protocol, plan = self.protocol, self.protocol.pulses
         if self._periods:
-            self.measured_period = statistics.fmean(self._periods)
+            stride = self.measured_period = statistics.fmean(self._periods)
         elif plan.period is not None:  # no complete stride was asked for: the best guess there is
-            self.measured_period = plan.period
+            stride = plan.period
         else:
             raise ProtocolError(
                 "baseline: no complete stride was seen from which period_offset could be measured"
@@ -153,11 +154,11 @@ class Conductor:
         if len(self._periods) > 1:
             spread = statistics.stdev(self._periods, self.measured_period)
             self.measured_period_error = spread / math.sqrt(len(self._periods))
-        delay = (1 + plan.initial_phase) * self.measured_period
+        delay = (1 + plan.initial_phase) * stride
         return PulseTrain(
             side=protocol.side,
             first_onset=strike + nanoseconds(delay),
-            period=plan.period_for(self.measured_period),
+            period=plan.period_for(stride),
             count=plan.count,
             torque=protocol.pulse_torque,
             duration=plan.width,

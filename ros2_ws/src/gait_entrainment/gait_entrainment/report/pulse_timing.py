@@ -102,10 +102,11 @@ def timing_summary(outcome: dict[str, Any]) -> list[str]:
         if figures is None or not (figures["worst_ms"] or figures["missing"]):
             continue
         missing = f", {figures['missing']} never seen" if figures["missing"] else ""
+        percent = figures["worst_percent"]
+        share = "" if percent is None else f": {percent:.2f} % of a stride"
         lines.append(
             f"pulses {kind:<10}{figures['median_ms']:.1f} ms after their command (median), "
-            f"{figures['p99_ms']:.1f} (99 %), {figures['worst_ms']:.1f} (worst: "
-            f"{figures['worst_percent']:.2f} % of a stride){missing}"
+            f"{figures['p99_ms']:.1f} (99 %), {figures['worst_ms']:.1f} (worst{share}){missing}"
         )
     return lines
 

@@ -42,8 +42,9 @@ def outcome_of(run: "Simulation | RecordedRun") -> dict[str, Any]:
     last = analysis.entrainments[-1] if analysis.entrainments else None
     verdict = last.verdict if last else Verdict.UNDECIDED
     entrained = verdict is Verdict.ENTRAINED
-    lags = [p.phase_lag for p in analysis.pulses[-FINAL_PULSES:]]
-    toe_off = analysis.pulses[-1].toe_off if analysis.pulses else None
+    placed = [p for p in analysis.pulses if p.toe_off is not None]  # the others have no lag
+    lags = [p.phase_lag for p in placed[-FINAL_PULSES:]]
+    toe_off = placed[-1].toe_off if placed else None
     parameters = asdict(protocol)
     parameters["side"] = protocol.side.name.lower()
     parameters["pulses"]["torque"] = protocol.pulse_torque
@@ -97,13 +98,14 @@ def summary(outcome: dict[str, Any]) -> str:
     strides, pulses = outcome["stride_period"], outcome["pulses"]
     unperturbed, period = outcome["unperturbed_stride_period"], outcome["perturbation_period"]
     lines = [f"strides          {len(strides)}, pulses placed in them: {len(pulses)}"]
-    if unperturbed is not None:
-        lines.append(f"stride period    {unperturbed:.4f} s unperturbed, {strides[-1]:.4f} s last")
+    if strides:
+        measured = "not measured" if unperturbed is None else f"{unperturbed:.4f} s"
+        lines.append(f"stride period    {measured} unperturbed, {strides[-1]:.4f} s last")
     if period is not None:
         torque, width = parameters["pulses"]["torque"], parameters["pulses"]["width"]
+        offset = "" if unperturbed is None else f" ({(period - unperturbed) * 1e3:+.1f} ms)"
         lines.append(
-            f"pulses           {torque:.2f} N m for {width:g} s every {period:.4f} s"
-            f" ({(period - unperturbed) * 1e3:+.1f} ms)"
+            f"pulses           {torque:.2f} N m for {width:g} s every {period:.4f} s{offset}"
         )
     verdict = outcome["verdict"]
     if outcome["entrained"]:

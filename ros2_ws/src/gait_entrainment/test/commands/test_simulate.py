@@ -60,6 +60,28 @@ def test_json_holds_what_is_promised(capsys):
     assert outcome["parameters"]["walker"]["ankle_stiffness"] == 87.3
 
 
+def test_a_sham_of_no_torque_is_walked_and_drifts(capsys):
+    code, out, err = simulate(capsys, "--json", "--torque", "0")
+    assert (code, err) == (0, "")
+    outcome = json.loads(out)
+    assert outcome["verdict"] == "drifting"
+    assert len(outcome["pulses"]) == 50
+    assert outcome["pulse_timing"]["measured"] is None  # no torque shows them
+    code, out, err = simulate(capsys, "--torque", "0", "--driver", "emulated")
+    assert (code, err) == (0, "")
+
+
+def test_a_stride_period_that_nothing_measured_is_not_told(capsys):
+    options = ["--baseline", "1", "--period", "1.8", "--driver", "emulated"]
+    code, out, _ = simulate(capsys, *options)
+    assert code == 0
+    assert "not measured unperturbed" in out
+    assert "every 1.8000 s\n" in out
+    _, out, _ = simulate(capsys, *options, "--json")
+    assert "NaN" not in out
+    assert json.loads(out)["unperturbed_stride_period"] is None
+
+
 def test_options_reach_the_walker(capsys):
     _, out, _ = simulate(
         capsys,
