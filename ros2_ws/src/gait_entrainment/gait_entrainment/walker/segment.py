@@ -117,6 +117,11 @@ PANEL_WIDTH: Final = 1.6
 # A panel this narrow [rad, or its root up to a stall] is taken as it is.
 NARROWEST_PANEL: Final = 1e-12
 
+# Up to this width [rad] a panel whose squared rate stays within this part of itself is smooth: the
+# nearest stall is many widths away. If it does not converge, the rounding of that rate is why.
+SMOOTH_PANEL: Final = 1e-3
+SMOOTH_CHANGE: Final = 0.1
+
 # Longest a segment may take [s]: where a stall is approached along a tangent, it takes forever.
 LONGEST: Final = 1e6
 
@@ -322,6 +327,17 @@ def short_cosine(x: float) -> float:
 
 
 @compiled
+def smooth(model: Model, segment: Segment, start: float, end: float) -> bool:
+    """Whether the speed hardly changes over a panel, so that no narrower one would do better."""
+    if end - start > SMOOTH_PANEL:
+        return False
+    square = squared_rate(model, segment, start)
+    change = abs(squared_rate(model, segment, 0.5 * (start + end)) - square)
+    change = max(change, abs(squared_rate(model, segment, end) - square))
+    return change < SMOOTH_CHANGE * square
+
+
+@compiled
 def double_stance_time(
     model: Model, work: Floats, segment: Segment, start: float, end: float
 ) -> float:
@@ -339,6 +355,12 @@ def double_stance_time(
             part, converged = stall_panel(model, work, segment, here, there)
         else:
             part, converged = panel(model, work, segment, here, there)
+        if not converged and to_stall:
+            converged = smooth(
+                model, segment, segment.end - here * here, segment.end - there * there
+            )
+        elif not converged:
+            converged = smooth(model, segment, here, there)
         if converged or abs(width) < NARROWEST_PANEL:
             total += part
             if not total < LONGEST:

@@ -15,6 +15,7 @@
 """The edge cases of the torque, and the reported ends of a walk."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from scipy.integrate import quad
 
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment.walker import EndingKind, Phase, Walker, step_to_step, walk
+from gait_entrainment.walker import EndingKind, Phase, Walker, segment, step_to_step, walk
 
 PERIOD = float(walk(TABLE_1, 1).heel_strikes[1])
 TOE_OFF = float(walk(TABLE_1, 1).toe_offs[0])
@@ -306,3 +307,47 @@ def test_step_to_step_is_nan_where_the_walker_falls():
 def test_a_start_without_speed_is_refused(speed):
     with pytest.raises(ValueError, match="initial_speed"):
         Walker(TABLE_1, initial_speed=speed)
+
+
+@pytest.mark.parametrize("torque", [0.0, -0.11])
+def test_a_start_at_almost_no_speed_takes_few_panels(monkeypatch, torque):
+    """
+    Near alpha = pi / 4 the collision leaves a speed whose square is mostly rounding.
+
+    No panel over that converges, and none so narrow: halving them went down to 1e-12 rad.
+    """
+    parameters = WalkerParameters(
+        mass=7.5,
+        leg_length=0.2070358564066132,
+        foot_length=0.06037016813419777,
+        gravity=1.7398843650819493,
+        leg_angle=0.7853884337131884,
+        max_plantarflexion=3.140736786912436,
+        ankle_stiffness=0.2945487543865029,
+    )
+    walker = Walker(parameters, Side.RIGHT)
+    walker.extend_torque(Side.LEFT, [0], [torque], 10 * SECOND)
+    walker.advance(SECOND // 10)
+    last = walker._log[walker._count - 1]
+    assert (last["ends"] == segment.FALL) == (torque < 0)
+    # The loop as it is written, not compiled, so that its panels can be counted.
+    fields = SimpleNamespace(**{name: last[name] for name in last.dtype.names})
+    calls = []
+
+    def counted(name):
+        compiled = getattr(segment, name)
+
+        def call(*arguments):
+            calls.append(name)
+            return compiled(*(last if a is fields else a for a in arguments))
+
+        return call
+
+    for name in ("panel", "stall_panel", "smooth"):
+        monkeypatch.setattr(segment, name, counted(name))
+    work = np.empty(segment.WORK_SHAPE)
+    time = segment.double_stance_time.py_func(
+        walker._model, work, fields, last["position"], last["end"]
+    )
+    assert time == pytest.approx(last["duration"], rel=1e-9)
+    assert len(calls) - calls.count("smooth") < 300
