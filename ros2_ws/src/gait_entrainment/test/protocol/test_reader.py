@@ -163,6 +163,12 @@ def test_an_option_replaces_the_file_and_its_alternative():
         read_protocol(None, {"pulses.width": (-1.0, "--width")})
 
 
+def test_options_that_contradict_each_other_are_refused():
+    both = {"pulses.period": (1.9, "--period"), "pulses.period_offset": (0.1, "--period-offset")}
+    with pytest.raises(ProtocolError, match=r"^--period-offset: .*not both"):
+        read_protocol(None, both)
+
+
 def test_a_number_without_a_dot_in_scientific_notation_is_a_number():
     assert read_protocol("pulses: {width: 1e-1}\n\n").pulses.width == 0.1
 
