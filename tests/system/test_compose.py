@@ -23,6 +23,7 @@ from pathlib import Path
 import yaml
 from harness import PATIENCE
 
+from gait_entrainment.bags import BagReader
 from gait_entrainment_nodes.domain import claimed_domain
 from gait_entrainment_nodes.node_list import NODES, PUBLISHERS
 
@@ -39,6 +40,22 @@ def services(**variables):
 
     text = (ROOT / "docker" / "compose.yaml").read_text()
     return yaml.safe_load(re.sub(r"\$\{(\w+):-(.*?)\}", value, text))["services"]
+
+
+def assert_no_state_is_counted(bag):
+    """
+    Hold the final counts of /diagnostics against what happened in the run.
+
+    A node that starts before the recorder has told its state to nobody: that is no loss.
+    """
+    with BagReader(bag) as reader:
+        decoded = [m for _, m in reader.decoded(["/diagnostics", "/published_counts"])]
+    names = [s.name for m in decoded if hasattr(m, "status") for s in m.status]
+    told = [m for m in decoded if hasattr(m, "counts")]
+    assert told
+    for message in told:
+        counted = message.counts[message.topics.index("/diagnostics")]
+        assert counted <= names.count(f"{message.node.strip('/')}: run"), message.node
 
 
 def test_services_conduct_and_record_one_experiment(tmp_path):
@@ -75,6 +92,7 @@ def test_services_conduct_and_record_one_experiment(tmp_path):
             assert running[name].wait(PATIENCE) == 0, name
         text, _ = start("outcome").communicate(timeout=PATIENCE)
         assert "strides          9, pulses placed in them: 5" in text
+        assert_no_state_is_counted(tmp_path / "bags/from_compose")
         for name in set(PUBLISHERS) - {"experiment"}:
             running[name].terminate()
             assert running[name].wait(PATIENCE) == 0, name

@@ -309,6 +309,8 @@ class Participant:
         if time.monotonic() >= self._state_due:
             self._state_due = time.monotonic() + STATE_PERIOD
             self._publish_status("state", self.get_clock().now().nanoseconds)
+            # Told from the first moment on: a recorder that comes later has lost nothing.
+            self._diagnostics.count -= 1
 
     def _publish_status(self, what: str, stamp: int) -> None:
         status = self._status
