@@ -26,7 +26,7 @@ from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 
 _EXAMPLES = """examples:
   entrain bag info bags/paper_example
-  entrain bag check bags/*                       this project's bags or anybody's
+  entrain bag check bags/*/                      this project's bags or anybody's
   entrain bag recover bags/broken bags/rescued   after a crash
   entrain bag export bags/paper_example tables --format parquet
 """
@@ -36,7 +36,7 @@ _INFO_EXAMPLES = """examples:
 """
 _CHECK_EXAMPLES = """examples:
   entrain bag check bags/paper_example
-  entrain bag check bags/* --json                one JSON object per bag, one per line
+  entrain bag check bags/*/ --json               one JSON object per bag, one per line
 
 Exit code 1 where a rule is broken that makes a reader fail; warnings alone give 0.
 """

@@ -76,13 +76,13 @@ def add_command(commands: Any) -> None:
         + " ".join(map(str, _OFFSETS)),
     )
     drawn = parser.add_argument_group("distributions of the subjects")
-    for name, meaning in (
-        ("leg-length", "leg length [m]"),
-        ("mass", "mass [kg]"),
-        ("peak-torque", "peak ankle torque over body weight x leg length"),
-        ("variation", "coefficient of variation of the stride period"),
+    for name, text in (
+        ("leg-length", "leg length [m]; default 0.92 0.05"),
+        ("mass", "mass [kg]; default 75 12"),
+        ("peak-torque", "peak ankle torque over body weight x leg length; default 0.17 0.01"),
+        ("variation", "coefficient of variation of the stride period; default 0.02 0.005"),
     ):
-        drawn.add_argument("--" + name, nargs=2, type=float, metavar=("MEAN", "SD"), help=meaning)
+        drawn.add_argument("--" + name, nargs=2, type=float, metavar=("MEAN", "SD"), help=text)
     parser.add_argument("--out", type=Path, metavar="DIR", help="write figure and trials.csv")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.set_defaults(run=run)

@@ -16,6 +16,7 @@
 
 import argparse
 import json
+import math
 import sys
 from collections.abc import Iterable
 from dataclasses import asdict, fields
@@ -49,19 +50,32 @@ def add_command(commands: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     actions = parser.add_subparsers(required=True, metavar="ACTION")
-    listing = actions.add_parser("list", help="every driver that is installed")
+    listing = actions.add_parser(
+        "list",
+        help="every driver that is installed",
+        description="List every driver that is installed, and its options: NAME=DEFAULT, unit,"
+        " meaning, range.",
+    )
     listing.add_argument("--json", action="store_true", help="print one JSON object")
     listing.set_defaults(run=list_drivers)
-    check = actions.add_parser("check", help="the conformance kit")
+    check = actions.add_parser(
+        "check",
+        help="the conformance kit",
+        description="Hold a driver, or a node, against every promise of the contract"
+        " (docs/drivers.md). Exit code 1 where one is broken.",
+    )
     checked = check.add_mutually_exclusive_group(required=True)
-    checked.add_argument("driver", nargs="?", metavar="NAME[:OPTION=VALUE,...]")
+    checked.add_argument("driver", nargs="?", metavar="NAME[:OPTION=VALUE,...]", help="driver")
     checked.add_argument(
         "--node",
         metavar="NAME",
         help="check from outside a node that speaks the perturbator's topics, in any language",
     )
     check.add_argument(
-        "--side", choices=("left", "right"), default="right", help="ankle of the node's robot"
+        "--side",
+        choices=("left", "right"),
+        default="right",
+        help="ankle of the node's robot (default right)",
     )
     check.add_argument(
         "--real-time",
@@ -74,7 +88,10 @@ def add_command(commands: Any) -> None:
         help="let a real device deliver torque; nobody may wear it",
     )
     check.add_argument(
-        "--torque", type=float, default=8.0, help="height of the pulses [N m] (default 8)"
+        "--torque",
+        type=float,
+        default=8.0,
+        help="height of the pulses [N m], up to 30 (default 8)",
     )
     check.add_argument("--json", action="store_true", help="print one JSON object")
     check.set_defaults(run=check_driver)
@@ -90,7 +107,8 @@ def list_drivers(options: argparse.Namespace) -> int:
         print(f"{name}: {description['summary']}")
         for option in description["options"]:
             unit = f" {option['unit']}" if option["unit"] not in ("", "1") else ""
-            print(f"    {option['name']}={option['default']}{unit}  {option['meaning']}")
+            default = f"{option['name']}={option['default']}{unit}"
+            print(f"    {default}  {option['meaning']}{_allowed(option)}")
     return 0
 
 
@@ -173,6 +191,15 @@ def refuse_unarmed(driver: Driver, armed: bool) -> None:
         )
 
 
+def _allowed(option: dict[str, Any]) -> str:
+    if "choices" in option:
+        return f"; one of {', '.join(option['choices'])}"
+    if "range" not in option:
+        return ""
+    low, high = option["range"]
+    return f"; {low:g} to {high:g}" if high < math.inf else f"; {low:g} or more"
+
+
 def _description(name: str) -> dict[str, Any]:
     try:
         robot = find_driver(name).robot
@@ -180,7 +207,7 @@ def _description(name: str) -> dict[str, Any]:
         return {"summary": str(error), "options": []}
     module = sys.modules[robot.__module__]
     text = (robot.__doc__ or "").strip()
-    if text.startswith("See the module"):
+    if not text or text.startswith("See the module"):
         text = (module.__doc__ or "").strip()
     return {
         "summary": text.splitlines()[0] if text else "",

@@ -16,9 +16,11 @@
 
 import argparse
 from dataclasses import fields
+from enum import Enum
+from operator import attrgetter
 
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment.protocol import Protocol, read_protocol
+from gait_entrainment.protocol import DEFAULT_PROTOCOL, Protocol, read_protocol
 
 # Option -> (field of the protocol, type, what it says in the help)
 _OPTIONS = {
@@ -33,7 +35,7 @@ _OPTIONS = {
     "--torque-fraction": (
         "pulses.torque_fraction",
         float,
-        "the same as a fraction of the peak ankle torque",
+        "the same as a fraction of the peak ankle torque, -1 to 1",
     ),
     "--width": ("pulses.width", float, "duration of a pulse [s]"),
     "--baseline": ("baseline", int, "strides before the pulses"),
@@ -41,7 +43,7 @@ _OPTIONS = {
     "--washout": ("washout", int, "strides after the strides of the pulses"),
     "--side": ("side", str, "the perturbed leg: left or right"),
     "--name": ("name", str, "name of the experiment"),
-    "--driver": ("driver", str, "ankle robot driver"),
+    "--driver": ("driver", str, "ankle robot driver, as entrain driver list has them"),
     "--seed": ("seed", int, "seed of whatever is random"),
     **{
         "--" + f.name.replace("_", "-"): (
@@ -61,7 +63,22 @@ def add_protocol_options(parser: argparse.ArgumentParser) -> None:
     )
     group = parser.add_argument_group("fields of the protocol")
     for option, (field, kind, text) in _OPTIONS.items():
-        group.add_argument(option, dest=field, type=kind, help=text, metavar=kind.__name__.upper())
+        group.add_argument(
+            option,
+            dest=field,
+            type=kind,
+            help=text + _default_text(field),
+            metavar=kind.__name__.upper(),
+        )
+
+
+def _default_text(field: str) -> str:
+    default = attrgetter(field)(DEFAULT_PROTOCOL)
+    if default is None:  # another field says the same
+        return ""
+    if isinstance(default, Enum):
+        default = default.name.lower()
+    return f"; default {default:g}" if isinstance(default, float) else f"; default {default}"
 
 
 def chosen_protocol(options: argparse.Namespace) -> Protocol:

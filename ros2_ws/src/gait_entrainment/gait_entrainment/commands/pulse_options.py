@@ -32,7 +32,7 @@ def add_walker_options(parser: argparse.ArgumentParser) -> None:
     """Add one option per parameter of the walker; the defaults are Table 1."""
     group = parser.add_argument_group("walker (default: Table 1)")
     for field in fields(WalkerParameters):
-        text = f"{field.metadata['meaning']} [{field.metadata['unit']}]"
+        text = f"{field.metadata['meaning']} [{field.metadata['unit']}]; default {field.default:g}"
         option = "--" + field.name.replace("_", "-")
         group.add_argument(option, type=float, help=text, metavar="FLOAT")
 
@@ -49,10 +49,14 @@ def add_pulse_options(parser: argparse.ArgumentParser) -> None:
         type=float,
         metavar="FLOAT",
         default=PAPER_FRACTION,
-        help="the same as a fraction of the peak ankle torque",
+        help=f"the same as a fraction of the peak ankle torque; default {PAPER_FRACTION}",
     )
     group.add_argument(
-        "--width", type=float, metavar="FLOAT", default=PAPER_WIDTH, help="duration [s]"
+        "--width",
+        type=float,
+        metavar="FLOAT",
+        default=PAPER_WIDTH,
+        help=f"duration [s]; default {PAPER_WIDTH}",
     )
 
 

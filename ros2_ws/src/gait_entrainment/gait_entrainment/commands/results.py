@@ -155,7 +155,9 @@ def add_command(commands: Any) -> None:
         epilog="examples:\n  entrain results --out docs",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--out", type=Path, default=Path("docs"), metavar="DIR")
+    parser.add_argument(
+        "--out", type=Path, default=Path("docs"), metavar="DIR", help="default docs"
+    )
     parser.set_defaults(run=run)
 
 

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 # The exact borders are drawn at this many torques or more: a coarse sweep has smooth borders too.
 _BORDER_TORQUES = 50
 
+_OUT = "folder of table and picture; what is there already is not walked again; default sweep"
 _EXAMPLES = """examples:
   entrain sweep --out tongue                 100 offsets x 50 torques x 16 initial phases
   entrain sweep --out tongue                 again, after an interruption: goes on
@@ -62,15 +63,24 @@ def add_command(commands: Any) -> None:
             type=float,
             default=default,
             metavar=("MIN", "MAX", "COUNT"),
-            help=f"{text}; default {default}",
+            help=f"{text}; default {' '.join(map(str, default))}",
         )
-    parser.add_argument("--phases", type=int, default=16, metavar="INT", help="initial phases")
-    parser.add_argument("--strides", type=int, default=100, metavar="INT", help="of each walk")
+    for option, count, text in (
+        ("--phases", 16, "initial phases walked from"),
+        ("--strides", 100, "strides of each walk"),
+    ):
+        parser.add_argument(
+            option, type=int, default=count, metavar="INT", help=f"{text}; default {count}"
+        )
     parser.add_argument(
-        "--width", type=float, default=PAPER_WIDTH, metavar="FLOAT", help="of the pulse [s]"
+        "--width",
+        type=float,
+        default=PAPER_WIDTH,
+        metavar="FLOAT",
+        help=f"duration of the pulse [s]; default {PAPER_WIDTH}",
     )
     add_walker_options(parser)
-    parser.add_argument("--out", type=Path, default=Path("sweep"), metavar="DIR", help="results")
+    parser.add_argument("--out", type=Path, default=Path("sweep"), metavar="DIR", help=_OUT)
     parser.add_argument("--jobs", type=int, metavar="INT", help="processes; default: all cores")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="use a Dask cluster instead")
     parser.add_argument("--json", action="store_true", help="print one JSON object")

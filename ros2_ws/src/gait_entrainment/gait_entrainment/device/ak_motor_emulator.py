@@ -76,7 +76,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--motor", choices=MOTORS, default="AK80-9", help="type of the motor")
     parser.add_argument("--motor-id", type=int, default=1, help="1 to 127")
-    parser.add_argument("--reply-bytes", type=int, choices=(6, 8), default=8)
+    parser.add_argument(
+        "--reply-bytes", type=int, choices=(6, 8), default=8, help="length of a reply"
+    )
     options = parser.parse_args(arguments)
     motor = EmulatedAkMotor(
         MOTORS[options.motor],

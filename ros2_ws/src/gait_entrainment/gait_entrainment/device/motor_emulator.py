@@ -94,20 +94,26 @@ class EmulatedMotor(ABC):
 
 def emulator_parser(name: str, description: str) -> argparse.ArgumentParser:
     """Return a command line with what every emulator takes."""
-    parser = argparse.ArgumentParser(prog=name, description=description)
+    parser = argparse.ArgumentParser(
+        prog=name,
+        description=description,
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
     parser.add_argument("--interface", default="udp_multicast", help="python-can interface")
     parser.add_argument("--channel", default="239.74.163.2", help="channel of the bus")
     parser.add_argument(
-        "--port", type=int, default=0, help="of udp_multicast; 0: python-can's own"
+        "--port", type=int, default=0, help="UDP port of udp_multicast; 0: python-can's own"
     )
-    parser.add_argument("--bandwidth", type=float, default=30.0, help="of the torque [Hz]")
+    parser.add_argument(
+        "--bandwidth", type=float, default=30.0, help="bandwidth of the torque [Hz]"
+    )
     parser.add_argument(
         "--timeout", type=float, default=0.0, help="the motor's own watchdog [s]; 0 is off"
     )
     parser.add_argument(
         "--loss", type=float, default=0.0, help="share of the frames that get lost"
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the losses")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the losses")
     parser.add_argument(
         "--error", type=lambda text: int(text, 0), default=0, help="error that comes up"
     )

@@ -122,8 +122,9 @@ def test_a_mistake_gives_one_line(capsys, arguments, words):
 def test_the_list_tells_every_driver_and_option(capsys):
     assert main(["driver", "list"]) == 0
     out = capsys.readouterr().out
-    for words in ("ideal: ", "emulated: ", "ak_mit_can: ", "bandwidth=20.0 Hz", "motor=AK80-9"):
+    for words in ("ideal: ", "emulated: ", "ak_mit_can: ", "motor=AK80-9", "AK60-6, AK70-10"):
         assert words in out
+    assert "bandwidth=20.0 Hz  torque bandwidth (-3 dB) of the lag; 0.5 to 300" in out
     assert main(["driver", "list", "--json"]) == 0
     listed = json.loads(capsys.readouterr().out)
     assert "torque bandwidth" in listed["emulated"]["options"][0]["meaning"]
