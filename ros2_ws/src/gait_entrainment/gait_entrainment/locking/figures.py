@@ -62,7 +62,11 @@ def draw_branches(
             )
     for lock in locks:
         offset = (lock.period - gait.unperturbed_period) * 1e3
-        axes.plot([offset], [lock.lag], "*" if lock.stable else "x", color=BLACK, ms=9)
+        mark, text = ("*", "stable lock") if lock.stable else ("x", "unstable lock")
+        text += f" at {offset:+g} ms"
+        label = None if text in named else text
+        named.add(text)
+        axes.plot([offset], [lock.lag], mark, color=BLACK, ms=9, ls="none", label=label)
     axes.axhline(0, color=GREY, ls=":", lw=1.0)
     axes.annotate("toe-off", (0, 0), xytext=(4, 3), textcoords="offset points", color=GREY)
     axes.plot([], [], color=GREY, lw=2.2, label="stable")

@@ -74,7 +74,7 @@ def _stride_period(run: RecordedRun) -> Any:
     ):
         if np.isfinite(period):
             axes.axhline(period, color=colour, ls=style, lw=1.2, label=f"{text} {period:.4f} s")
-    strides = run.analysis.strides
+    strides = [s for s in run.analysis.strides if s.number <= run.protocol.strides]
     axes.plot([s.number for s in strides], [s.period for s in strides], ".-", color=BLUE, lw=0.8)
     axes.set(xlabel="stride", ylabel="stride period [s]", title="Stride period")
     axes.ticklabel_format(useOffset=False)
