@@ -82,7 +82,7 @@ class WalkerParameters:
     max_plantarflexion: float = _parameter(
         2.576, "maximal plantarflexion of the ankle, where toe-off is", "rad", "mu", math.pi
     )
-    ankle_stiffness: float = _parameter(87.3, "stiffness of the ankle, k of the paper", "N m/rad", "k", 1e7)
+    ankle_stiffness: float = _parameter(87.3, "ankle stiffness", "N m/rad", "k", 1e7)
 
     def __post_init__(self) -> None:
         """Check every field, the linkage, and that the period-one gait exists."""
