@@ -32,6 +32,13 @@ if TYPE_CHECKING:
 
 # Pulses whose lags make up the final one: the paper's locked gait repeats itself exactly.
 FINAL_PULSES = 5
+# What a verdict other than entrained says to a person.
+_MEANINGS = {
+    "drifting": "the pulses run through the stride",
+    "lost": "the gait followed the pulses, then drifted",
+    "untestable": "pulse period and stride period are too close to tell them apart",
+    "undecided": "neither locked nor drifting for certain; more pulses may tell",
+}
 
 
 def outcome_of(run: "Simulation | RecordedRun") -> dict[str, Any]:
@@ -110,6 +117,8 @@ def summary(outcome: dict[str, Any]) -> str:
     verdict = outcome["verdict"]
     if outcome["entrained"]:
         verdict += f" since stride {outcome['entrained_since_stride']}"
+    else:
+        verdict += f": {_MEANINGS[verdict]}"
     lines.append(f"verdict          {verdict}")
     lag, double_stance = outcome["final_phase_lag"], outcome["double_stance"]
     if lag is not None and outcome["entrained"]:
@@ -124,7 +133,10 @@ def _place(lag: float, double_stance: float | None) -> str:
     if double_stance is None or -lag > double_stance:
         return "before double stance"
     percent = 100 * (1 + lag / double_stance)
-    return f"the pulse begins {percent:.0f} % into double stance ({double_stance:.3f} s)"
+    place = f"the pulse begins {percent:.0f} % into double stance ({double_stance:.3f} s)"
+    if percent < 50:
+        place += "\n                 so early, a slow passage may look locked: ask entrain lock"
+    return place
 
 
 def _double_stance(events: Sequence[GaitEvent], toe_off: int | None) -> float:

@@ -46,6 +46,15 @@ def test_the_final_lag_is_told_with_its_place_in_double_stance(simulation):
     assert f"{percent:.0f} % into double stance" in summary(told)
 
 
+def test_a_slow_passage_that_looks_locked_comes_with_a_warning(simulation):
+    # docs/analysis.md: no lock is there, and more pulses leave it.
+    plan = PulsePlan(period_offset=-0.07, initial_phase=0.6)
+    told = summary(outcome_of(simulate(Protocol(pulses=plan))))
+    assert "entrained since stride 42" in told
+    assert "slow passage" in told
+    assert "slow passage" not in summary(outcome_of(simulation))
+
+
 def test_what_is_not_known_is_null_in_json():
     protocol = Protocol(baseline=2, washout=0, pulses=PulsePlan(count=1))
     nothing = analyze([], [], Side.RIGHT)
@@ -53,7 +62,7 @@ def test_what_is_not_known_is_null_in_json():
     text = json.dumps(told, allow_nan=False)
     assert json.loads(text)["unperturbed_stride_period"] is None
     assert json.loads(text)["verdict"] == "undecided"
-    assert "undecided" in summary(told)
+    assert "undecided: neither locked nor drifting" in summary(told)
 
 
 def test_the_figures_are_drawn(simulation, tmp_path):
