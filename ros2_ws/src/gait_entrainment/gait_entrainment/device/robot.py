@@ -53,8 +53,9 @@ class AnkleRobot(ABC):
     A driver of one ankle robot: every abstract method implemented, and this list kept.
 
     **Construction** ``(side, options, seed)``: keeps its arguments, sets ``capabilities``;
-    touches no hardware. Options are a frozen dataclass, ``Options``, whose fields have metadata
-    ``meaning`` and ``unit``; its ``__post_init__`` raises LimitError for a value out of range.
+    touches no hardware. Options are a frozen dataclass, ``Options``, whose fields have a default
+    and metadata ``meaning``, ``unit`` and, checked before construction, ``range`` (least, most)
+    or ``choices``; its ``__post_init__`` raises LimitError for what these cannot say.
 
     **Lifecycle**, mapped on the perturbator's lifecycle node::
 
