@@ -128,6 +128,7 @@ class Perturbator(Participant, LifecycleNode):
             "~/deliver_pulse_train",
             execute_callback=self.execute,
             goal_callback=self.on_goal,
+            handle_accepted_callback=self.guarded(self.on_accepted),
             cancel_callback=self.guarded(self.on_cancel),
         )
 
@@ -356,11 +357,21 @@ class Perturbator(Participant, LifecycleNode):
         self.committed = True
         return ""
 
-    async def execute(self, goal: Any) -> DeliverPulseTrain.Result:
-        """Wait for the end of a train and say how it ended."""
+    def on_accepted(self, goal: Any) -> None:
+        """
+        Execute a goal only once its train has ended.
+
+        The executor resumes a coroutine that waits over and over: for as long as pulses come it
+        would fight the torque loop for the interpreter.
+        """
         assert self._goal_ended is not None
         self._goal = goal
-        outcome, message, delivered = await self._goal_ended
+        self._goal_ended.add_done_callback(lambda _: goal.execute())
+
+    def execute(self, goal: Any) -> DeliverPulseTrain.Result:
+        """Say how a train ended."""
+        assert self._goal_ended is not None
+        outcome, message, delivered = self._goal_ended.result()
         if outcome == DeliverPulseTrain.Result.CANCELLED:
             goal.canceled()
         elif outcome == DeliverPulseTrain.Result.DELIVERED:
