@@ -127,6 +127,7 @@ class Experiment(Participant, Node):
         self.own_begun = False  # the protocol of the parameter is conducted
         self.conductor: Conductor | None = None  # of the run that goes on
         self._goal: Any = None
+        self._result = RunProtocol.Result()  # of the goal that was conducted last
         self.perturbator = f"{self.get_namespace()}/perturbator".lstrip("/")
         self.waiting = Waiting()
 
@@ -146,6 +147,7 @@ class Experiment(Participant, Node):
             "~/run_protocol",
             execute_callback=self.execute,
             goal_callback=self.on_goal,
+            handle_accepted_callback=self.guarded(self.on_accepted),
             cancel_callback=lambda _: CancelResponse.ACCEPT,
         )
 
@@ -171,11 +173,20 @@ class Experiment(Participant, Node):
         self.busy = True
         return GoalResponse.ACCEPT
 
-    async def execute(self, goal: Any) -> RunProtocol.Result:
-        """Conduct the protocol of a goal."""
+    def on_accepted(self, goal: Any) -> None:
+        """Conduct the protocol of a goal, which is executed at its end: see `waiting`."""
         self._goal = goal
-        result = await self.run(goal.request.protocol)
+        self.waiting.begin(self.conduct_goal(goal))
+
+    async def conduct_goal(self, goal: Any) -> None:
+        """Conduct the protocol of a goal to its end."""
+        self._result = await self.run(goal.request.protocol)
         self._goal = None
+        goal.execute()
+
+    def execute(self, goal: Any) -> RunProtocol.Result:
+        """Say how the protocol of a goal ended."""
+        result = self._result
         if result.outcome == RunProtocol.Result.FINISHED:
             goal.succeed()
         elif result.outcome == RunProtocol.Result.CANCELLED:
@@ -229,7 +240,7 @@ class Experiment(Participant, Node):
         self.conductor = conductor
         self.fail_if_troubled()
         self.publish_horizon(start)
-        final = await self.ended
+        final = await self.waiting.until(self.ended)
         await self.close_run(self.silence_timeout)
         # The answer came behind every stop: a walk to its end without torque is no success.
         if self.stopped_at:
@@ -500,7 +511,7 @@ class Experiment(Participant, Node):
         """Look after everything that is waited for."""
         if self.protocol and not self.own_begun:
             self.own_begun = True
-            self.executor.create_task(self.conduct_own)
+            self.waiting.begin(self.conduct_own())
         now = time.monotonic()
         if self.waiting.look_after():
             # This process was held up: what came meanwhile has not been heard yet.

@@ -12,9 +12,15 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Waiting for answers in coroutines of a node, on steady time."""
+"""
+Waiting for answers in a coroutine of a node, on steady time.
+
+The node's loop resumes the coroutine: rclpy's executor would do so over and over, for as long as
+it waits, and keep a processor busy.
+"""
 
 import time
+from collections.abc import Coroutine
 from typing import Any
 
 from rclpy.task import Future
@@ -30,17 +36,29 @@ class OverdueError(Exception):
 
 
 class Waiting:
-    """What the coroutines of one node wait for; its loop looks after it at every deadline."""
+    """What a coroutine of a node waits for; the node's loop looks after it at every deadline."""
 
     def __init__(self) -> None:
         self.deadline = time.monotonic() + TICK  # when it is looked after next, steady time [s]
+        self._coroutine: Coroutine[Any, Any, None] | None = None
         self._waits: list[tuple[Future, float, str]] = []  # what, until when, why it matters
         self._ticks: list[Future] = []
+
+    def begin(self, coroutine: Coroutine[Any, Any, None]) -> None:
+        """Run a coroutine that waits here only; one at a time."""
+        assert self._coroutine is None
+        self._coroutine = coroutine
+        self._hasten()
+
+    async def until(self, future: Future) -> Any:
+        """Return the result of a future."""
+        future.add_done_callback(lambda _: self._hasten())
+        return await future
 
     async def within(self, future: Future, reason: str, timeout: float) -> Any:
         """Return the result of a future; OverdueError with the reason after a time [s]."""
         self._waits.append((future, time.monotonic() + timeout, reason))
-        return await future
+        return await self.until(future)
 
     async def tick(self) -> None:
         """Wait for the next tick."""
@@ -70,4 +88,13 @@ class Waiting:
         ticks, self._ticks = self._ticks, []
         for future in ticks:
             future.set_result(None)
+        if self._coroutine is not None:
+            try:
+                self._coroutine.send(None)
+            except StopIteration:
+                self._coroutine = None
         return held_up
+
+    def _hasten(self) -> None:
+        """Let the loop look after it at once; a deadline that has passed stays as it is."""
+        self.deadline = min(self.deadline, time.monotonic())
