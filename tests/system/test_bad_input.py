@@ -27,7 +27,7 @@ from gait_entrainment_nodes.domain import claimed_domain
 
 # What is wrong; the options; what the line must name, field and allowed range.
 WRONG_USAGE = {
-    "negative width": (["--width=-0.1"], ["width", "-0.1", "above 0"]),
+    "negative width": (["--width=-0.1"], ["width", "-0.1", "at least 1e-09"]),
     "overlapping pulses": (["--width=0.4", "--period=0.3"], ["width", "0.3", "below the period"]),
     "weak spring": (["--ankle-stiffness=60"], ["ankle_stiffness", "60", "allowed:"]),
     "NaN": (["--mass=nan"], ["mass", "nan", "finite number"]),
