@@ -122,9 +122,8 @@ class BagRecorder(Participant, Node):
             )
         except BagError as error:
             raise ValueError(f"output: {error}") from None
-        self.acknowledge = self.create_publisher(
-            RECORDER_PROGRESS.type, RECORDER_PROGRESS.name, RECORDER_PROGRESS.qos
-        )
+        # Ready means, for this topic too, that everyone will hear: the walker waits for it.
+        self.acknowledge = self.publisher(RECORDER_PROGRESS, recorded=False)
         self.resolved = {
             topic.name: self.resolve_topic_name(topic.name)
             for topic in (

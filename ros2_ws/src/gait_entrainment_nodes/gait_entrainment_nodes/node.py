@@ -178,12 +178,13 @@ class Participant:
         self.add_on_set_parameters_callback(self._on_set_parameters)
         self.failure: str | None = None  # why the node must end with exit code 1
         self.finished = False  # set to end the loop with exit code 0
+        self._offered: list[CountedPublisher] = []
         self._publishers_counted: list[CountedPublisher] = []
         self._diagnostics = self.publisher(DIAGNOSTICS)
         self.note_state(DiagnosticStatus.OK, "ready")
         self._state_due = 0.0  # steady time [s]
         # Not counted itself: its message says what the others published.
-        self._counts = CountedPublisher(self, PUBLISHED_COUNTS)
+        self._counts = self.publisher(PUBLISHED_COUNTS, recorded=False)
 
     def parameter(self, name: str) -> Any:
         """Return the value of a parameter."""
@@ -229,15 +230,13 @@ class Participant:
         """
         self.create_service(Trigger, "~/ready", self._on_ready)
 
-    def publisher(self, topic: Topic) -> CountedPublisher:
-        """Create a counted publisher."""
+    def publisher(self, topic: Topic, *, recorded: bool = True) -> CountedPublisher:
+        """Create a publisher; what it has sent is told to the recorder, if that records it."""
         publisher = CountedPublisher(self, topic)
-        self._publishers_counted.append(publisher)
+        self._offered.append(publisher)
+        if recorded:
+            self._publishers_counted.append(publisher)
         return publisher
-
-    @property
-    def _offered(self) -> list[CountedPublisher]:
-        return [*self._publishers_counted, self._counts]
 
     def subscription(self, topic: Topic, callback: Callable[[Any], None], **options: Any) -> Any:
         """Create a subscription with the quality of service of its topic."""
