@@ -22,6 +22,7 @@ _gait_entrainment_source() {
     set +u
     source "$root/ros2_ws/install/local_setup.bash"
     [ -z "$nounset" ] || set -u
+    _gait_entrainment_prepend PATH "$root/ros2_ws/install/gait_entrainment_drivers/bin"
     _gait_entrainment_prepend PATH "$root/ros2_ws/install/gait_entrainment/bin"
     _gait_entrainment_prepend PATH "$root/ros2_ws/install/gait_entrainment_nodes/lib/gait_entrainment_nodes"
 

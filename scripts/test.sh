@@ -12,7 +12,7 @@ run() {
     pytest "$@" || [[ $? == "$nothing_selected" ]] || failed=1
 }
 
-devices=ros2_ws/src/gait_entrainment/test/device
+devices=ros2_ws/src/gait_entrainment_drivers/test
 run --numprocesses auto --ignore "$devices" ros2_ws/src "$@"
 run "$devices" tests "$@"
 exit $failed

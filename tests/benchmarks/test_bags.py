@@ -1,16 +1,5 @@
-# Copyright 2026 The gait_entrainment authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Bags: recording at 20,000 messages a second, and one hour at 1 kHz looked into and analyzed."""
 
@@ -25,13 +14,13 @@ import numpy as np
 import pytest
 from sensor_msgs.msg import JointState
 
-from gait_entrainment.bags import BagReader, BagWriter, TopicInfo, find_definition
 from gait_entrainment.protocol import Protocol, PulsePlan, write_protocol
 from gait_entrainment.simulation import simulate
+from gait_entrainment_bags import BagReader, BagWriter, TopicInfo, find_definition
 from gait_entrainment_msgs import msg
-from gait_entrainment_nodes.domain import claimed_domain
-from gait_entrainment_nodes.raw_messages import MessageTemplate, mark, serialize
-from gait_entrainment_nodes.stamps import header, to_time
+from gait_entrainment_nodes.messaging.domain import claimed_domain
+from gait_entrainment_nodes.messaging.raw_messages import MessageTemplate, mark, serialize
+from gait_entrainment_nodes.messaging.stamps import header, to_time
 
 pytestmark = pytest.mark.benchmark
 
@@ -43,10 +32,10 @@ import sys, time
 import rclpy
 from sensor_msgs.msg import JointState
 from gait_entrainment_msgs.msg import PublishedCounts
-from gait_entrainment_nodes.node import CountedPublisher
-from gait_entrainment_nodes.raw_messages import serialize
-from gait_entrainment_nodes.stamps import header
-from gait_entrainment_nodes.topics import PUBLISHED_COUNTS, Topic
+from gait_entrainment_nodes.nodes.node import CountedPublisher
+from gait_entrainment_nodes.messaging.raw_messages import serialize
+from gait_entrainment_nodes.messaging.stamps import header
+from gait_entrainment_nodes.messaging.topics import PUBLISHED_COUNTS, Topic
 
 name, rate, duration = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
 rclpy.init()

@@ -1,16 +1,5 @@
-# Copyright 2026 The gait_entrainment authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
 
 """How fast whole commands are. Prints, asserts nothing about speed; each beside its baseline."""
 
@@ -27,8 +16,8 @@ from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-from gait_entrainment_nodes.domain import claimed_domain
-from gait_entrainment_nodes.topics import JOINT_STATES
+from gait_entrainment_nodes.messaging.domain import claimed_domain
+from gait_entrainment_nodes.messaging.topics import JOINT_STATES
 
 pytestmark = pytest.mark.benchmark
 
@@ -38,9 +27,9 @@ import sys
 import rclpy
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
-from gait_entrainment_nodes.node import Participant
-from gait_entrainment_nodes.raw_messages import serialize
-from gait_entrainment_nodes.topics import JOINT_STATES
+from gait_entrainment_nodes.nodes.node import Participant
+from gait_entrainment_nodes.messaging.raw_messages import serialize
+from gait_entrainment_nodes.messaging.topics import JOINT_STATES
 
 
 class Source(Participant, Node):

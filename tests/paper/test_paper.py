@@ -1,16 +1,5 @@
-# Copyright 2026 The gait_entrainment authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The published numbers: which of ours agree, and that the differences are explained."""
 
@@ -19,7 +8,7 @@ import json
 import pytest
 
 from gait_entrainment.commands import main
-from gait_entrainment.paper import compare, explain
+from gait_entrainment_studies.paper import compare, explain
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +63,7 @@ def test_less_than_9_percent_is_tight_for_pulses_in_every_step_only(published):
 def test_command_draws_every_figure_and_prints_json(tmp_path, capsys, monkeypatch, published):
     # The numbers are made above; here only what the command does with them.
     rows = list(published.values())
-    monkeypatch.setattr("gait_entrainment.paper.compare", lambda: rows)
+    monkeypatch.setattr("gait_entrainment_studies.paper.compare", lambda: rows)
     assert main(["paper", "--json", "--out", str(tmp_path / "figures")]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert set(printed[0]) == {"name", "paper", "ours", "unit", "agrees", "note"}

@@ -1,16 +1,5 @@
-# Copyright 2026 The gait_entrainment authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Runs as processes, and a probe that listens to them: what the system tests share."""
 
@@ -35,14 +24,14 @@ from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-from gait_entrainment.bags import BagReader
 from gait_entrainment.protocol import Protocol, read_protocol, write_protocol
 from gait_entrainment.simulation import simulate
+from gait_entrainment_bags import BagReader
+from gait_entrainment_bringup.node_list import NODES, STOP_ORDER, parameters
+from gait_entrainment_bringup.supervisor import Supervisor
 from gait_entrainment_msgs.action import RunProtocol
-from gait_entrainment_nodes.domain import claimed_domain
-from gait_entrainment_nodes.node_list import NODES, STOP_ORDER, parameters
-from gait_entrainment_nodes.supervisor import Supervisor
-from gait_entrainment_nodes.topics import STRIDES, Topic
+from gait_entrainment_nodes.messaging.domain import claimed_domain
+from gait_entrainment_nodes.messaging.topics import STRIDES, Topic
 
 # Long enough for a machine whose two cores are shared; nothing waits for it to pass.
 PATIENCE = 60.0

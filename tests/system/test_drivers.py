@@ -1,16 +1,5 @@
-# Copyright 2026 The gait_entrainment authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Other robots than the ideal one behind the perturbator; the kit and the stop from outside."""
 
@@ -37,16 +26,16 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from std_srvs.srv import Trigger
 
-from gait_entrainment.bags import BagReader
 from gait_entrainment.experiment import Phase
 from gait_entrainment.protocol import read_protocol
-from gait_entrainment.report.pulse_timing import recorded_timings
-from gait_entrainment.report.recorded_run import read_run
 from gait_entrainment.simulation import simulate
+from gait_entrainment_bags import BagReader
+from gait_entrainment_bags.pulse_timing import recorded_timings
+from gait_entrainment_bags.recorded_run import read_run
+from gait_entrainment_bringup.node_list import STOP_ORDER
 from gait_entrainment_msgs.msg import AnkleRobotState
-from gait_entrainment_nodes.domain import claimed_domain
-from gait_entrainment_nodes.node_list import STOP_ORDER
-from gait_entrainment_nodes.topics import DIAGNOSTICS, EXPERIMENT_STATE, ROBOT_STATE
+from gait_entrainment_nodes.messaging.domain import claimed_domain
+from gait_entrainment_nodes.messaging.topics import DIAGNOSTICS, EXPERIMENT_STATE, ROBOT_STATE
 
 SHORT = ("--baseline=2", "--pulses=3", "--washout=1")
 WASHED_OUT = (*QUICK, "--baseline=2", "--pulses=2", "--washout=100000")
@@ -260,8 +249,8 @@ def test_kit_from_outside_finds_every_promise_kept(tmp_path, driver, options):
 
 BROKEN_NODE = """
 import sys
-from gait_entrainment_nodes import perturbator
-from gait_entrainment_nodes.node import run_node
+from gait_entrainment_nodes.nodes import perturbator
+from gait_entrainment_nodes.nodes.node import run_node
 
 class Broken(perturbator.Perturbator):
     {fault}
@@ -311,9 +300,9 @@ def test_kit_from_outside_finds_a_broken_node(tmp_path, fault):
 
 UNSTOPPABLE_NODE = """
 import sys
-from gait_entrainment.device import drivers
-from gait_entrainment.device.ideal import IdealAnkleRobot
-from gait_entrainment_nodes import perturbator
+from gait_entrainment.robot import drivers
+from gait_entrainment.robot.ideal import IdealAnkleRobot
+from gait_entrainment_nodes.nodes import perturbator
 
 class Unstoppable(IdealAnkleRobot):
     def stop(self):

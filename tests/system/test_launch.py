@@ -1,16 +1,5 @@
-# Copyright 2026 The gait_entrainment authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
 
 
 """The launch files with the real launch: exit codes, namespaces, remapping, replay, a device."""
@@ -31,12 +20,12 @@ from lifecycle_msgs.msg import State
 from lifecycle_msgs.srv import GetState
 from std_srvs.srv import Trigger
 
-from gait_entrainment.bags import BagReader
 from gait_entrainment.protocol import read_protocol
-from gait_entrainment.report.recorded_run import read_run
 from gait_entrainment.simulation import simulate
-from gait_entrainment_nodes.domain import claimed_domain
-from gait_entrainment_nodes.topics import GAIT_EVENTS, STRIDES, Topic
+from gait_entrainment_bags import BagReader
+from gait_entrainment_bags.recorded_run import read_run
+from gait_entrainment_nodes.messaging.domain import claimed_domain
+from gait_entrainment_nodes.messaging.topics import GAIT_EVENTS, STRIDES, Topic
 
 pytestmark = pytest.mark.skipif(
     find_spec("ros2launch") is None, reason="needs ros2 launch, which the wheels do not bring"

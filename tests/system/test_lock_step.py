@@ -1,16 +1,5 @@
-# Copyright 2026 The gait_entrainment authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
 
 """What is promised of a lock-step run: the simulated events, and the same bytes every time."""
 
@@ -31,8 +20,8 @@ from harness import (
     stamp_of,
 )
 
-from gait_entrainment.bags import BagReader, check
-from gait_entrainment.report.recorded_run import read_run
+from gait_entrainment_bags import BagReader, check
+from gait_entrainment_bags.recorded_run import read_run
 
 # Pulses later than the strides: the last of them are on, or still to come, when the run ends.
 UNFINISHED = ("--side=left", "--period-offset=0.04", "--washout=0", "--initial-phase=0.9")

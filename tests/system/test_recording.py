@@ -1,16 +1,5 @@
-# Copyright 2026 The gait_entrainment authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The recorder as a process: what it keeps when it is killed, when the disk is full, and how."""
 
@@ -33,11 +22,11 @@ from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
 
-from gait_entrainment.bags import BagReader, BagWriter, UnreadableBagError, check, recover
+from gait_entrainment_bags import BagReader, BagWriter, UnreadableBagError, check, recover
 from gait_entrainment_msgs.msg import Progress, PublishedCounts
-from gait_entrainment_nodes.domain import claimed_domain
-from gait_entrainment_nodes.stamps import header, to_time
-from gait_entrainment_nodes.topics import (
+from gait_entrainment_nodes.messaging.domain import claimed_domain
+from gait_entrainment_nodes.messaging.stamps import header, to_time
+from gait_entrainment_nodes.messaging.topics import (
     CLOCK,
     EVERY_MESSAGE,
     PUBLISHED_COUNTS,
@@ -46,11 +35,13 @@ from gait_entrainment_nodes.topics import (
 )
 
 SECOND = 10**9
-RECORDER = "import sys; from gait_entrainment_nodes.bag_recorder import main; sys.exit(main())"
+RECORDER = (
+    "import sys; from gait_entrainment_nodes.nodes.bag_recorder import main; sys.exit(main())"
+)
 # A disk that is full once so many bytes are written; what was put aside is there all the same.
 FULL_DISK = """
 import errno
-from gait_entrainment.bags import writer
+from gait_entrainment_bags import writer
 
 class File:
     def __init__(self, path):

@@ -1,16 +1,5 @@
-# Copyright 2026 The gait_entrainment authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Live, replayed and analyzed offline: the same strides and pulse phases, byte for byte."""
 
@@ -29,15 +18,16 @@ import pytest
 from harness import PATIENCE, Probe, entrain_run, payloads, probe
 from std_srvs.srv import Trigger
 
-from gait_entrainment.bags import BagReader, BagWriter
-from gait_entrainment.report.recorded_run import read_run
+from gait_entrainment_bags import BagReader, BagWriter
+from gait_entrainment_bags.recorded_run import read_run
+from gait_entrainment_bringup import replay_client
+from gait_entrainment_bringup.commands import replay as replay_command
 from gait_entrainment_msgs.srv import Burst, GetRate, IsPaused, Play, Seek, SetRate
-from gait_entrainment_nodes import replay_client, replay_command
-from gait_entrainment_nodes.domain import claimed_domain
-from gait_entrainment_nodes.gait_analyzer import GaitAnalyzerNode
-from gait_entrainment_nodes.raw_messages import serialize
-from gait_entrainment_nodes.stamps import to_time
-from gait_entrainment_nodes.topics import CLOCK, GAIT_EVENTS
+from gait_entrainment_nodes.messaging.domain import claimed_domain
+from gait_entrainment_nodes.messaging.raw_messages import serialize
+from gait_entrainment_nodes.messaging.stamps import to_time
+from gait_entrainment_nodes.messaging.topics import CLOCK, GAIT_EVENTS
+from gait_entrainment_nodes.nodes.gait_analyzer import GaitAnalyzerNode
 
 BAG = Path(__file__).parents[2] / "bags" / "paper_example"
 RESULTS = ("/gait/strides", "/gait/pulse_phases")

@@ -1,16 +1,5 @@
-# Copyright 2026 The gait_entrainment authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
 
 """What a ROS engineer expects of any node: parameters, diagnostics, the graph, over real DDS."""
 
@@ -28,12 +17,12 @@ from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
 from rclpy.parameter import Parameter
 
 from gait_entrainment.conventions import Side
+from gait_entrainment_bringup.node_list import NODES
+from gait_entrainment_bringup.supervisor import Supervisor
 from gait_entrainment_msgs.action import RunProtocol
 from gait_entrainment_msgs.srv import GetRate
-from gait_entrainment_nodes.domain import claimed_domain
-from gait_entrainment_nodes.node_list import NODES
-from gait_entrainment_nodes.supervisor import Supervisor
-from gait_entrainment_nodes.topics import (
+from gait_entrainment_nodes.messaging.domain import claimed_domain
+from gait_entrainment_nodes.messaging.topics import (
     DIAGNOSTICS,
     HORIZON,
     JOINT_STATES,

@@ -1,16 +1,5 @@
-# Copyright 2026 The gait_entrainment authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Nodes that are told to stop, and torque that ends with them."""
 
@@ -20,10 +9,10 @@ import time
 import pytest
 from harness import QUICK, cpu_seconds, session, stamp_of
 
-from gait_entrainment.bags import BagReader
+from gait_entrainment_bags import BagReader
+from gait_entrainment_bringup.node_list import DISPLAY, NODES
 from gait_entrainment_msgs.action import RunProtocol
-from gait_entrainment_nodes.node_list import DISPLAY, NODES
-from gait_entrainment_nodes.topics import ANKLE_TORQUE, PULSES, TORQUE_PROFILE
+from gait_entrainment_nodes.messaging.topics import ANKLE_TORQUE, PULSES, TORQUE_PROFILE
 
 EACH = (*NODES, DISPLAY)
 # From the signal to the end of the process [s], on a machine that does other things too.

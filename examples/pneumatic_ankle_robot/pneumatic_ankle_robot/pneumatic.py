@@ -1,21 +1,10 @@
-# Copyright 2026 The gait_entrainment authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
 
 """
 A simulated pneumatic ankle robot: torque rises and falls evenly as its muscle fills and empties.
 
-Read it beside the contract in ``gait_entrainment.device.AnkleRobot``. A real one would open its
+Read it beside the contract in ``gait_entrainment.robot.AnkleRobot``. A real one would open its
 valves in ``schedule`` and report its pressure sensor in ``promise`` and ``read``.
 """
 
@@ -23,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.device import (
+from gait_entrainment.robot import (
     AnkleRobot,
     Capabilities,
     DeviceError,

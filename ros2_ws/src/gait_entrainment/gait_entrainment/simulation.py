@@ -1,16 +1,5 @@
-# Copyright 2026 The gait_entrainment authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
 
 """
 The whole experiment in one process, without ROS: the same parts in the same chain of promises.
@@ -22,8 +11,10 @@ which a lock-step run drives them. So both give the same events to the nanosecon
 import math
 from dataclasses import dataclass
 
-from gait_entrainment.analysis import Analysis, VerdictSettings, analyze
-from gait_entrainment.device import (
+from gait_entrainment.experiment import Conductor
+from gait_entrainment.gait import Analysis, GaitEvent, VerdictSettings, analyze
+from gait_entrainment.protocol import Protocol
+from gait_entrainment.robot import (
     DeviceLimits,
     LimitError,
     PulseTiming,
@@ -31,9 +22,6 @@ from gait_entrainment.device import (
     TimingAudit,
     find_driver,
 )
-from gait_entrainment.events import GaitEvent
-from gait_entrainment.experiment import Conductor
-from gait_entrainment.protocol import Protocol
 from gait_entrainment.walker import Ending, WalkerRun
 
 

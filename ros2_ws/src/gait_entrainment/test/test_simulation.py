@@ -1,16 +1,5 @@
-# Copyright 2026 The gait_entrainment authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The experiment in one process: the paper's example entrains, and its mirror image likewise."""
 
@@ -21,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gait_entrainment.analysis import Verdict, analyze
 from gait_entrainment.conventions import EventKind, Side
-from gait_entrainment.device import LimitError
+from gait_entrainment.gait import Verdict, analyze
+from gait_entrainment.outcome import outcome_of
 from gait_entrainment.protocol import Protocol, PulsePlan
-from gait_entrainment.report.summary import outcome_of
+from gait_entrainment.robot import LimitError
 from gait_entrainment.simulation import simulate
 from gait_entrainment.walker import Walker
 

@@ -1,16 +1,5 @@
-# Copyright 2026 The gait_entrainment authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Claims on ROS domains: exclusive among all processes, and gone with their holder."""
 
@@ -21,9 +10,9 @@ from argparse import Namespace
 
 import pytest
 
-from gait_entrainment_nodes import domain as module
-from gait_entrainment_nodes import stop_command
-from gait_entrainment_nodes.domain import DomainError, claimed_domain
+from gait_entrainment_nodes.commands import stop as stop_command
+from gait_entrainment_nodes.messaging import domain as module
+from gait_entrainment_nodes.messaging.domain import DomainError, claimed_domain
 
 
 @pytest.fixture(autouse=True)
@@ -72,7 +61,7 @@ def test_every_domain_taken_is_said():
 
 def test_claim_ends_with_a_killed_process(monkeypatch):
     program = (
-        "from gait_entrainment_nodes.domain import claimed_domain\n"
+        "from gait_entrainment_nodes.messaging.domain import claimed_domain\n"
         "import time\n"
         "with claimed_domain() as domain: print(domain, flush=True); time.sleep(60)\n"
     )

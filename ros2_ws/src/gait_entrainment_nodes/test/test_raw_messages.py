@@ -1,16 +1,5 @@
-# Copyright 2026 The gait_entrainment authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Bytes of messages against what ROS itself and an independent library make of them."""
 
@@ -28,10 +17,10 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from sensor_msgs.msg import JointState
 
-from gait_entrainment.bags import find_definition
+from gait_entrainment_bags import find_definition
 from gait_entrainment_msgs.msg import AnkleRobotState, TorqueProfile
-from gait_entrainment_nodes.raw_messages import MessageTemplate, mark, serialize
-from gait_entrainment_nodes.stamps import header, to_time
+from gait_entrainment_nodes.messaging.raw_messages import MessageTemplate, mark, serialize
+from gait_entrainment_nodes.messaging.stamps import header, to_time
 
 derandomized = settings(derandomize=True, deadline=None, max_examples=60)
 stamps = st.integers(0, (2**31 - 1) * 10**9)

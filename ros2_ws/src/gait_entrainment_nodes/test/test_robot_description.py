@@ -1,16 +1,5 @@
-# Copyright 2026 The gait_entrainment authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The robot description, moved by the walker's joint angles, is the walker."""
 
@@ -23,10 +12,10 @@ import xacro
 from scipy.spatial.transform import Rotation
 
 from gait_entrainment.conventions import EventKind, Side
-from gait_entrainment.footing import Footing
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.walker import Walker
-from gait_entrainment_nodes.walker_sim import JOINTS
+from gait_entrainment_nodes.nodes.footing import Footing
+from gait_entrainment_nodes.nodes.walker_sim import JOINTS
 
 URDF = Path(__file__).parents[1] / "urdf" / "sagittal_walker.urdf.xacro"
 SMALLER = WalkerParameters(leg_length=0.8, foot_length=0.15, ankle_stiffness=70.0)

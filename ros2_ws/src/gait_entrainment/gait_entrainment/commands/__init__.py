@@ -1,73 +1,91 @@
-# Copyright 2026 The gait_entrainment authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
 
-"""The command line ``entrain``: one module per command."""
+"""
+The command line ``entrain``: a table of commands, each loaded only when it is asked for.
+
+A package adds commands by the entry point ``gait_entrainment.commands``. It names a module with
+``COMMANDS``, a mapping from name to what the command is for. The command itself is the module of
+that name beside it:
+
+    DESCRIPTION, EXAMPLES     what ``entrain NAME --help`` says
+    add_options(parser)       adds the options
+    run(options) -> int       does it and returns the exit code; a command of several actions has
+                              none, but sets it as a default of each action's parser
+
+Whatever a command raises as an EntrainmentError is printed here, in one line.
+"""
 
 import argparse
+import importlib
 import sys
 from collections.abc import Sequence
 from importlib.metadata import entry_points
 
-from gait_entrainment.commands import (
-    analyze,
-    bag,
-    cohort,
-    driver,
-    existence,
-    lock,
-    paper,
-    phase_response,
-    results,
-    simulate,
-    sweep,
-)
+from gait_entrainment.errors import EntrainmentError
 
-# Commands of other packages, such as those that need ROS, are found under this entry point.
 ENTRY_POINTS = "gait_entrainment.commands"
 COMMANDS = {
-    "simulate": simulate.add_command,
-    "analyze": analyze.add_command,
-    "bag": bag.add_command,
-    "driver": driver.add_command,
-    "paper": paper.add_command,
-    "lock": lock.add_command,
-    "existence": existence.add_command,
-    "phase-response": phase_response.add_command,
-    "sweep": sweep.add_command,
-    "cohort": cohort.add_command,
-    "results": results.add_command,
+    "simulate": "the experiment in one process, without ROS",
 }
+_DESCRIPTION = "Rehearse, run and analyze entrainment experiments."
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; return 0 where it is done, 1 where it failed, 2 for wrong usage."""
-    parser = argparse.ArgumentParser(
-        prog="entrain", description="Rehearse, run and analyze entrainment experiments."
-    )
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    for add_command in COMMANDS.values():
-        add_command(commands)
-    for entry_point in entry_points(group=ENTRY_POINTS):
-        entry_point.load()(commands)
-    options = parser.parse_args(arguments)
+    """Run one command; return 0 if it is done, 1 if it failed, 2 for wrong usage."""
+    words = sys.argv[1:] if arguments is None else list(arguments)
+    name = words[0] if words else ""
     try:
+        options = make_parser(name).parse_args(words)
         return int(options.run(options))
+    except EntrainmentError as error:
+        print(f"entrain {name}: {error}", file=sys.stderr)
+        return error.exit_code
+    except ModuleNotFoundError as error:
+        package = (error.name or "").partition(".")[0]
+        print(
+            f"entrain: the Python package {package} is missing: run rosdep install, or "
+            f"pip install {package} (docs/installation.md)",
+            file=sys.stderr,
+        )
     except KeyboardInterrupt:
-        print("entrain: interrupted", file=sys.stderr)
-        return 1
+        print(f"entrain {name}: interrupted", file=sys.stderr)
     except BrokenPipeError:
-        return 1
+        pass
     except OSError as error:  # such as a folder that cannot be written
-        print(f"entrain: {error}", file=sys.stderr)
-        return 1
+        print(f"entrain {name}: {error}", file=sys.stderr)
+    return 1
+
+
+def make_parser(name: str = "") -> argparse.ArgumentParser:
+    """Return the parser of the command line; only the command of this name is loaded."""
+    parser = argparse.ArgumentParser(prog="entrain", description=_DESCRIPTION)
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    for command, (package, purpose) in _find_commands().items():
+        options = commands.add_parser(command, help=purpose)
+        if command == name:
+            add_command(options, f"{package}.{command.replace('-', '_')}")
+    return parser
+
+
+def add_command(parser: argparse.ArgumentParser, module_name: str) -> None:
+    """Load the module of a command and let it fill its parser."""
+    module = importlib.import_module(module_name)
+    parser.description = module.DESCRIPTION
+    parser.epilog = getattr(module, "EXAMPLES", None)
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    module.add_options(parser)
+    if hasattr(module, "run"):
+        parser.set_defaults(run=module.run)
+
+
+def _find_commands() -> dict[str, tuple[str, str]]:
+    """Return package and purpose of every command, by its name."""
+    packages = {__name__: COMMANDS}
+    for point in sorted(entry_points(group=ENTRY_POINTS), key=lambda point: point.name):
+        packages[point.value] = point.load().COMMANDS
+    return {
+        command: (package, purpose)
+        for package, commands in packages.items()
+        for command, purpose in commands.items()
+    }

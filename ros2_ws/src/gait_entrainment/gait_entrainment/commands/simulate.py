@@ -1,50 +1,30 @@
-# Copyright 2026 The gait_entrainment authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
 
 """entrain simulate: the experiment in one process, without ROS."""
 
 import argparse
 import json
 import sys
-from typing import Any
 
 from gait_entrainment.commands.outcome_options import add_outcome_options
 from gait_entrainment.commands.protocol_options import add_protocol_options, chosen_protocol
-from gait_entrainment.device import DeviceError, LimitError
+from gait_entrainment.outcome import outcome_of, summary, timing_outcome, timing_summary
 from gait_entrainment.protocol import ProtocolError
-from gait_entrainment.report.pulse_timing import timing_outcome, timing_summary
-from gait_entrainment.report.summary import outcome_of, summary
+from gait_entrainment.robot import DeviceError, LimitError
 
-_EXAMPLES = """examples:
+DESCRIPTION = "Conduct a protocol on the simulated walker, in one process."
+EXAMPLES = """examples:
   entrain simulate                              the paper's example
   entrain simulate --period-offset -0.07        pulses 70 ms faster than the walker
   entrain simulate my_protocol.yaml --json      one JSON object with every stride and pulse
 """
 
 
-def add_command(commands: Any) -> None:
-    """Add the command to the command line."""
-    parser = commands.add_parser(
-        "simulate",
-        help="the experiment in one process, without ROS",
-        description="Conduct a protocol on the simulated walker, in one process.",
-        epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
     add_protocol_options(parser)
     add_outcome_options(parser)
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -1,0 +1,34 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+The gait: events and the strides they bound, pulse phases, phase lags, the entrainment verdict.
+
+Nothing here knows a walker: a person's signals take the same path as the model's.
+"""
+
+from gait_entrainment.gait.analyzer import Analysis, GaitAnalyzer, PulseCounts, analyze
+from gait_entrainment.gait.drift import Drift, drift_of
+from gait_entrainment.gait.event import GaitEvent
+from gait_entrainment.gait.published import published_values
+from gait_entrainment.gait.pulse_phase import PulsePhase
+from gait_entrainment.gait.strides import EventCounts, Stride, StrideTracker
+from gait_entrainment.gait.verdict import Entrainment, Verdict, VerdictSettings
+
+__all__ = [
+    "Analysis",
+    "Drift",
+    "Entrainment",
+    "EventCounts",
+    "GaitAnalyzer",
+    "GaitEvent",
+    "PulseCounts",
+    "PulsePhase",
+    "Stride",
+    "StrideTracker",
+    "Verdict",
+    "VerdictSettings",
+    "analyze",
+    "drift_of",
+    "published_values",
+]

@@ -1,0 +1,210 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The analyzer: gait events and pulse onsets in, strides, pulse phases and verdicts out."""
+
+import math
+from bisect import bisect_left
+from collections import deque
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
+from gait_entrainment.gait.event import GaitEvent
+from gait_entrainment.gait.pulse_phase import (
+    LagFollower,
+    PulsePhase,
+    depends_on_next_toe_off,
+)
+from gait_entrainment.gait.strides import EventCounts, Stride, StrideTracker
+from gait_entrainment.gait.verdict import Entrainment, EntrainmentTest, VerdictSettings
+
+Result = Stride | PulsePhase | Entrainment
+
+
+@dataclass(slots=True)
+class PulseCounts:
+    """What became of the pulse onsets received."""
+
+    placed: int = 0  # in a stride, published
+    without_lag: int = 0  # of those, the ones whose nearest toe-off is missing
+    outside_strides: int = 0  # before stride 1, in a missed stride, or after the last stride
+    late: int = 0  # dropped: came after the promise that no such pulse would come
+    withdrawn: int = 0  # announced, then called off by a stop
+
+
+class _UnperturbedPeriod:
+    """Mean period of the complete strides before the first pulse, in exact integer arithmetic."""
+
+    def __init__(self) -> None:
+        self._count = self._sum = self._squares = 0
+        self.mean = math.nan  # [s]
+        self.standard_error = math.nan  # [s]
+
+    def add(self, stride: Stride) -> None:
+        period = stride.end - stride.start
+        self._count += 1
+        self._sum += period
+        self._squares += period * period
+        n, total = self._count, self._sum
+        self.mean = total / (n * NANOSECONDS_PER_SECOND)
+        if n > 1:
+            variance = (n * self._squares - total * total) / (n * n * (n - 1))
+            self.standard_error = math.sqrt(variance) / NANOSECONDS_PER_SECOND
+
+
+class GaitAnalyzer:
+    """
+    Analyzes one run of one perturbed leg, online.
+
+    Two inputs, in any interleaving: gait events, and promises about pulses. A stride comes out
+    with the heel strike that closes it. Its pulses come out, with the verdict at that stride,
+    once the promises reach that heel strike; where a pulse may be nearer to the next toe-off than
+    to its own, once the next stride is closed too. So the sequence of strides depends on the
+    events alone, and the sequences of pulse phases and of verdicts on the events and the onsets,
+    never on how events and promises interleave. (A stop is not bound by this: it happens when it
+    happens.)
+
+    Pulses outside every complete stride are counted in ``pulse_counts``, not published; they keep
+    their number.
+    """
+
+    def __init__(self, side: Side, settings: VerdictSettings | None = None) -> None:
+        self._tracker = StrideTracker(side)
+        self._test = EntrainmentTest(settings or VerdictSettings())
+        self._lags = LagFollower()
+        self._unperturbed = _UnperturbedPeriod()
+        self._strides: deque[Stride] = deque()  # closed, pulses not resolved yet
+        self._before: Stride | None = None  # the latest stride whose pulses are resolved
+        self._onsets: list[int] = []  # announced, not resolved yet; ascending
+        self._promised = -math.inf  # no pulse before this instant will be added [ns]
+        self._finished = False
+        self._number = 0  # of the latest pulse resolved
+        self.pulse_counts = PulseCounts()
+
+    @property
+    def event_counts(self) -> EventCounts:
+        """What became of the events received so far."""
+        return self._tracker.counts
+
+    def add_event(self, event: GaitEvent) -> list[Result]:
+        """Take one gait event; return the results that it completes, in order."""
+        stride = self._tracker.add(event)
+        if stride is None:
+            return []
+        self._strides.append(stride)
+        return [stride, *self._resolve()]
+
+    def add_promise(self, onsets: Iterable[int], valid_until: int) -> list[Result]:
+        """
+        Take the onsets of pulses [ns], and the promise that none before an instant will follow.
+
+        An onset that was announced already is ignored; one that an earlier promise excludes is
+        dropped and counted. Returns the results that this completes, in order.
+        """
+        for onset in onsets:
+            if onset < self._promised:
+                self.pulse_counts.late += 1
+                continue
+            place = bisect_left(self._onsets, onset)
+            if self._onsets[place : place + 1] != [onset]:
+                self._onsets.insert(place, onset)
+        self._promised = max(self._promised, valid_until)
+        return self._resolve()
+
+    def stop(self, stamp: int) -> None:
+        """Take a stop [ns]: no announced pulse begins from it on, and no promise reaches on."""
+        kept = bisect_left(self._onsets, stamp)
+        self.pulse_counts.withdrawn += len(self._onsets) - kept
+        del self._onsets[kept:]
+        self._promised = min(self._promised, stamp)
+
+    def finish(self) -> list[Result]:
+        """End the run: no more events or pulses. Returns the results that were waiting."""
+        self._promised = math.inf
+        self._finished = True
+        results = self._resolve()
+        self.pulse_counts.outside_strides += len(self._onsets)
+        self._onsets.clear()
+        return results
+
+    def _resolve(self) -> list[Result]:
+        """Resolve the pulses of closed strides, as far as events and promises allow."""
+        results: list[Result] = []
+        while self._strides and self._strides[0].end <= self._promised:
+            stride = self._strides[0]
+            onsets = self._onsets[: bisect_left(self._onsets, stride.end)]
+            after = self._strides[1] if len(self._strides) > 1 else None
+            if (
+                onsets
+                and after is None
+                and not self._finished
+                and depends_on_next_toe_off(onsets[-1], stride)
+            ):
+                break
+            self._strides.popleft()
+            del self._onsets[: len(onsets)]
+            results += self._resolve_stride(stride, after, onsets)
+            self._before = stride
+        return results
+
+    def _resolve_stride(
+        self, stride: Stride, after: Stride | None, onsets: Sequence[int]
+    ) -> list[Result]:
+        """Place the pulses that began before the end of a stride; then ask for the verdict."""
+        before = self._before
+        if before is not None and before.number != stride.number - 1:
+            before = None
+        if after is not None and after.number != stride.number + 1:
+            after = None
+        period = self._unperturbed
+        pulses: list[PulsePhase] = []
+        for onset in onsets:
+            self._number += 1
+            if onset < stride.start:
+                self.pulse_counts.outside_strides += 1
+                continue
+            pulse = self._lags.place(self._number, onset, stride, before, after, period.mean)
+            self.pulse_counts.placed += 1
+            self.pulse_counts.without_lag += pulse.toe_off is None
+            pulses.append(pulse)
+        if self._number == 0:
+            period.add(stride)
+        entrainment = self._test.add(stride, pulses, period.mean, period.standard_error)
+        return [*pulses, entrainment] if entrainment else list(pulses)
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """All results of one run."""
+
+    strides: tuple[Stride, ...]
+    pulses: tuple[PulsePhase, ...]
+    entrainments: tuple[Entrainment, ...]  # the last one is the verdict of the run
+    event_counts: EventCounts
+    pulse_counts: PulseCounts
+
+
+def analyze(
+    events: Iterable[GaitEvent],
+    onsets: Iterable[int],
+    side: Side,
+    settings: VerdictSettings | None = None,
+) -> Analysis:
+    """
+    Analyze a whole run of one perturbed leg offline, with the very class that runs online.
+
+    Events come in the order in which they were received; onsets [ns] in any.
+    """
+    analyzer = GaitAnalyzer(side, settings)
+    results = [result for event in events for result in analyzer.add_event(event)]
+    known = sorted(onsets)
+    results += analyzer.add_promise(known, known[-1] if known else 0)
+    results += analyzer.finish()
+    return Analysis(
+        strides=tuple(result for result in results if isinstance(result, Stride)),
+        pulses=tuple(result for result in results if isinstance(result, PulsePhase)),
+        entrainments=tuple(result for result in results if isinstance(result, Entrainment)),
+        event_counts=analyzer.event_counts,
+        pulse_counts=analyzer.pulse_counts,
+    )

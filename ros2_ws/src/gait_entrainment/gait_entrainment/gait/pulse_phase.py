@@ -1,0 +1,108 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Where in the gait cycle a pulse began, and how far from toe-off."""
+
+import math
+from dataclasses import dataclass
+
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
+from gait_entrainment.gait.strides import Stride
+
+
+@dataclass(frozen=True, slots=True)
+class PulsePhase:
+    """One pulse, placed in the gait cycle of the perturbed leg."""
+
+    number: int  # of the pulse in the run, from 1
+    onset: int  # [ns]
+    stride: int  # stride in which the pulse began
+    phase: float  # (onset - heel strike) / stride period, in [0, 1)
+    phase_lag: float  # onset minus the nearest toe-off [s]; NaN where that toe-off is missing
+    unwrapped_lag: float  # the same, followed across wraps from the first lag on [s]
+    toe_off: int | None  # the toe-off that the lag refers to [ns]
+
+
+def depends_on_next_toe_off(onset: int, stride: Stride) -> bool:
+    """
+    Whether a toe-off of the next stride could be nearer to an onset than that of its own stride.
+
+    The next toe-off comes after the closing heel strike, so an onset that is at least as near to
+    its own toe-off as to that strike needs no look ahead.
+    """
+    return stride.toe_off is not None and onset - stride.toe_off > stride.end - onset
+
+
+def nearest_toe_off(
+    onset: int, stride: Stride, before: Stride | None, after: Stride | None
+) -> tuple[int, int] | None:
+    """
+    Return the stamp [ns] of the toe-off nearest to an onset, and the stride that it is in.
+
+    None where a toe-off that is missing might be the nearest: a lag to the next best one would
+    be wrong by up to a stride. Ties go to the earlier toe-off.
+
+    Parameters
+    ----------
+    onset
+        Onset of the pulse [ns], within the stride.
+    stride
+        Stride in which the pulse began.
+    before, after
+        Its neighbours; None where they are missing.
+
+    """
+    own = stride.toe_off
+    if own is None:
+        return None
+    if onset >= own:
+        if not depends_on_next_toe_off(onset, stride):
+            return own, stride.number
+        if after is None or after.toe_off is None:
+            return None
+        if onset - own <= after.toe_off - onset:
+            return own, stride.number
+        return after.toe_off, after.number
+    if before is None or before.toe_off is None:
+        # The toe-off before the stride lies before the heel strike that starts it.
+        return (own, stride.number) if own - onset <= onset - stride.start else None
+    if onset - before.toe_off <= own - onset:
+        return before.toe_off, before.number
+    return own, stride.number
+
+
+class LagFollower:
+    """
+    Follows the phase lag across its wraps.
+
+    Pulse n is compared with the toe-off n strides after that of the first pulse. That toe-off
+    may lie in the future, so its distance from the nearest one is counted in unperturbed strides
+    T: unwrapped lag = lag + (m - n) T, where m strides and n pulses have passed since the first
+    lag. It presumes one train with one pulse a stride (1:1 entrainment).
+    """
+
+    def __init__(self) -> None:
+        self._first: tuple[int, int] | None = None  # stride of the toe-off, number of the pulse
+
+    def place(
+        self,
+        number: int,
+        onset: int,
+        stride: Stride,
+        before: Stride | None,
+        after: Stride | None,
+        unperturbed_period: float,
+    ) -> PulsePhase:
+        """Place one pulse; arguments as in ``nearest_toe_off``, the period in seconds."""
+        phase = (onset - stride.start) / (stride.end - stride.start)
+        nearest = nearest_toe_off(onset, stride, before, after)
+        if nearest is None:
+            return PulsePhase(number, onset, stride.number, phase, math.nan, math.nan, None)
+        toe_off, toe_off_stride = nearest
+        lag = (onset - toe_off) / NANOSECONDS_PER_SECOND
+        if self._first is None:
+            self._first = toe_off_stride, number
+        ahead = (toe_off_stride - self._first[0]) - (number - self._first[1])
+        # Without a wrap the lag stands as it is, even where T is unknown (NaN).
+        unwrapped = lag + ahead * unperturbed_period if ahead else lag
+        return PulsePhase(number, onset, stride.number, phase, lag, unwrapped, toe_off)

@@ -1,0 +1,178 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The outcome of an experiment, as one mapping for machines and a few lines for people."""
+
+import math
+import statistics
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any, Protocol
+
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind
+from gait_entrainment.gait import Analysis, GaitEvent, Verdict
+from gait_entrainment.protocol import Protocol as ProtocolOfRun
+from gait_entrainment.robot import PulseTiming
+from gait_entrainment.robot.timing import distribution
+
+# Pulses whose lags make up the final one: the paper's locked gait repeats itself exactly.
+FINAL_PULSES = 5
+# What a verdict other than entrained says to a person.
+_MEANINGS = {
+    "drifting": "the pulses run through the stride",
+    "lost": "the gait followed the pulses, then drifted",
+    "untestable": "pulse period and stride period are too close to tell them apart",
+    "undecided": "neither locked nor drifting for certain; more pulses may tell",
+}
+
+
+class Run(Protocol):
+    """What a simulated and a recorded run have in common."""
+
+    @property
+    def protocol(self) -> ProtocolOfRun:
+        """What was conducted."""
+
+    @property
+    def events(self) -> tuple[GaitEvent, ...]:
+        """Gait events in the order in which they came."""
+
+    @property
+    def analysis(self) -> Analysis:
+        """Strides, pulse phases and verdicts."""
+
+    @property
+    def measured_period(self) -> float:
+        """Mean stride period over the baseline [s]; NaN without a plan."""
+
+    @property
+    def pulse_period(self) -> float:
+        """Period of the pulses as planned [s]; NaN without a plan."""
+
+
+def outcome_of(run: Run) -> dict[str, Any]:
+    """Return what ``--json`` prints; times in seconds, None where something is not known."""
+    protocol, analysis = run.protocol, run.analysis
+    strides = [s for s in analysis.strides if s.number <= protocol.strides]
+    start = strides[0].start if strides else 0
+    last = analysis.entrainments[-1] if analysis.entrainments else None
+    verdict = last.verdict if last else Verdict.UNDECIDED
+    entrained = verdict is Verdict.ENTRAINED
+    placed = [p for p in analysis.pulses if p.toe_off is not None]  # the others have no lag
+    lags = [p.phase_lag for p in placed[-FINAL_PULSES:]]
+    toe_off = placed[-1].toe_off if placed else None
+    parameters = asdict(protocol)
+    parameters["side"] = protocol.side.name.lower()
+    parameters["pulses"]["torque"] = protocol.pulse_torque
+    outcome: dict[str, Any] = _without_nan(
+        {
+            "unperturbed_stride_period": run.measured_period,
+            "perturbation_period": run.pulse_period,
+            "stride_period": [stride.period for stride in strides],
+            "pulses": [
+                {
+                    "onset": (pulse.onset - start) / NANOSECONDS_PER_SECOND,
+                    "phase": pulse.phase,
+                    "phase_lag": pulse.phase_lag,
+                }
+                for pulse in analysis.pulses
+            ],
+            "verdict": verdict.name.lower(),
+            "entrained": entrained,
+            "entrained_since_stride": last.entrained_since_stride if last and entrained else None,
+            "final_phase_lag": statistics.median(lags) if lags else math.nan,
+            "double_stance": _double_stance(run.events, toe_off),
+            "parameters": parameters,
+        }
+    )
+    return outcome
+
+
+def summary(outcome: dict[str, Any]) -> str:
+    """Return the outcome in a few lines."""
+    parameters = outcome["parameters"]
+    strides, pulses = outcome["stride_period"], outcome["pulses"]
+    unperturbed, period = outcome["unperturbed_stride_period"], outcome["perturbation_period"]
+    lines = [f"strides          {len(strides)}, pulses placed in them: {len(pulses)}"]
+    if strides:
+        measured = "not measured" if unperturbed is None else f"{unperturbed:.4f} s"
+        lines.append(f"stride period    {measured} unperturbed, {strides[-1]:.4f} s last")
+    if period is not None:
+        torque, width = parameters["pulses"]["torque"], parameters["pulses"]["width"]
+        offset = "" if unperturbed is None else f" ({(period - unperturbed) * 1e3:+.1f} ms)"
+        lines.append(
+            f"pulses           {torque:.2f} N m for {width:g} s every {period:.4f} s{offset}"
+        )
+    verdict = outcome["verdict"]
+    if outcome["entrained"]:
+        verdict += f" since stride {outcome['entrained_since_stride']}"
+    else:
+        verdict += f": {_MEANINGS[verdict]}"
+    lines.append(f"verdict          {verdict}")
+    lag, double_stance = outcome["final_phase_lag"], outcome["double_stance"]
+    if lag is not None and outcome["entrained"]:
+        lines.append(f"final phase lag  {lag * 1e3:+.1f} ms: {_place(lag, double_stance)}")
+    return "\n".join(lines)
+
+
+def _place(lag: float, double_stance: float | None) -> str:
+    """Say where in the gait cycle a phase lag [s] lies."""
+    if lag >= 0:
+        return "after toe-off"
+    if double_stance is None or -lag > double_stance:
+        return "before double stance"
+    percent = 100 * (1 + lag / double_stance)
+    place = f"the pulse begins {percent:.0f} % into double stance ({double_stance:.3f} s)"
+    if percent < 50:
+        place += "\n                 so early, a slow passage may look locked: ask entrain lock"
+    return place
+
+
+def _double_stance(events: Sequence[GaitEvent], toe_off: int | None) -> float:
+    """Return the duration [s] of the double stance that a toe-off ends; NaN if unknown."""
+    if toe_off is None:
+        return math.nan
+    strikes = [e.stamp for e in events if e.kind is EventKind.HEEL_STRIKE and e.stamp < toe_off]
+    return (toe_off - max(strikes)) / NANOSECONDS_PER_SECOND if strikes else math.nan
+
+
+def _without_nan(value: Any) -> Any:
+    """Replace NaN, which JSON does not have, by None."""
+    if isinstance(value, dict):
+        return {key: _without_nan(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_without_nan(item) for item in value]
+    return None if isinstance(value, float) and math.isnan(value) else value
+
+
+def timing_outcome(timings: Sequence[PulseTiming], stride: float) -> dict[str, Any]:
+    """Return what ``--json`` prints of the pulses' timing; percentages are of a stride [s]."""
+    return {
+        "sent": distribution(timings, "sent", stride),
+        "measured": distribution(timings, "measured", stride),
+        "each_ms": [
+            {"sent": _late(t.commanded, t.sent), "measured": _late(t.commanded, t.measured)}
+            for t in timings
+        ],
+    }
+
+
+def timing_summary(outcome: dict[str, Any]) -> list[str]:
+    """Return lines for people; none where every pulse came at its instant."""
+    lines = []
+    for kind in ("sent", "measured"):
+        figures = outcome[kind]
+        if figures is None or not (figures["worst_ms"] or figures["missing"]):
+            continue
+        missing = f", {figures['missing']} never seen" if figures["missing"] else ""
+        percent = figures["worst_percent"]
+        share = "" if percent is None else f": {percent:.2f} % of a stride"
+        lines.append(
+            f"pulses {kind:<10}{figures['median_ms']:.1f} ms after their command (median), "
+            f"{figures['p99_ms']:.1f} (99 %), {figures['worst_ms']:.1f} (worst{share}){missing}"
+        )
+    return lines
+
+
+def _late(commanded: int, onset: int | None) -> float | None:
+    return None if onset is None else (onset - commanded) / 1e6

@@ -1,0 +1,34 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The ankle robot: pulse trains in, promised torque profiles out."""
+
+from gait_entrainment.robot.contract import AnkleRobot, Capabilities, RobotState
+from gait_entrainment.robot.drivers import Driver, driver_names, find_driver
+from gait_entrainment.robot.faults import DeviceError, Fault, LimitError
+from gait_entrainment.robot.guard import GuardedRobot
+from gait_entrainment.robot.limits import DeviceLimits
+from gait_entrainment.robot.measured_onsets import MeasuredOnsets
+from gait_entrainment.robot.profile import TorqueProfile
+from gait_entrainment.robot.pulse_train import PulseTrain
+from gait_entrainment.robot.timing import PulseTiming, TimingAudit, measured_onset
+
+__all__ = [
+    "AnkleRobot",
+    "Capabilities",
+    "DeviceError",
+    "DeviceLimits",
+    "Driver",
+    "Fault",
+    "GuardedRobot",
+    "LimitError",
+    "MeasuredOnsets",
+    "PulseTiming",
+    "PulseTrain",
+    "RobotState",
+    "TimingAudit",
+    "TorqueProfile",
+    "driver_names",
+    "find_driver",
+    "measured_onset",
+]

@@ -1,0 +1,128 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Ankle robot drivers by name, loaded only when chosen.
+
+A driver is named by a text, NAME or NAME:OPTION=VALUE,OPTION=VALUE, everywhere the same: in a
+protocol, on the command line, as a parameter of the perturbator. Drivers of other packages are
+found under the entry point ``gait_entrainment.drivers``.
+"""
+
+import importlib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
+
+from gait_entrainment.conventions import Side
+from gait_entrainment.robot.contract import AnkleRobot
+from gait_entrainment.robot.faults import DeviceError, LimitError
+from gait_entrainment.robot.guard import GuardedRobot
+from gait_entrainment.robot.limits import DeviceLimits
+
+ENTRY_POINTS = "gait_entrainment.drivers"
+# Those of this package are named here, so that a simulation need not search all packages first.
+OWN_DRIVERS = {
+    "ideal": "gait_entrainment.robot.ideal:IdealAnkleRobot",
+    "emulated": "gait_entrainment.robot.emulated:EmulatedAnkleRobot",
+}
+
+
+@dataclass(frozen=True)
+class Driver:
+    """A driver that has been chosen and loaded, with its options, not yet connected."""
+
+    name: str
+    robot: type[AnkleRobot]
+    options: Any
+
+    def make(self, side: Side, limits: DeviceLimits | None = None, seed: int = 0) -> GuardedRobot:
+        """Return the robot behind the safety envelope, in the state before ``configure``."""
+        return GuardedRobot(self.robot(side, self.options, seed), side, limits)
+
+    @property
+    def simulated(self) -> bool:
+        """Whether it lives in simulated time, so that it can run in lock-step."""
+        return self.robot(Side.LEFT, self.options, 0).capabilities.simulated
+
+
+def driver_names() -> dict[str, str]:
+    """Return where each driver is found, by name; nothing is loaded."""
+    others = {point.name: point.value for point in entry_points(group=ENTRY_POINTS)}
+    return dict(sorted({**others, **OWN_DRIVERS}.items()))
+
+
+def find_driver(text: str) -> Driver:
+    """
+    Load the driver that a text names, and check its options.
+
+    Raises
+    ------
+    LimitError
+        where there is none of that name, with the names that there are; where an option is
+        unknown or out of range.
+    DeviceError
+        where the driver cannot be loaded.
+
+    """
+    name, _, options = text.partition(":")
+    target = OWN_DRIVERS.get(name) or driver_names().get(name)
+    if target is None:
+        known = ", ".join(driver_names())
+        raise LimitError(f"driver: {name!r} is unknown; allowed: {known}")
+    try:
+        robot = _load(name, target)
+    except (ImportError, AttributeError) as error:
+        raise DeviceError(
+            f"driver: {name} ({target}) cannot be loaded: {error}; install what it needs"
+        ) from None
+    return Driver(name, robot, _options(name, robot.Options, options))
+
+
+def _load(name: str, target: str) -> type[AnkleRobot]:
+    if name in OWN_DRIVERS:
+        module, _, attribute = target.partition(":")
+        loaded: type[AnkleRobot] = getattr(importlib.import_module(module), attribute)
+    else:
+        loaded = EntryPoint(name, target, ENTRY_POINTS).load()
+    if not (isinstance(loaded, type) and issubclass(loaded, AnkleRobot)):
+        raise LimitError(f"driver: {name} ({target}) is no AnkleRobot: derive it from that class")
+    return loaded
+
+
+def _options(name: str, options_type: type[Any], text: str) -> Any:
+    """Return a driver's options from OPTION=VALUE,OPTION=VALUE."""
+    known: Mapping[str, Any] = {f.name: f for f in fields(options_type)}
+    values = {}
+    for part in filter(None, text.split(",")):
+        key, equals, value = part.partition("=")
+        if not equals or key not in known:
+            allowed = ", ".join(known) or "none"
+            raise LimitError(f"driver: {name}: option {part!r}; allowed: {allowed}, as NAME=VALUE")
+        values[key] = _value(f"driver: {name}: {key}", known[key], value)
+    return options_type(**values)
+
+
+def _value(where: str, option: Any, text: str) -> Any:
+    """Return an option's value of the type of its default, within its range."""
+    kind = type(option.default)
+    if kind is bool:
+        if text not in ("true", "false"):
+            raise LimitError(f"{where}: {text!r}; allowed: true, false")
+        return text == "true"
+    if kind is str:
+        choices = option.metadata.get("choices")
+        if choices is not None and text not in choices:
+            raise LimitError(f"{where}: {text!r}; allowed: {', '.join(choices)}")
+        return text
+    low, high = option.metadata.get("range", (-math.inf, math.inf))
+    try:
+        value = kind(text)
+    except ValueError:
+        value = math.nan
+    if not low <= value <= high:
+        unit = option.metadata["unit"]
+        raise LimitError(f"{where}: {text!r}; allowed: {low:g} to {high:g} {unit}")
+    return value

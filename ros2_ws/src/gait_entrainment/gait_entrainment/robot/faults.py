@@ -1,0 +1,55 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What can be wrong with an ankle robot: faults as values, and the errors that calls raise."""
+
+from dataclasses import dataclass
+
+
+class DeviceError(RuntimeError):
+    """The device cannot do what was asked: one line that says what and what to do."""
+
+
+class LimitError(ValueError):
+    """A request outside what is allowed; the message names field, value and limit."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """
+    Something that is wrong, as a driver or the safety envelope reports it.
+
+    Every fault means: torque is brought to zero and stays there until the robot is closed and
+    configured again.
+    """
+
+    name: str  # short, stable, for machines: lower case with underscores
+    meaning: str  # one sentence for people
+
+
+STOPPED = Fault("stopped", "The stop was called.")
+EXPERIMENT_SILENT = Fault(
+    "experiment_silent", "The experiment sent no horizon for longer than the limit."
+)
+DEVICE_SILENT = Fault(
+    "device_silent",
+    "The device sent no reply for longer than the limit: see to its power and wiring, or to what"
+    " else loads this computer.",
+)
+HOST_LOOP_LATE = Fault(
+    "host_loop_late",
+    "The loop that times the torque woke up later than the limit: see to what else loads this"
+    " computer.",
+)
+TORQUE_EXCEEDED = Fault(
+    "torque_exceeded", "More torque was delivered than the limit and its margin allow."
+)
+IMPULSE_EXCEEDED = Fault(
+    "impulse_exceeded", "More angular impulse was delivered per stride than the limit allows."
+)
+DRIVER_FAILED = Fault("driver_failed", "The driver raised an error or broke its contract.")
+NOT_STOPPED = Fault(
+    "not_stopped",
+    "The driver cannot bring the torque to zero: cut the power. The process ends, so that the "
+    "device hears nothing more.",
+)

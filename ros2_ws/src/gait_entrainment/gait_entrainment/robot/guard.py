@@ -1,0 +1,409 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+The safety envelope: the one way to an ankle robot, whatever its driver.
+
+Nothing else holds the driver. Every train is held against the limits before the driver sees it,
+every delivered torque afterwards, and every path out, an exception included, brings the torque to
+zero before the device is disabled. Any fault latches: torque stays at zero until ``close`` and
+``configure``.
+
+What this cannot do, since it is software beside others on a system that is not real time: see
+docs/safety.md.
+"""
+
+import atexit
+import contextlib
+import itertools
+import math
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
+from gait_entrainment.robot.contract import AnkleRobot, Capabilities, RobotState
+from gait_entrainment.robot.faults import (
+    DRIVER_FAILED,
+    EXPERIMENT_SILENT,
+    IMPULSE_EXCEEDED,
+    NOT_STOPPED,
+    STOPPED,
+    TORQUE_EXCEEDED,
+    DeviceError,
+    Fault,
+    LimitError,
+)
+from gait_entrainment.robot.limits import DeviceLimits
+from gait_entrainment.robot.profile import TorqueProfile
+from gait_entrainment.robot.pulse_train import PulseTrain
+
+# How often the watchdog looks whether the experiment has fallen silent [s].
+_WATCH_PERIOD = 0.01
+_INACTIVE = "the device is not active; configure and activate it first"
+
+_T = TypeVar("_T")
+
+
+class GuardedRobot:
+    """
+    An ankle robot behind the safety envelope; nobody else may keep the driver.
+
+    Attributes
+    ----------
+    train, delivered
+        The pulses scheduled last, and how many of them have begun in what was promised.
+    promised_until
+        Everything before this instant is promised [ns].
+    faults
+        What latched the torque at zero, in the order in which it was found.
+
+    """
+
+    def __init__(self, robot: AnkleRobot, side: Side, limits: DeviceLimits | None = None) -> None:
+        self._robot = robot
+        self.side = side
+        self.limits = limits or DeviceLimits()
+        self.train: PulseTrain | None = None
+        self.delivered = 0
+        self.promised_until = 0
+        self.faults: tuple[Fault, ...] = ()
+        self._configured = self._active = self._armed = self._begun = False
+        self._delivered_torque = _DeliveredTorque(self.limits)
+        self._last_heard = math.inf  # steady time [s]
+        self._watching = threading.Event()
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What the device can do."""
+        return self._robot.capabilities
+
+    @property
+    def enabled(self) -> bool:
+        """Whether the device has been activated, be it latched or not."""
+        return self._active
+
+    @property
+    def armed(self) -> bool:
+        """Whether torque is allowed; a device in simulated time needs no arming."""
+        return self._armed
+
+    @property
+    def busy(self) -> bool:
+        """Whether some pulse of the train has not been promised to its end."""
+        train = self.train
+        return train is not None and train.end(train.count - 1) > self.promised_until
+
+    # Lifecycle
+
+    def configure(self) -> None:
+        """
+        Connect to the device; releases what was latched.
+
+        Raises
+        ------
+        DeviceError
+            where it does not answer, is another one than it should be, or is configured already.
+
+        """
+        if self._configured:
+            raise DeviceError("the device is configured already; close it first")
+        self.faults = ()
+        try:
+            self._call(self._robot.configure)
+        except DeviceError:
+            with contextlib.suppress(Exception):
+                self._robot.close()
+            raise
+        self._configured = True
+
+    def activate(self) -> None:
+        """
+        Enable the device at zero torque.
+
+        Raises
+        ------
+        DeviceError
+            where it is not configured, is latched, is active already, or cannot be enabled.
+
+        """
+        if not self._configured:
+            raise DeviceError("the device is not configured; configure it first")
+        self._refuse_latched()
+        if self._active:
+            raise DeviceError("the device is active already; deactivate it first")
+        self._call(self._robot.activate)
+        self._active = True
+        self._armed = self.capabilities.simulated
+        if not self.capabilities.simulated:
+            # The interpreter's end kills the threads of a driver: zero torque comes before it.
+            atexit.register(self.close)
+            self._watching.set()
+            threading.Thread(target=self._watch, name="experiment watchdog", daemon=True).start()
+
+    def arm(self) -> None:
+        """
+        Allow torque: the step that a person takes, who has seen that all is well.
+
+        Raises
+        ------
+        DeviceError
+            where the device is not active, or is latched.
+
+        """
+        self._refuse_latched()
+        if not self._active:
+            raise DeviceError("the device is not active; activate it before arming")
+        self._armed = True
+
+    def begin(self, start: int) -> None:
+        """
+        Start the account of a run at an instant [ns]; a train of the run before is dropped.
+
+        Raises
+        ------
+        DeviceError
+            where the device is not active, or the driver fails. A latched one may begin: there
+            will be no torque.
+
+        """
+        if not self._active:
+            raise DeviceError(_INACTIVE)
+        self._call(lambda: self._robot.begin(start))
+        self.train, self.delivered, self.promised_until = None, 0, start
+        self._delivered_torque = _DeliveredTorque(self.limits)
+        self._begun = True
+        self.heard()
+
+    def deactivate(self) -> None:
+        """
+        Bring the torque to zero, then disable the device; what fails becomes a fault.
+
+        Promises may still be asked for, until the run is over.
+        """
+        self.train = None
+        self._watching.clear()
+        if self._active:
+            self._active = self._armed = False
+            self._quietly(self._robot.deactivate)
+
+    def close(self) -> None:
+        """Bring the torque to zero, disable and release, from any state; never raises."""
+        self.deactivate()
+        self._configured = self._begun = False
+        self._quietly(self._robot.close)
+        atexit.unregister(self.close)
+
+    def __enter__(self) -> "GuardedRobot":
+        """Return the robot; leaving the context closes it, however it is left."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the robot."""
+        self.close()
+
+    # Torque
+
+    def heard(self) -> None:
+        """Note a sign of life of the experiment."""
+        self._last_heard = time.monotonic()
+
+    def schedule(self, train: PulseTrain) -> None:
+        """
+        Accept a train of pulses.
+
+        Raises
+        ------
+        LimitError
+            where the train is outside the limits, is for the other ankle, begins before what was
+            already promised, or where another train is still under way. Nothing changes then.
+        DeviceError
+            where the device is not active, not armed, latched, or cannot take the train.
+
+        """
+        self._refuse_inactive()
+        if not self._begun:
+            raise DeviceError("no run is under way; begin one first")
+        if not self._armed:
+            raise DeviceError("the device is not armed; see that all is well, then arm it")
+        self.limits.check(train)
+        peak = self.capabilities.peak_torque
+        if abs(train.torque) > peak:
+            raise LimitError(
+                f"torque: {train.torque:g} N m is more than the device can deliver; "
+                f"allowed: -{peak:g} to {peak:g} N m"
+            )
+        if train.side is not self.side:
+            raise LimitError(f"side: {train.side.name.lower()}; the robot sits on the other ankle")
+        if self.busy:
+            raise LimitError("a pulse train is under way; allowed: one at a time")
+        if train.first_onset < self.promised_until:
+            late = (self.promised_until - train.first_onset) / NANOSECONDS_PER_SECOND
+            raise LimitError(f"first_onset: lies {late:g} s inside what is already promised")
+        train = self.limits.ramped(train)
+        self._call(lambda: self._robot.schedule(train))
+        self.train, self.delivered = train, 0
+        self.heard()
+        if self.faults:  # a stop from another thread came in between
+            self.stop()
+            self._refuse_latched()
+
+    def cancel(self) -> None:
+        """Forget the train: torque is zero from now on."""
+        if self.train is not None:
+            self.train = None
+            self._call(self._robot.cancel)
+
+    def stop(self, fault: Fault = STOPPED) -> None:
+        """
+        Bring the torque to zero and keep it there; from any thread and state, never raises.
+
+        A driver that raises here breaks the last promise there is, which is a fault of its own.
+        """
+        self._latch(fault)
+        self.train = None
+        try:
+            self._robot.stop()
+        except Exception:
+            self._latch(NOT_STOPPED)
+
+    def promise(self, until: int) -> TorqueProfile:
+        """
+        Return the delivered torque from the last promise up to ``until`` [ns] at most.
+
+        It becomes binding. Delivered torque or impulse beyond the limits latches a fault; what
+        was delivered is told all the same.
+
+        Raises
+        ------
+        ValueError
+            where ``until`` lies before the last promise.
+        DeviceError
+            where no run is under way, the driver fails, or breaks its contract.
+
+        """
+        begin = self.promised_until
+        if until < begin:
+            raise ValueError(f"a promise up to {until} ns would take back one up to {begin} ns")
+        if not self._begun:
+            raise DeviceError("no run is under way; begin one first")
+        profile = self._call(lambda: self._robot.promise(until))
+        broken = contract_breach(profile, begin, until)
+        if broken:
+            self.stop(DRIVER_FAILED)
+            raise DeviceError(f"the driver broke its contract: {broken}")
+        self.delivered += len(profile.onsets)
+        self.promised_until = profile.valid_until
+        fault = self._delivered_torque.add(profile)
+        if fault is not None:
+            self.stop(fault)
+        return profile
+
+    def read(self) -> Sequence[RobotState]:
+        """Return the states since the last call; a fault in one of them latches."""
+        states = self._call(self._robot.read)
+        for state in states:
+            for fault in state.faults:
+                if fault not in self.faults:
+                    self.stop(fault)
+        return states
+
+    # Guarding
+
+    def _latch(self, fault: Fault) -> None:
+        if fault not in self.faults:
+            self.faults = (*self.faults, fault)
+
+    def _refuse_latched(self) -> None:
+        if self.faults:
+            names = ", ".join(fault.name for fault in self.faults)
+            raise DeviceError(f"torque is latched at zero ({names}): clean up and configure first")
+
+    def _refuse_inactive(self) -> None:
+        self._refuse_latched()
+        if not self._active:
+            raise DeviceError(_INACTIVE)
+
+    def _call(self, function: Callable[[], _T]) -> _T:
+        """Call the driver; whatever it raises, the torque goes to zero first."""
+        try:
+            return function()
+        except LimitError:
+            raise  # refused, nothing has changed
+        except BaseException as error:
+            if self._active:
+                self.stop(DRIVER_FAILED)
+            if isinstance(error, DeviceError) or not isinstance(error, Exception):
+                raise
+            raise DeviceError(f"the driver failed: {type(error).__name__}: {error}") from error
+
+    def _quietly(self, function: Callable[[], None]) -> None:
+        """Call the driver on the way out: an error becomes a fault, and the way goes on."""
+        try:
+            function()
+        except Exception:
+            self.stop(DRIVER_FAILED)
+
+    def _watch(self) -> None:
+        """Stop the torque where the experiment falls silent while torque may come."""
+        while self._watching.is_set():
+            silence = time.monotonic() - self._last_heard
+            if self.train is not None and silence > self.limits.silence:
+                self.stop(EXPERIMENT_SILENT)
+                return
+            time.sleep(_WATCH_PERIOD)
+
+
+def contract_breach(profile: TorqueProfile, begin: int, until: int) -> str:
+    """Return which promise of a profile is broken, or an empty text."""
+    times = [*profile.times, profile.valid_until]
+    if not profile.times or len(profile.times) != len(profile.torques):
+        return "a profile needs one torque for each time, and at least one"
+    if profile.times[0] != begin:
+        return f"a profile from {profile.times[0]} ns does not adjoin the one up to {begin} ns"
+    if profile.valid_until > until:
+        return f"a profile up to {profile.valid_until} ns goes beyond the {until} ns asked for"
+    empty = profile.valid_until == begin and len(profile.times) == 1
+    if not empty and any(a >= b for a, b in itertools.pairwise(times)):
+        return "the times of a profile are not ascending"
+    if not all(math.isfinite(torque) for torque in profile.torques):
+        return f"the torques of a profile are not all finite: {profile.torques}"
+    return ""
+
+
+class _DeliveredTorque:
+    """Watches the delivered torque, and its impulse within any stretch as long as a stride."""
+
+    def __init__(self, limits: DeviceLimits) -> None:
+        margin = 1 + limits.overshoot
+        self._torque = limits.torque * margin
+        self._impulse = limits.impulse * margin
+        self._window = round(limits.stride * NANOSECONDS_PER_SECOND)
+        self._pieces: deque[tuple[int, int, float]] = deque()  # begin, end [ns], magnitude [N m]
+        self._sum = 0.0  # impulse of these pieces [N m s]
+
+    def add(self, profile: TorqueProfile) -> Fault | None:
+        """Account for a profile; return a fault where it exceeds a limit."""
+        ends = [*profile.times[1:], profile.valid_until]
+        found = None
+        for begin, end, torque in zip(profile.times, ends, profile.torques, strict=True):
+            if torque == 0:
+                continue
+            if abs(torque) > self._torque:
+                found = found or TORQUE_EXCEEDED
+            self._pieces.append((begin, end, abs(torque)))
+            self._sum += _impulse(begin, end, torque)
+            while self._pieces[0][1] <= end - self._window:
+                self._sum -= _impulse(*self._pieces.popleft())
+            first, _, height = self._pieces[0]
+            before = _impulse(first, max(first, end - self._window), height)
+            if self._sum - before > self._impulse:
+                found = found or IMPULSE_EXCEEDED
+        return found
+
+
+def _impulse(begin: int, end: int, torque: float) -> float:
+    """Return the magnitude of the angular impulse [N m s] of a torque between two instants."""
+    return abs(torque) * (end - begin) / NANOSECONDS_PER_SECOND

@@ -1,0 +1,138 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Monte Carlo of the entrainment verdict on noisy walkers that are known to lock, or not to.
+
+Prints the table of docs/analysis.md: python monte_carlo.py [TRIALS]
+"""
+
+import statistics
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import betaincinv
+from synthetic_gait import (
+    Noise,
+    Response,
+    autoregressive,
+    follows_partly,
+    ignores,
+    locks,
+    locks_within_80_ms,
+    long_range,
+    noisy_walk,
+    slips,
+    white,
+)
+
+from gait_entrainment.conventions import Side
+from gait_entrainment.gait import Verdict, VerdictSettings, analyze, drift_of
+
+
+@dataclass(frozen=True)
+class Case:
+    """A walker, and the noise of its stride periods."""
+
+    response: Response
+    noise: Noise
+    variation: float  # coefficient of variation of the stride periods
+    window: int = 20  # pulses judged at a time
+
+    def __str__(self) -> str:
+        walker = self.response.__name__.replace("_", " ")
+        noise = self.noise.__name__.replace("_", " ")
+        return f"| {walker} | {noise} | {100 * self.variation:g} % | {self.window} |"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Verdicts of many independent trials of one case."""
+
+    trials: int
+    ever_entrained: int  # trials in which any stride was called entrained
+    final: Counter[Verdict]  # verdicts at the last pulse
+    since: list[int]  # entrained_since_stride, where entrained at the last pulse
+
+    def __str__(self) -> str:
+        cells = [rate(self.ever_entrained, self.trials)]
+        cells.append(rate(self.final[Verdict.ENTRAINED], self.trials))
+        others = [v for v in Verdict if v != Verdict.ENTRAINED]
+        cells += [f"{100 * self.final[v] / self.trials:.1f}" for v in others]
+        cells.append(f"{statistics.median(self.since):g}" if self.since else "-")
+        return " " + " | ".join(cells) + " |"
+
+
+def interval(successes: int, trials: int) -> tuple[float, float]:
+    """Return the 95 % interval of a binomial rate (Clopper and Pearson 1934)."""
+    low = betaincinv(successes, trials - successes + 1, 0.025) if successes else 0.0
+    high = betaincinv(successes + 1, trials - successes, 0.975) if successes < trials else 1.0
+    return float(low), float(high)
+
+
+def rate(successes: int, trials: int) -> str:
+    """Return a rate with its 95 % interval, in per cent."""
+    low, high = interval(successes, trials)
+    return f"{100 * successes / trials:.1f} ({100 * low:.1f} to {100 * high:.1f})"
+
+
+def run(case: Case, trials: int, seed: int = 2012) -> Outcome:
+    """Run independent trials of one case; the same seed gives the same trials."""
+    rule = VerdictSettings(window=case.window)
+    ever, final, since = 0, Counter[Verdict](), []
+    for rng in np.random.default_rng(seed).spawn(trials):
+        events, onsets = noisy_walk(rng, case.response, case.noise, case.variation)
+        entrainments = analyze(events, onsets, Side.RIGHT, rule).entrainments
+        ever += any(e.verdict == Verdict.ENTRAINED for e in entrainments)
+        last = entrainments[-1]
+        final[last.verdict] += 1
+        if last.entrained_since_stride is not None:
+            since.append(last.entrained_since_stride)
+    return Outcome(trials, ever, final, since)
+
+
+def coverage(noise: Noise, trials: int, seed: int = 2012) -> float:
+    """Return how often the drift's 95 % interval over 20 strides holds the true slope."""
+    rng, covered = np.random.default_rng(seed), 0
+    strides = np.arange(20.0)
+    for _ in range(trials):
+        lags = 0.02 * strides + 0.04 * noise(rng, len(strides))
+        drift = drift_of(strides.tolist(), lags.tolist(), 0.95, 0.9)
+        covered += abs(drift.slope - 0.02) <= drift.half_width
+    return covered / trials
+
+
+NOISES: tuple[Noise, ...] = (white, autoregressive, long_range)
+
+
+def cases() -> Iterator[Case]:
+    """Yield the rows of the table."""
+    for response in (ignores, follows_partly, slips):
+        for noise in NOISES:
+            yield Case(response, noise, 0.02)
+    for response, variations in ((locks, (0.02, 0.01)), (locks_within_80_ms, (0.02, 0.01, 0.005))):
+        for variation in variations:
+            for noise in NOISES:
+                yield Case(response, noise, variation)
+    for response in (ignores, locks):
+        for noise in NOISES:
+            yield Case(response, noise, 0.02, window=30)
+
+
+if __name__ == "__main__":
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
+    print(
+        "| walker | noise | CV | N | ever entrained, % (95 % interval) | at the last pulse: "
+        "entrained, % | undecided, % | drifting, % | lost, % | untestable, % | entrained since "
+        "stride, median |"
+    )
+    print("| --- " * 11 + "|")
+    for each in cases():
+        print(each, run(each, count), sep="", flush=True)
+    for noise in NOISES:
+        print(
+            f"coverage of the drift's interval, {noise.__name__}: {coverage(noise, 4 * count):.3f}"
+        )

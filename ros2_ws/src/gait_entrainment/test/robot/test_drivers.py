@@ -1,0 +1,68 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Drivers by name: found without being loaded, options checked, one line for a mistake."""
+
+import subprocess
+import sys
+
+import pytest
+
+from gait_entrainment.conventions import Side
+from gait_entrainment.robot import DeviceError, LimitError, driver_names, find_driver
+
+
+def test_the_drivers_of_this_package_are_there():
+    assert {"ideal", "emulated"} <= set(driver_names())
+
+
+def test_naming_drivers_loads_none():
+    code = (
+        "import sys; from gait_entrainment.robot import driver_names, find_driver;"
+        "driver_names(); find_driver('ideal');"
+        "print(sorted({'can', 'gait_entrainment.robot.emulated', 'rclpy'} & set(sys.modules)))"
+    )
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert out.stdout.strip() == "[]"
+
+
+def test_options_reach_the_driver():
+    driver = find_driver("emulated:peak_torque=7.5,delay=0.1")
+    assert (driver.options.peak_torque, driver.options.delay) == (7.5, 0.1)
+    assert driver.simulated
+    assert driver.make(Side.LEFT).capabilities.peak_torque == 7.5
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "driver: '' is unknown; allowed: .*emulated.*ideal"),
+        ("emulatd", "'emulatd' is unknown"),
+        ("ideal:delay=1", "ideal: option 'delay=1'; allowed: none"),
+        ("emulated:delay", "option 'delay'; allowed: bandwidth, .*NAME=VALUE"),
+        ("emulated:delay=soon", "delay: 'soon'; allowed: 0 to 0.5 s"),
+        ("emulated:delay=nan", "delay: 'nan'; allowed"),
+        ("emulated:delay=0.6", "delay: '0.6'; allowed"),
+        ("emulated:state_rate=300", "state_rate: 300 Hz; allowed: a divisor of 1000"),
+    ],
+)
+def test_a_mistake_is_told_in_one_line(text, words):
+    with pytest.raises(LimitError, match=words) as error:
+        find_driver(text)
+    assert "\n" not in str(error.value)
+
+
+def test_a_driver_that_cannot_be_loaded_says_what_is_missing(monkeypatch):
+    from gait_entrainment.robot import drivers
+
+    monkeypatch.setitem(drivers.OWN_DRIVERS, "absent", "no_such_package:Robot")
+    with pytest.raises(DeviceError, match=r"absent .*cannot be loaded: .*no_such_package"):
+        find_driver("absent")
+
+
+def test_what_is_no_driver_is_refused(monkeypatch):
+    from gait_entrainment.robot import drivers
+
+    monkeypatch.setitem(drivers.OWN_DRIVERS, "wrong", "pathlib:Path")
+    with pytest.raises(LimitError, match="no AnkleRobot"):
+        find_driver("wrong")

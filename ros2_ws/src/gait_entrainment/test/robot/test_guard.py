@@ -1,0 +1,314 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The safety envelope: nothing reaches a driver past it, and every way out ends in zero torque."""
+
+import itertools
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gait_entrainment.conventions import Side
+from gait_entrainment.robot import (
+    DeviceError,
+    DeviceLimits,
+    Fault,
+    GuardedRobot,
+    LimitError,
+    PulseTrain,
+    TorqueProfile,
+)
+from gait_entrainment.robot.faults import EXPERIMENT_SILENT
+from gait_entrainment.robot.guard import contract_breach
+
+from .recording_robot import RecordingRobot
+
+SECOND = 1_000_000_000
+OVERHEATED = Fault("overheated", "The motor is too hot.")
+
+
+def train(**changes):
+    values = {
+        "side": Side.LEFT,
+        "first_onset": 3 * SECOND,
+        "period": 1.9,
+        "count": 4,
+        "torque": 13.0,
+        "duration": 0.1,
+    }
+    return PulseTrain(**{**values, **changes})
+
+
+def ready(limits=None, simulated=True):
+    driver = RecordingRobot(Side.LEFT, simulated=simulated)
+    guard = GuardedRobot(driver, Side.LEFT, limits)
+    guard.configure()
+    guard.activate()
+    guard.begin(0)
+    return guard, driver
+
+
+@pytest.mark.parametrize(
+    ("limits", "changes", "words"),
+    [
+        ({}, {"torque": 20.1}, "more than the device can deliver.*-20 to 20"),
+        ({}, {"torque": -20.1}, "more than the device can deliver"),
+        ({"torque": 12.0}, {}, "torque: 13 N m.*-12 to 12"),
+        ({"torque": 12.0}, {"torque": -13.0}, "torque"),
+        ({}, {"torque": math.nan}, "torque: nan"),
+        ({}, {"torque": math.inf}, "torque: inf"),
+        ({"duration": 0.09}, {}, "width: 0.1 s"),
+        ({"rate": 200.0}, {}, "rate: a pulse of 0.1 s does not reach 13 N m at 200 N m/s"),
+        ({"impulse": 1.2}, {}, "impulse: 1.3 N m s within 1 s.*at most 1.2"),
+        ({"rate": 200.0}, {"torque": -13.0}, "rate"),
+        ({"impulse": 1.5}, {"period": 0.5}, "impulse: 2.6 N m s"),
+        ({"impulse": 1.5}, {"period": 0.5, "torque": -13.0}, "impulse: 2.6 N m s"),
+        ({"duty": 0.05}, {}, "duty: 0.0526.*at most 0.05"),
+        ({}, {"first_onset": -1}, "already promised"),
+        ({}, {"side": Side.RIGHT}, "other ankle"),
+    ],
+)
+def test_a_train_outside_the_limits_never_reaches_the_driver(limits, changes, words):
+    guard, driver = ready(DeviceLimits(**limits))
+    with pytest.raises(LimitError, match=words):
+        guard.schedule(train(**changes))
+    assert "schedule" not in driver.calls
+    assert guard.train is None
+    assert not guard.faults
+
+
+@pytest.mark.parametrize(
+    "limits",
+    [{"torque": 13.0}, {"duration": 0.1}, {"impulse": 1.3001}, {"duty": 0.0527}, {"rate": 260.0}],
+)
+def test_a_train_at_its_limits_is_accepted(limits):
+    guard, _ = ready(DeviceLimits(**limits))
+    guard.schedule(train())
+    assert guard.train is not None
+
+
+def test_the_devices_peak_and_the_end_of_what_is_promised_are_allowed():
+    guard, _ = ready()
+    guard.promise(SECOND)
+    guard.schedule(train(torque=-20.0, first_onset=SECOND))
+    assert guard.train is not None
+
+
+def test_one_train_at_a_time_until_it_is_cancelled_or_the_run_begins_anew():
+    guard, driver = ready()
+    for over in (guard.cancel, lambda: guard.begin(0)):
+        guard.schedule(train())
+        with pytest.raises(LimitError, match="under way"):
+            guard.schedule(train())
+        over()
+        assert guard.train is None
+    assert driver.calls.count("schedule") == 2
+
+
+def test_each_activation_and_each_run_begins_anew():
+    guard, driver = ready()
+    with pytest.raises(DeviceError, match="active already; deactivate"):
+        guard.activate()
+    assert driver.calls.count("activate") == 1
+    guard.close()
+    guard.configure()
+    guard.activate()
+    with pytest.raises(DeviceError, match="begin one first"):
+        guard.schedule(train())
+
+
+def test_a_single_pulse_is_held_against_the_impulse_before_anything_moves():
+    limits = DeviceLimits(impulse=1.2)
+    limits.check_pulse(-11.9, 0.1)
+    with pytest.raises(LimitError, match=r"impulse: 1\.3 N m s"):
+        limits.check_pulse(-13.0, 0.1)
+
+
+@pytest.mark.parametrize("torque", [-13.0, 13.0])
+def test_a_rate_makes_ramps(torque):
+    guard, driver = ready(DeviceLimits(rate=520.0))
+    guard.schedule(train(torque=torque))
+    assert driver.train.ramp == pytest.approx(0.025)
+
+
+@pytest.mark.parametrize("call", ["activate", "arm", "begin", "schedule", "promise"])
+def test_nothing_is_commanded_before_its_turn(call):
+    driver = RecordingRobot(Side.LEFT)
+    guard = GuardedRobot(driver, Side.LEFT)
+    arguments = {"begin": (0,), "schedule": (train(),), "promise": (1,)}.get(call, ())
+    with pytest.raises(DeviceError, match=r"first|before|no run"):
+        getattr(guard, call)(*arguments)
+    assert driver.calls == []
+
+
+def test_a_device_outside_simulation_needs_arming():
+    guard, driver = ready(simulated=False)
+    with pytest.raises(DeviceError, match="not armed"):
+        guard.schedule(train())
+    guard.arm()
+    guard.schedule(train())
+    guard.close()
+    assert driver.calls[-2:] == ["deactivate", "close"]
+    guard.configure()
+    guard.activate()
+    assert not guard.armed
+
+
+def test_a_stop_latches_until_closed_and_configured():
+    guard, driver = ready()
+    guard.schedule(train())
+    guard.stop()
+    assert driver.calls[-1] == "stop"
+    assert [f.name for f in guard.faults] == ["stopped"]
+    for call in (lambda: guard.schedule(train()), guard.activate, guard.arm):
+        with pytest.raises(DeviceError, match=r"latched at zero \(stopped\)"):
+            call()
+    guard.close()
+    with pytest.raises(DeviceError, match="latched"):
+        guard.schedule(train())
+    guard.configure()
+    guard.activate()
+    guard.begin(0)
+    guard.schedule(train())
+
+
+def test_more_delivered_torque_than_allowed_latches_and_is_told_all_the_same():
+    guard, driver = ready(DeviceLimits(torque=10.0, overshoot=0.1))
+    driver.torques = [10.9, -11.1]
+    guard.promise(SECOND // 10)
+    assert not guard.faults
+    assert guard.promise(2 * SECOND // 10).torques == (-11.1,)
+    assert [f.name for f in guard.faults] == ["torque_exceeded"]
+    assert driver.calls[-1] == "stop"
+
+
+def test_torque_that_does_not_end_exceeds_the_impulse():
+    guard, driver = ready(DeviceLimits(impulse=2.0, overshoot=0.0))
+    driver.torques = [5.0] * 10
+    found = [bool(guard.promise(k * SECOND // 10).side or guard.faults) for k in range(1, 7)]
+    assert found == [False] * 4 + [True] * 2
+    assert [f.name for f in guard.faults] == ["impulse_exceeded"]
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(
+    heights=st.lists(st.integers(-20, 20), min_size=5, max_size=60),
+    limit=st.integers(1, 200),
+    window=st.integers(100, 900),
+)
+def test_the_impulse_of_any_stride_is_watched(heights, limit, window):
+    """Against a brute-force sliding window over milliseconds."""
+    limits = DeviceLimits(impulse=limit / 100, stride=window / 1e3, overshoot=0.0)
+    guard, driver = ready(limits)
+    driver.torques = [float(h) for h in heights]
+    per_ms = [abs(h) for h in heights for _ in range(50)]
+    sums = [0, *itertools.accumulate(per_ms)]
+    for k in range(1, len(heights) + 1):
+        guard.promise(k * 50_000_000)
+        ends = range(1, 50 * k + 1)
+        # Windows are looked at where a piece of torque ends.
+        largest = max(sums[e] - sums[max(e - window, 0)] for e in ends if e % 50 == 0)
+        if abs(largest - limit * 10) > 1e-6:
+            assert bool(guard.faults) == (largest > limit * 10)
+
+
+def test_a_fault_that_the_device_reports_latches():
+    guard, driver = ready()
+    guard.schedule(train())
+    driver.faults = (OVERHEATED,)
+    guard.promise(SECOND)
+    guard.read()
+    assert guard.faults == (OVERHEATED,)
+    assert driver.calls[-1] == "stop"
+
+
+@pytest.mark.parametrize("error", [RuntimeError("boom"), DeviceError("gone"), KeyboardInterrupt()])
+@pytest.mark.parametrize("call", ["schedule", "promise", "read", "cancel", "begin"])
+def test_whatever_the_driver_raises_the_torque_goes_to_zero(call, error):
+    guard, driver = ready()
+    if call != "schedule":
+        guard.schedule(train())
+    driver.raises = {call: error}
+    arguments = {"begin": (0,), "schedule": (train(),), "promise": (1,)}.get(call, ())
+    with pytest.raises((DeviceError, KeyboardInterrupt)):
+        getattr(guard, call)(*arguments)
+    assert driver.calls[-1] == "stop"
+    assert [f.name for f in guard.faults] == ["driver_failed"]
+
+
+def test_an_exception_in_the_users_code_closes_the_robot():
+    guard, driver = ready()
+    guard.schedule(train())
+    with pytest.raises(ZeroDivisionError), guard:
+        raise ZeroDivisionError
+    assert driver.calls[-2:] == ["deactivate", "close"]
+
+
+def test_a_failing_deactivation_stops_and_closes_all_the_same():
+    guard, driver = ready()
+    driver.raises = {"deactivate": OSError("bus gone"), "stop": OSError("bus gone")}
+    guard.close()
+    assert driver.calls[-3:] == ["deactivate", "stop", "close"]
+    assert [f.name for f in guard.faults] == ["driver_failed", "not_stopped"]
+
+
+def test_a_device_that_does_not_answer_is_released_and_can_be_configured_later():
+    driver = RecordingRobot(Side.LEFT)
+    guard = GuardedRobot(driver, Side.LEFT)
+    driver.raises = {"configure": DeviceError("motor 1 does not answer")}
+    with pytest.raises(DeviceError, match="does not answer"):
+        guard.configure()
+    assert driver.calls == ["configure", "close"]
+    with pytest.raises(DeviceError, match="not configured"):
+        guard.activate()
+    driver.raises = {}
+    guard.configure()
+    guard.activate()
+
+
+def test_a_stop_that_meets_a_schedule_wins():
+    guard, driver = ready()
+    driver.schedule = lambda _: guard.stop()  # as if from another thread, in the midst of it
+    with pytest.raises(DeviceError, match="latched"):
+        guard.schedule(train())
+    assert driver.calls[-1] == "stop"
+    assert guard.train is None
+
+
+def test_a_silent_experiment_stops_a_real_device():
+    guard, driver = ready(DeviceLimits(silence=0.05), simulated=False)
+    guard.arm()
+    guard.schedule(train())
+    assert driver.stopped.wait(5.0)
+    assert guard.faults == (EXPERIMENT_SILENT,)
+    guard.close()
+
+
+@pytest.mark.parametrize(
+    ("times", "torques", "until", "words"),
+    [
+        ((), (), 10, "at least one"),
+        ((0, 5), (1.0,), 10, "one torque for each"),
+        ((1,), (0.0,), 10, "does not adjoin"),
+        ((0,), (0.0,), 11, "beyond"),
+        ((0, 5, 5), (0.0, 1.0, 0.0), 10, "ascending"),
+        ((0, 10), (0.0, 1.0), 10, "ascending"),
+        ((0, 3), (0.0, 1.0), 0, "ascending"),
+        ((0,), (math.nan,), 10, "finite"),
+        ((0,), (0.0,), 10, ""),
+        ((0,), (0.0,), 0, ""),
+    ],
+)
+def test_breaches_of_a_profiles_contract(times, torques, until, words):
+    breach = contract_breach(TorqueProfile(Side.LEFT, times, torques, (), until), 0, 10)
+    assert (words in breach) if words else breach == ""
+
+
+def test_a_broken_profile_stops_the_torque():
+    guard, driver = ready()
+    driver.promise = lambda until: TorqueProfile(Side.LEFT, (7,), (3.0,), (), until)
+    with pytest.raises(DeviceError, match=r"broke its contract.*adjoin"):
+        guard.promise(SECOND)
+    assert driver.calls[-1] == "stop"

@@ -1,0 +1,138 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The ideal ankle robot: its promises tell the commanded pulses, however they are cut."""
+
+import itertools
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gait_entrainment.conventions import Side
+from gait_entrainment.robot import DeviceLimits, LimitError, PulseTrain, find_driver
+
+SECOND = 1_000_000_000
+
+
+def train(**changes):
+    values = {
+        "side": Side.LEFT,
+        "first_onset": 3 * SECOND,
+        "period": 1.9,
+        "count": 4,
+        "torque": 13.0,
+        "duration": 0.1,
+    }
+    return PulseTrain(**{**values, **changes})
+
+
+def ideal_robot(start=0, limits=None):
+    robot = find_driver("ideal").make(Side.LEFT, limits)
+    robot.configure()
+    robot.activate()
+    robot.begin(start)
+    return robot
+
+
+def torque_at(profiles, instant):
+    """Torque that adjoining profiles promise for an instant, straight from their definition."""
+    for profile in profiles:
+        if profile.times[0] <= instant < profile.valid_until:
+            return [
+                torque
+                for time, torque in zip(profile.times, profile.torques, strict=True)
+                if time <= instant
+            ][-1]
+    raise AssertionError("not promised")
+
+
+@settings(derandomize=True, deadline=None, max_examples=200)
+@given(
+    cuts=st.lists(st.integers(0, 12 * SECOND), max_size=30),
+    first=st.integers(0, 5 * SECOND),
+    period=st.floats(0.11, 3.0),
+    duration=st.floats(0.001, 0.1),
+    probes=st.lists(st.integers(0, 12 * SECOND - 1), min_size=5, max_size=20),
+)
+def test_promises_tell_the_pulses_however_they_are_cut(cuts, first, period, duration, probes):
+    robot = ideal_robot(limits=DeviceLimits(duty=1.0, impulse=1e3))
+    pulses = train(first_onset=first, period=period, duration=duration)
+    robot.schedule(pulses)
+    profiles = [robot.promise(until) for until in [*sorted(cuts), 12 * SECOND]]
+    spans = [
+        (
+            first + round(n * period * 1e9),
+            first + round(n * period * 1e9) + round(duration * 1e9),
+        )
+        for n in range(pulses.count)
+    ]
+    # Both sides of every edge, where a cut could go wrong, and instants anywhere.
+    edges = [edge + d for span in spans for edge in span for d in (-1, 0)]
+    for instant in [*probes, *(e for e in edges if 0 <= e < 12 * SECOND)]:
+        on = any(begin <= instant < end for begin, end in spans)
+        assert torque_at(profiles, instant) == (13.0 if on else 0.0)
+    promised = [onset for profile in profiles for onset in profile.onsets]
+    assert promised == [begin for begin, _ in spans if begin < 12 * SECOND]
+    for before, after in itertools.pairwise(profiles):
+        assert after.times[0] == before.valid_until
+    assert robot.delivered == len(promised)
+
+
+def test_onsets_are_rounded_from_the_first_one():
+    period = 1.8832295304285713
+    assert train(period=period).onset(1000) == 3 * SECOND + round(1000 * period * 1e9)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"torque": 30.1}, "torque: 30.1 N m.*-30 to 30"),
+        ({"torque": -31.0}, "torque: -31 N m"),
+        ({"torque": math.nan}, "torque: nan"),
+        ({"duration": 0.0}, "width: 0 s.*at most 0.5"),
+        ({"duration": 0.51}, "width"),
+        ({"duration": math.nan}, "width"),
+        ({"period": 0.1}, "period.*overlap"),
+        ({"period": math.inf}, "period"),
+        ({"count": 0}, "count: 0; allowed: at least 1"),
+        ({"side": Side.RIGHT}, "side"),
+        ({"first_onset": 1}, "already promised"),
+    ],
+)
+def test_what_it_must_not_deliver_is_refused_and_changes_nothing(changes, words):
+    robot = ideal_robot()
+    robot.promise(SECOND)
+    with pytest.raises(LimitError, match=words):
+        robot.schedule(train(**changes))
+    assert robot.train is None
+    assert robot.promise(20 * SECOND).torques == (0.0,)
+
+
+def test_one_train_at_a_time():
+    robot = ideal_robot()
+    robot.schedule(train())
+    with pytest.raises(LimitError, match="one at a time"):
+        robot.schedule(train())
+    robot.promise(30 * SECOND)
+    robot.schedule(train(first_onset=30 * SECOND))
+
+
+def test_nothing_is_delivered_after_cancelling():
+    robot = ideal_robot()
+    robot.schedule(train())
+    robot.promise(3 * SECOND + 1)
+    robot.cancel()
+    assert robot.promise(20 * SECOND).torques == (0.0,)
+
+
+def test_a_promise_is_not_taken_back():
+    robot = ideal_robot(5)
+    robot.promise(10)
+    with pytest.raises(ValueError, match="take back"):
+        robot.promise(9)
+
+
+def test_the_limits_are_the_users_own():
+    DeviceLimits(torque=50.0).check(train(torque=45.0))

@@ -1,0 +1,101 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Measured onsets against flanks whose crossing is known in closed form."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gait_entrainment.conventions import Side
+from gait_entrainment.robot import (
+    PulseTiming,
+    PulseTrain,
+    RobotState,
+    TimingAudit,
+    find_driver,
+    measured_onset,
+)
+from gait_entrainment.robot.timing import distribution, quantile
+
+MS = 1_000_000
+
+
+@settings(derandomize=True, deadline=None, max_examples=200)
+@given(
+    onset=st.floats(20.0, 60.0),
+    rise=st.floats(2.0, 40.0),
+    height=st.sampled_from([12.0, -3.0]),
+    step=st.floats(0.3, 9.0),
+    fraction=st.floats(0.05, 0.95),
+)
+def test_a_linear_flank_is_crossed_exactly_between_samples(onset, rise, height, step, fraction):
+    times = [k * step for k in range(1, int(150 / step))]  # [ms]
+    torques = [height * min(max((t - onset) / rise, 0.0), 1.0) for t in times]
+    index, found = measured_onset([round(t * MS) for t in times], torques, height, fraction)
+    assert times[index] * MS >= found - 1
+    crossing = onset + fraction * rise
+    # On the flank's own line the interpolation is exact; else it lies within its sample.
+    earlier = max(t for t in times if t < crossing)
+    if earlier >= onset and earlier + step <= onset + rise:
+        assert found == pytest.approx(crossing * MS, abs=3)
+    else:
+        assert earlier * MS - 1 <= found <= (earlier + step) * MS + 1
+
+
+def test_what_never_rises_or_was_never_low_has_no_onset():
+    assert measured_onset([0, MS, 2 * MS], [0.0, 4.9, 4.0], 10.0) is None
+    assert measured_onset([0, MS], [9.0, 10.0], 10.0) is None
+    assert measured_onset([0, MS], [math.nan, math.nan], 10.0) is None
+    assert measured_onset([], [], 10.0) is None
+
+
+def test_a_torque_that_is_known_only_where_it_jumps_is_not_interpolated():
+    assert measured_onset([0, 500 * MS], [0.0, 10.0], 10.0) == (1, 500 * MS)
+
+
+def test_the_audit_of_an_emulated_robot_finds_its_delay_and_lag():
+    options = "bandwidth=10,delay=0.007,jitter=0,noise=0,loss=0,torque_rate=1e6,state_rate=1000"
+    robot = find_driver(f"emulated:{options}").make(Side.LEFT)
+    robot.configure()
+    robot.activate()
+    robot.begin(0)
+    robot.schedule(PulseTrain(Side.LEFT, 500 * MS, 1.0, 3, 10.0, 0.2))
+    audit, timings = TimingAudit(), []
+    for until in range(100 * MS, 4000 * MS, 130 * MS):
+        for onset in robot.promise(until).onsets:
+            audit.add_pulse(onset, 10.0, 0.2)
+        timings += audit.add_states(robot.read())
+    timings += audit.finish()
+    assert [t.commanded for t in timings] == [500 * MS, 1500 * MS, 2500 * MS]
+    # Asked for after the delay; half the height is reached ln 2 time constants later.
+    half = 7 + 1e3 * math.log(2) / (2 * math.pi * 10)
+    for timing in timings:
+        assert timing.sent - timing.commanded == 7 * MS
+        assert (timing.measured - timing.commanded) / MS == pytest.approx(half - 1, abs=0.2)
+
+
+def test_a_pulse_that_never_came_is_told_as_missing():
+    audit = TimingAudit()
+    audit.add_pulse(100 * MS, 5.0, 0.1)
+    states = [RobotState(t * MS, 0.0, 0.0, math.nan) for t in range(0, 1000, 5)]
+    assert audit.add_states(states) == [PulseTiming(100 * MS, None, None)]
+
+
+def test_the_distribution_is_that_of_the_pulses_seen():
+    timings = [PulseTiming(0, n * MS, None) for n in range(1, 201)] + [PulseTiming(0, None, None)]
+    figures = distribution(timings, "sent", 2.0)
+    assert figures["pulses"] == 200
+    assert figures["missing"] == 1
+    assert figures["median_ms"] == pytest.approx(100)
+    assert figures["p99_ms"] == pytest.approx(198)
+    assert figures["worst_ms"] == pytest.approx(200)
+    assert figures["worst_percent"] == pytest.approx(10)
+    assert distribution(timings, "measured", 2.0) is None
+
+
+@pytest.mark.parametrize(("share", "value"), [(0.5, 2), (0.51, 3), (1.0, 4), (0.0, 1)])
+def test_quantile_is_the_nearest_rank(share, value):
+    assert quantile([1, 2, 3, 4], share) == value

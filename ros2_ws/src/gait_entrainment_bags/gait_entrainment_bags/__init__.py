@@ -1,0 +1,52 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Bags: recording into MCAP with rosbag2's rules, reading, checking, rescuing, exporting."""
+
+from gait_entrainment_bags.checks import Finding, Severity, check
+from gait_entrainment_bags.definitions import Definition, find_definition
+from gait_entrainment_bags.errors import (
+    BagError,
+    BagExistsError,
+    BagWriteError,
+    DefinitionMissingError,
+    DiskFullError,
+    UnreadableBagError,
+)
+from gait_entrainment_bags.mcap_file import BagMessage
+from gait_entrainment_bags.metadata import INFINITE, QosProfile, TopicInfo
+from gait_entrainment_bags.playback import FASTEST, Moment, Playback, choose_topics
+from gait_entrainment_bags.reader import BagInfo, BagReader, info
+from gait_entrainment_bags.recovery import Recovery, recover
+from gait_entrainment_bags.tables import export
+from gait_entrainment_bags.writer import ENDED_EARLY, BagWriter
+
+__all__ = [
+    "BagWriter",
+    "ENDED_EARLY",
+    "BagReader",
+    "BagMessage",
+    "BagInfo",
+    "info",
+    "check",
+    "Finding",
+    "Severity",
+    "recover",
+    "Recovery",
+    "export",
+    "Playback",
+    "Moment",
+    "FASTEST",
+    "choose_topics",
+    "TopicInfo",
+    "QosProfile",
+    "INFINITE",
+    "Definition",
+    "find_definition",
+    "BagError",
+    "BagExistsError",
+    "UnreadableBagError",
+    "DefinitionMissingError",
+    "BagWriteError",
+    "DiskFullError",
+]

@@ -1,0 +1,168 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Figures of one run: stride period, phase lag, timing of the pulses, ankle torque by stride.
+
+matplotlib is imported only when a figure is drawn: it takes longer than a whole simulation.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
+from gait_entrainment.drawing import BLUE, GREEN, GREY, ORANGE
+from gait_entrainment.robot.timing import distribution, lateness_ms
+from gait_entrainment_bags.recorded_run import RecordedRun, drawn_strides
+
+
+def draw_figures(run: RecordedRun, folder: Path) -> list[Path]:
+    """Draw the figures of a run as PNG files into a folder; return their paths."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    figures = {
+        "stride_period.png": _stride_period(run),
+        "phase_lag.png": _phase_lag(run),
+        "pulse_timing.png": _pulse_timing(run),
+        "ankle_torque.png": _ankle_torque(run),
+    }
+    for name, figure in figures.items():
+        figure.savefig(folder / name, dpi=130)
+    return [folder / name for name in figures]
+
+
+def _axes(height: float = 3.6) -> tuple[Any, Any]:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.2, height), layout="constrained")
+    axes = figure.subplots()
+    axes.spines[["top", "right"]].set_visible(False)
+    return figure, axes
+
+
+def _shade_pulses(run: RecordedRun, axes: Any) -> None:
+    """Shade the strides in which pulses were given."""
+    strides = [p.stride for p in run.analysis.pulses]
+    if strides:
+        axes.axvspan(
+            min(strides) - 0.5, max(strides) + 0.5, color=ORANGE, alpha=0.10, lw=0, label="pulses"
+        )
+
+
+def _stride_period(run: RecordedRun) -> Any:
+    figure, axes = _axes()
+    _shade_pulses(run, axes)
+    for period, text, colour, style in (
+        (run.measured_period, "unperturbed", GREY, "--"),
+        (run.pulse_period, "pulse period", ORANGE, "-."),
+    ):
+        if np.isfinite(period):
+            axes.axhline(period, color=colour, ls=style, lw=1.2, label=f"{text} {period:.4f} s")
+    strides = [s for s in run.analysis.strides if s.number <= run.protocol.strides]
+    axes.plot([s.number for s in strides], [s.period for s in strides], ".-", color=BLUE, lw=0.8)
+    axes.set(xlabel="stride", ylabel="stride period [s]", title="Stride period")
+    axes.ticklabel_format(useOffset=False)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(frameon=False)
+    return figure
+
+
+def _phase_lag(run: RecordedRun) -> Any:
+    figure, axes = _axes()
+    pulses = run.analysis.pulses
+    axes.axhline(0, color=GREY, ls="--", lw=1.2, label="toe-off: end of double stance")
+    axes.plot(
+        [p.stride for p in pulses],
+        [p.phase_lag * 1e3 for p in pulses],
+        ".-",
+        color=BLUE,
+        lw=0.8,
+        label="pulse onset",
+    )
+    last = run.analysis.entrainments[-1] if run.analysis.entrainments else None
+    if last is not None and last.entrained_since_stride:
+        axes.axvline(
+            last.entrained_since_stride,
+            color=GREEN,
+            lw=1.2,
+            label=f"near its final lag since stride {last.entrained_since_stride}",
+        )
+    axes.set(xlabel="stride", ylabel="onset minus toe-off [ms]", title="Phase lag of the pulses")
+    axes.legend(frameon=False)
+    return figure
+
+
+def _pulse_timing(run: RecordedRun) -> Any:
+    """Draw which share of the pulses was sent, and was measured, at most so late."""
+    figure, axes = _axes()
+    for kind, colour, style in (("sent", ORANGE, "--"), ("measured", BLUE, "-")):
+        late = distribution(run.timings, kind, run.measured_period)
+        if late is None:
+            continue
+        figures = f"median {late['median_ms']:.1f}, 99 % {late['p99_ms']:.1f}"
+        missing = f"; {late['missing']} never seen" if late["missing"] else ""
+        axes.ecdf(
+            lateness_ms(run.timings, kind),
+            color=colour,
+            ls=style,
+            label=f"{kind}: {figures}, worst {late['worst_ms']:.1f} ms{missing}",
+        )
+    axes.set(
+        xlabel="onset after its command [ms]",
+        ylabel="share of the pulses",
+        ylim=(0, 1.02),
+        title=f"Timing of {len(run.timings)} pulses",
+    )
+    if np.isfinite(run.measured_period):
+        percent = 10 * run.measured_period  # [ms]
+        above = axes.secondary_xaxis(
+            "top", functions=(lambda ms: ms / percent, lambda share: share * percent)
+        )
+        above.set_xlabel("[% of the unperturbed stride]")
+    if axes.get_legend_handles_labels()[0]:
+        axes.axvline(0, color=GREY, lw=1.2)  # so that the command is in view
+        figure.legend(loc="outside lower center", frameon=False)
+    return figure
+
+
+def _ankle_torque(run: RecordedRun) -> Any:
+    """Draw one line of ankle torque per stride, from the other leg's heel strike on, as Fig. 7."""
+    rows = drawn_strides(run.protocol, run.analysis)
+    figure, axes = _axes(height=2 + 0.28 * len(rows))
+    torques = run.torques
+    peak = run.protocol.walker.peak_torque
+    scale = 0.9 / peak
+    longest = 0.0
+    for row, stride in enumerate(rows):
+        inside = (torques.stamps >= stride.start) & (torques.stamps < stride.end)
+        time = (torques.stamps[inside] - stride.start) / NANOSECONDS_PER_SECOND
+        longest = max(longest, stride.period)
+        own = torques.intrinsic[inside] * scale
+        whole = own + torques.effective[inside] * scale
+        delivered = torques.delivered[inside] != 0
+        axes.fill_between(time, row, row - own, color=BLUE, alpha=0.35, lw=0)
+        axes.fill_between(time, row - own, row - whole, color=ORANGE, lw=0)
+        axes.plot(time, row - whole, color=BLUE, lw=0.6)
+        axes.plot(time[delivered], np.full(delivered.sum(), row + 0.12), "s", ms=1.5, color=ORANGE)
+        axes.text(
+            longest * 1.01 if row else stride.period * 1.01,
+            row,
+            f"{stride.period:.4f} s",
+            fontsize=7,
+            va="bottom",
+        )
+    axes.text(longest * 1.01, -0.85, "stride period", fontsize=7)
+    axes.set_yticks(range(len(rows)), [str(s.number) for s in rows], fontsize=7)
+    axes.invert_yaxis()
+    axes.set_ylim(len(rows) - 0.5, -1.1)
+    axes.set(
+        xlabel="time since heel strike of the perturbed leg [s]",
+        ylabel="stride",
+        title=f"Ankle torque: own push-off (blue, peak {peak:.0f} N m), "
+        "pulse that acts (orange), pulse delivered (bar)",
+    )
+    axes.title.set_fontsize(9)
+    return figure

@@ -1,0 +1,323 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Playing a bag: which message is due when. Nothing here looks at a clock or sends anything.
+
+Every call says what time it is, so that a node paces by absolute deadlines and a test by numbers.
+"""
+
+import queue
+import threading
+from collections.abc import Collection, Iterator
+from fnmatch import fnmatchcase
+from typing import NamedTuple
+
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
+from gait_entrainment_bags.errors import BagError
+from gait_entrainment_bags.mcap_file import BagMessage
+from gait_entrainment_bags.reader import BagReader
+
+FASTEST = float("inf")
+"""Rate at which every message is due at once: whoever takes them sets the pace."""
+
+# Messages are read ahead in batches of so many, and so many batches.
+_BATCH, _BATCHES = 500, 8
+
+
+class Moment(NamedTuple):
+    """An instant of the bag [ns since 1970]: of a message, or of a tick of the clock."""
+
+    instant: int
+    message: BagMessage | None
+
+
+class Playback:
+    """
+    The messages of a bag in the order of log time, each at its time.
+
+    Parameters
+    ----------
+    bag
+        Must stay open meanwhile.
+    topics
+        Names of the topics to play.
+    start_offset
+        Seconds into the bag at which to start, and to which a loop returns.
+    duration
+        Seconds to play, from there.
+    rate
+        Seconds of the bag per second, above 0; `FASTEST` for no pace at all.
+    loop
+        Begin again at the end.
+    paused
+        Start paused.
+    clock_period
+        Seconds of the bag from one tick of the clock to the next, from the start on; 0: none.
+        Ticks do not depend on the rate, so that a listener sees the same at every rate.
+
+    Raises
+    ------
+    BagError
+        A number is out of range, a topic is not in the bag, or the bag holds no message.
+
+    """
+
+    def __init__(
+        self,
+        bag: BagReader,
+        topics: Collection[str],
+        *,
+        start_offset: float = 0.0,
+        duration: float = float("inf"),
+        rate: float = 1.0,
+        loop: bool = False,
+        paused: bool = False,
+        clock_period: float = 0.0,
+    ) -> None:
+        if missing := sorted(set(topics) - bag.topics.keys()):
+            raise BagError(f"{bag.path}: no topic {', '.join(missing)} in the bag")
+        if not bag.message_count:
+            raise BagError(f"{bag.path}: holds no message to play")
+        _require_rate(rate)
+        self.rate = rate
+        self.paused = paused
+        self.ended = False
+        self.start = self.end = 0
+        """First instant to play, and instant to stop before [ns since 1970]."""
+        self._bag = bag
+        self._topics = list(topics)
+        self._loop = loop
+        self._tick_period = round(clock_period * NANOSECONDS_PER_SECOND)
+        # The instant `_origin` of the bag is due at `_origin_at` on the steady clock.
+        self._origin = self._origin_at = 0
+        self._reading: _ReadAhead | None = None
+        self._moments: Iterator[Moment] = iter(())
+        self._next: Moment | None = None
+        if not duration > 0:
+            raise BagError(f"duration: {duration:g} s; allowed: above 0")
+        whole = bag.duration / NANOSECONDS_PER_SECOND
+        self.play(
+            round(start_offset * NANOSECONDS_PER_SECOND),
+            round(duration * NANOSECONDS_PER_SECOND) if duration <= whole else 0,
+            0,
+        )
+
+    def begin(self, now: int) -> None:
+        """Let the first instant be due now (steady time [ns])."""
+        self._origin_at = now
+
+    def due(self) -> int | None:
+        """Return the steady time [ns] at which the next moment is due; None for never."""
+        if self.paused or self.ended or self._next is None:
+            return None
+        if self.rate == FASTEST:
+            return self._origin_at
+        return self._origin_at + round((self._next.instant - self._origin) / self.rate)
+
+    def take(self, now: int) -> Moment | None:
+        """
+        Give the next moment if it is due by now (steady time [ns]).
+
+        Raises
+        ------
+        UnreadableBagError
+            The bag turns out to be damaged.
+
+        """
+        due = self.due()
+        if due is None or now < due:
+            return None
+        return self._advance(due)
+
+    def take_next(self) -> Moment | None:
+        """Give the next moment while paused, whenever it is due; None where all were given."""
+        if not self.paused or self.ended:
+            return None
+        moment = self._advance(self._origin_at)
+        if moment is not None:
+            self._origin = moment.instant
+        return moment
+
+    def pause(self, now: int) -> None:
+        """Stop at the instant that is due now."""
+        if not self.paused:
+            self._origin = self.instant(now)
+            self.paused = True
+
+    def resume(self, now: int) -> None:
+        """Go on from the instant at which it was stopped."""
+        if self.paused:
+            self._origin_at = now
+            self.paused = False
+
+    def set_rate(self, rate: float, now: int) -> None:
+        """
+        Play at another rate from now on.
+
+        Raises
+        ------
+        BagError
+            It is not above 0.
+
+        """
+        _require_rate(rate)
+        self._origin, self._origin_at = self.instant(now), now
+        self.rate = rate
+
+    def seek(self, instant: int, now: int) -> None:
+        """
+        Go on from another instant of the bag [ns since 1970], at its first message.
+
+        Raises
+        ------
+        BagError
+            It lies outside of what is played.
+
+        """
+        if not self.start <= instant < self.end:
+            raise BagError(f"time: {instant} ns; allowed: {self.start} to {self.end - 1} ns")
+        self._origin_at = now
+        self._go_to(instant)
+
+    def play(self, start_offset: int, duration: int, now: int) -> None:
+        """
+        Play from an offset into the bag [ns] for so long [ns]; 0 for all that follows.
+
+        Raises
+        ------
+        BagError
+            The offset lies outside of the bag.
+
+        """
+        if not 0 <= start_offset <= self._bag.duration:
+            raise BagError(
+                f"start_offset: {start_offset / NANOSECONDS_PER_SECOND:g} s; allowed: 0 to "
+                f"{self._bag.duration / NANOSECONDS_PER_SECOND:g} s"
+            )
+        self.start = self._bag.start + start_offset
+        self.end = self._bag.end + 1
+        if duration > 0:
+            self.end = min(self.end, self.start + duration)
+        self._origin_at = now
+        self._go_to(self.start)
+
+    def stop(self) -> None:
+        """Play no more; `seek` and `play` begin anew."""
+        self.ended = True
+        self._close()
+
+    def instant(self, now: int) -> int:
+        """Return the instant of the bag that is due now [ns since 1970]."""
+        if self.paused or self.rate == FASTEST:
+            return self._origin
+        return self._origin + round((now - self._origin_at) * self.rate)
+
+    def _go_to(self, instant: int) -> None:
+        self._close()
+        self._origin = instant
+        self._reading = _ReadAhead(self._bag.messages(self._topics, instant, self.end))
+        self._moments = self._with_ticks(instant, self._reading.messages())
+        self.ended = False
+        self._next = next(self._moments, None)
+        self.ended = self._next is None
+
+    def _advance(self, due: int) -> Moment | None:
+        """Give the next moment, which was due at a steady time [ns], and look at the one after."""
+        moment = self._next
+        self._next = next(self._moments, None)
+        if self.rate == FASTEST and moment is not None:
+            self._origin = moment.instant
+        if self._next is None:
+            if self._loop:
+                # Each round lasts as long as the bag does, whenever this call came.
+                self._origin_at = due
+                self._go_to(self.start)
+            else:
+                self.stop()
+        return moment
+
+    def _with_ticks(self, start: int, messages: Iterator[BagMessage]) -> Iterator[Moment]:
+        tick, period = start, self._tick_period
+        for message in messages:
+            while period and tick <= message.log_time:
+                yield Moment(tick, None)
+                tick += period
+            yield Moment(message.log_time, message)
+
+    def _close(self) -> None:
+        if self._reading is not None:
+            self._reading.stop()
+            self._reading = None
+
+
+def choose_topics(
+    bag: BagReader, patterns: Collection[str] = (), excluded: Collection[str] = ()
+) -> list[str]:
+    """
+    List the topics of a bag that match one of the patterns, and none of the excluded.
+
+    Patterns are names, or hold ``*`` for any text, as ``/gait/*`` does; none at all match all.
+
+    Raises
+    ------
+    BagError
+        A pattern matches no topic of the bag.
+
+    """
+    for pattern in patterns:
+        if not any(fnmatchcase(name, pattern) for name in bag.topics):
+            raise BagError(f"topics: {pattern} matches no topic of {bag.path}")
+    return [
+        name
+        for name in bag.topics
+        if (not patterns or any(fnmatchcase(name, pattern) for pattern in patterns))
+        and not any(fnmatchcase(name, pattern) for pattern in excluded)
+    ]
+
+
+def _require_rate(rate: float) -> None:
+    if not rate > 0:
+        raise BagError(f"rate: {rate:g}; allowed: above 0")
+
+
+class _ReadAhead:
+    """Reads messages in a thread: a chunk takes 20 ms, which would make messages late."""
+
+    def __init__(self, messages: Iterator[BagMessage]) -> None:
+        self._messages = messages
+        self._batches: queue.Queue[list[BagMessage] | Exception | None] = queue.Queue(_BATCHES)
+        self._stopped = False
+        self._thread = threading.Thread(target=self._read, daemon=True)
+        self._thread.start()
+
+    def messages(self) -> Iterator[BagMessage]:
+        """Give the messages; what goes wrong in the thread is raised here."""
+        while (batch := self._batches.get()) is not None:
+            if isinstance(batch, Exception):
+                raise batch
+            yield from batch
+
+    def stop(self) -> None:
+        """End the thread, so that nobody reads the bag any more."""
+        self._stopped = True
+        while self._thread.is_alive():
+            try:
+                self._batches.get(timeout=0.01)
+            except queue.Empty:
+                continue
+
+    def _read(self) -> None:
+        try:
+            batch: list[BagMessage] = []
+            for message in self._messages:
+                batch.append(message)
+                if len(batch) == _BATCH:
+                    self._batches.put(batch)
+                    batch = []
+                if self._stopped:
+                    return
+            self._batches.put(batch)
+            self._batches.put(None)
+        except Exception as error:
+            self._batches.put(error)

@@ -1,0 +1,135 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Rescuing what can be read of a bag that was never closed, or is damaged, into a new bag."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gait_entrainment_bags.definitions import is_type_name
+from gait_entrainment_bags.errors import UnreadableBagError
+from gait_entrainment_bags.mcap_file import BagMessage, Chunk, Contents, McapFile
+from gait_entrainment_bags.metadata import TopicInfo
+from gait_entrainment_bags.reader import (
+    bag_files,
+    differing_types,
+    read_metadata_file,
+    recorded_description,
+    topic_of,
+)
+from gait_entrainment_bags.writer import BagWriter
+
+RECOVERY_KEY = "recovery"
+"""Entry of the custom data of a rescued bag that says what it was made of, and what is missing."""
+
+
+@dataclass(frozen=True)
+class Recovery:
+    """What was rescued, and what was not."""
+
+    folder: Path
+    counts: dict[str, int]
+    """Messages rescued, by topic."""
+    last: int
+    """Log time of the latest message rescued [ns since the epoch]; 0 without messages."""
+    losses: tuple[str, ...]
+    """One line for each place where something is missing; empty if the bag was whole."""
+
+
+def recover(path: Path | str, out: Path | str) -> Recovery:
+    """
+    Write all that can be read of a bag, a folder or an ``.mcap`` file, into a new folder.
+
+    Raises
+    ------
+    BagExistsError
+        The folder is already there.
+    UnreadableBagError
+        Not one of the files is an MCAP file that could be read.
+    BagWriteError
+        The new bag cannot be written.
+
+    """
+    path = Path(path)
+    losses: list[str] = []
+    files = []
+    for file_path in bag_files(path):
+        try:
+            files.append(McapFile(file_path))
+        except UnreadableBagError as error:
+            losses.append(str(error))
+    if not files:
+        raise UnreadableBagError(losses[0])
+    try:
+        with BagWriter(out, ros_distro="") as writer:
+            rescue = _Rescue(writer)
+            for file in files:
+                losses += rescue.take(file)
+            losses += rescue.refused.values()
+            missing = "; ".join(losses) or "nothing is missing"
+            description = rescue.description or _described_beside(path)
+            if isinstance(custom_data := description.get("custom_data"), dict):
+                writer.custom_data.update((str(k), str(v)) for k, v in custom_data.items())
+            writer.custom_data[RECOVERY_KEY] = f"made of {path.name}; {missing}"
+            writer.ros_distro = str(description.get("ros_distro", ""))
+    finally:
+        for file in files:
+            file.close()
+    return Recovery(Path(out), dict(writer.counts), rescue.last, tuple(losses))
+
+
+def _described_beside(path: Path) -> dict[str, Any]:
+    try:
+        return read_metadata_file(path)
+    except UnreadableBagError:
+        return {}
+
+
+class _Rescue:
+    """Carries messages over into the new bag, and remembers the topics that it cannot take."""
+
+    def __init__(self, writer: BagWriter) -> None:
+        self.writer = writer
+        self.last = 0
+        self.description: dict[str, Any] = {}
+        self.refused: dict[str, str] = {}  # reason by topic
+        self._topics: dict[str, TopicInfo] = {}
+
+    def take(self, file: McapFile) -> list[str]:
+        """Carry over a file; say what is missing of it."""
+        losses = []
+        summary: Contents | None = None
+        try:
+            summary = file.read_summary()
+        except UnreadableBagError as error:
+            losses.append(str(error))
+        contents = file.scan(self._keep, summary)
+        self._announce(contents)
+        self.description = recorded_description(contents) or self.description
+        losses += [damage.text for damage in contents.damages]
+        if summary is not None and (missing := summary.message_count - contents.message_count) > 0:
+            losses.append(f"{file.path}: {missing} of {summary.message_count} messages are lost")
+        return losses
+
+    def _keep(self, contents: Contents, _: Chunk, messages: list[BagMessage]) -> None:
+        self._announce(contents)
+        for message in messages:
+            if message.topic not in self.refused:
+                self.writer.write(
+                    message.topic, message.data, message.log_time, message.publish_time
+                )
+                self.last = max(self.last, message.log_time)
+
+    def _announce(self, contents: Contents) -> None:
+        for channel in contents.channels.values():
+            topic = topic_of(channel, contents.schemas)
+            known = self._topics.setdefault(topic.name, topic)
+            if difference := differing_types(known, topic):
+                self.refused[topic.name] = f"{topic.name} has {difference}: the rest of it is lost"
+            if topic.name in self.writer.counts or topic.name in self.refused:
+                continue
+            if is_type_name(topic.type):
+                self.writer.add_topic(topic)
+            else:
+                self.refused[topic.name] = f"{topic.name}: lost, its type {topic.type!r} is none"

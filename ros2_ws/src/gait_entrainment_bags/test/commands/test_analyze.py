@@ -1,0 +1,178 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The bag that comes with the project holds what was recorded live over the nodes."""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from gait_entrainment.commands import main
+from gait_entrainment_bags import BagReader, BagWriter, check, recover
+from gait_entrainment_bags.recorded_run import read_run
+
+BAG = Path(__file__).parents[5] / "bags" / "paper_example"
+NEEDED = ("/gait_events", "/perturbation/torque_profile")
+pytestmark = pytest.mark.skipif(not BAG.exists(), reason="the repository's bag is not here")
+
+
+def entrain(capsys, *arguments):
+    code = main([*map(str, arguments)])
+    return code, *capsys.readouterr()
+
+
+def test_the_outcome_is_that_of_the_simulation(capsys):
+    code, out, err = entrain(capsys, "analyze", BAG, "--json")
+    assert (code, err) == (0, "")
+    told = json.loads(out)
+    simulated = json.loads(entrain(capsys, "simulate", "--json")[1])
+    assert {key: told[key] for key in simulated} == simulated
+    assert told["as_published_live"] is True
+    assert told["differences"] == []
+    assert (told["messages"], told["lost"]) == (16643, 0)
+    assert "the same to the last bit" in entrain(capsys, "analyze", BAG)[1]
+
+
+def copy(out, keep, told=None, renamed=("", "")):
+    """
+    Copy the bag; `keep` may change the bytes of a message, or leave it out with None.
+
+    `told` replaces custom data; a field of a topic is `renamed`.
+    """
+    with (
+        BagReader(BAG) as bag,
+        BagWriter(out, ros_distro="jazzy", custom_data=bag.custom_data | (told or {})) as writer,
+    ):
+        for topic in bag.topics.values():
+            name, field = renamed
+            text = re.sub(rf"(?m)^(\S+ ){field}\b", r"\1other", topic.schema_text)
+            writer.add_topic(replace(topic, schema_text=text) if topic.name == name else topic)
+        number = dict.fromkeys(bag.topics, 0)
+        for message in sorted(bag.messages(), key=lambda message: message.place):
+            data = keep(message.topic, number[message.topic], message.data)
+            number[message.topic] += 1
+            if data is not None:
+                writer.write(message.topic, data, message.log_time, message.publish_time)
+    return out
+
+
+def test_one_changed_bit_of_a_result_is_found(capsys, tmp_path):
+    def changed(topic, number, data):
+        if (topic, number) == ("/gait/pulse_phases", 17):
+            place = len(data) - 20  # the lowest bits of the unwrapped lag
+            return data[: place - 4] + bytes([data[place - 4] ^ 1]) + data[place - 3 :]
+        return data
+
+    bag = copy(tmp_path / "changed", changed)
+    code, out, _ = entrain(capsys, "analyze", bag, "--json")
+    told = json.loads(out)
+    assert (code, told["as_published_live"]) == (0, False)
+    (difference,) = told["differences"]
+    assert difference.startswith("gait/pulse_phases: ")
+    assert "message 18" in difference
+
+
+def test_deleted_events_are_analyzed_as_they_are(capsys, tmp_path):
+    bag = copy(
+        tmp_path / "gaps",
+        lambda topic, n, data: None if topic == "/gait_events" and n in (100, 101) else data,
+    )
+    code, out, _ = entrain(capsys, "analyze", bag, "--json")
+    told = json.loads(out)
+    assert code == 0
+    assert len(told["stride_period"]) in (78, 79)
+    assert told["as_published_live"] is False
+
+
+def test_a_rescued_bag_is_analyzed_up_to_where_it_ends(capsys, tmp_path):
+    shutil.copytree(BAG, tmp_path / "cut")
+    file = tmp_path / "cut" / "paper_example_0.mcap"
+    file.write_bytes(file.read_bytes()[:600_000])
+    code, _, err = entrain(capsys, "analyze", tmp_path / "cut")
+    assert code == 1
+    assert "entrain bag recover" in err
+    recover(tmp_path / "cut", tmp_path / "rescued")
+    code, out, _ = entrain(capsys, "analyze", tmp_path / "rescued", "--json")
+    assert code == 0
+    assert 10 < len(json.loads(out)["stride_period"]) < 80
+
+
+def test_torque_is_read_where_figures_need_it(tmp_path, capsys):
+    assert len(read_run(BAG, torques=False).torques.stamps) == 0
+    torques = read_run(BAG).torques
+    assert 0 < len(torques.stamps) < 0.5 * 7700
+    assert torques.effective.max() == pytest.approx(13.35, abs=0.01)
+    code, out, _ = entrain(capsys, "analyze", BAG, "--figures", tmp_path / "figures")
+    assert code == 0
+    assert out.count(".png") == 4
+
+
+def test_the_bag_follows_every_rule_and_opens_without_ros_and_message_packages():
+    assert check(BAG) == []
+    code = (
+        "import sys\n"
+        "class Block:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name.split('.')[0] in ('rclpy', 'gait_entrainment_msgs', 'std_msgs'):\n"
+        "            raise ImportError(name)\n"
+        "sys.meta_path.insert(0, Block())\n"
+        "from gait_entrainment.commands import main\n"
+        f"sys.exit(main(['analyze', {str(BAG)!r}]))\n"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+    assert "entrained since stride 29" in ended.stdout
+
+
+@pytest.mark.parametrize(
+    ("name", "expected", "words"),
+    [
+        ("nowhere", 2, "no such file"),
+        ("foreign", 1, "holds no protocol"),
+        ("text", 1, "not an MCAP"),
+        ("protocol=\0", 1, "its protocol cannot be read"),
+        ("onset=sideways", 1, "'sideways'; allowed: commanded, measured"),
+        ("messages_lost=oops", 1, "'oops'; allowed: a JSON object"),
+        ("messages_lost=[1]", 1, "'[1]'; allowed: a JSON object"),
+    ],
+)
+def test_what_cannot_be_analyzed_is_one_line(capsys, tmp_path, name, expected, words):
+    with BagWriter(tmp_path / "foreign", ros_distro="jazzy"):
+        pass
+    (tmp_path / "text").write_text("hello")
+    key, told, value = name.partition("=")
+    if told:  # what somebody else's tool has written into the custom data
+        name = "told"
+        copy(
+            tmp_path / name, lambda topic, _, data: data if topic in NEEDED else None, {key: value}
+        )
+    code, out, err = entrain(capsys, "analyze", tmp_path / name)
+    assert (code, out) == (expected, "")
+    assert err.count("\n") == 1
+    assert words in err
+
+
+@pytest.mark.parametrize(
+    "renamed",
+    [
+        ("/gait_events", "kind"),
+        ("/perturbation/torque_profile", "onsets"),
+        ("/perturbation/pulses", "torque"),
+        ("/gait/strides", "number"),
+    ],
+)
+def test_messages_of_another_version_are_named(capsys, tmp_path, renamed):
+    topics = {*NEEDED, renamed[0]}
+    bag = copy(
+        tmp_path / "old", lambda topic, _, data: data if topic in topics else None, {}, renamed
+    )
+    code, out, err = entrain(capsys, "analyze", bag)
+    assert (code, out) == (1, "")
+    assert err.count("\n") == 1
+    assert f"{renamed[0].strip('/')}: its messages have no field {renamed[1]}" in err

@@ -1,0 +1,122 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+import csv
+import json
+import shutil
+import struct
+
+import pytest
+
+from gait_entrainment.commands import main
+from gait_entrainment_bags import BagWriter, TopicInfo
+
+TEXT = "# C\nT clock\n" + "=" * 80 + "\nMSG: p/T\nint32 sec\nuint32 nanosec\n"
+CLOCK = TopicInfo("/a", "p/msg/C", TEXT, "RIHS01_" + "0" * 64)
+
+
+@pytest.fixture
+def bag(tmp_path):
+    folder = tmp_path / "walk"
+    data = {"seed": "7", "protocol": "name: x\nside: left\n"}
+    with BagWriter(folder, ros_distro="jazzy", custom_data=data) as writer:
+        writer.add_topic(CLOCK)
+        for second in (1, 2, 3):
+            writer.write("/a", struct.pack("<4BiI", 0, 1, 0, 0, second, 0), second * 10**9, 0)
+            writer.flush()
+    return folder
+
+
+def entrain(capsys, *arguments):
+    code = main(["bag", *map(str, arguments)])
+    return code, *capsys.readouterr()
+
+
+def test_info_tells_topics_times_and_custom_data(capsys, bag):
+    code, out, err = entrain(capsys, "info", bag)
+    assert (code, err) == (0, "")
+    for words in ("2.000 s", "messages   3", "/a p/msg/C", "seed: 7", "    side: left", "jazzy"):
+        assert words in out
+    told = json.loads(entrain(capsys, "info", bag, "--json")[1])
+    assert told["topics"] == [{"name": "/a", "type": "p/msg/C", "messages": 3}]
+    assert (told["start"], told["duration"]) == (10**9, 2 * 10**9)
+
+
+def test_check_prints_a_line_per_rule_and_fails_for_errors_only(capsys, bag, tmp_path):
+    assert entrain(capsys, "check", bag) == (0, f"{bag}: follows every rule\n", "")
+    broken = tmp_path / "broken"
+    shutil.copytree(bag, broken)
+    (broken / "metadata.yaml").unlink()
+    code, out, _ = entrain(capsys, "check", bag, broken)
+    assert code == 1
+    assert [line.split(": ")[:2] for line in out.splitlines()[1:]] == [["error", "metadata-file"]]
+    told = [
+        json.loads(line)
+        for line in entrain(capsys, "check", bag, broken, "--json")[1].split("\n")[:2]
+    ]
+    assert [entry["bag"] for entry in told] == [str(bag), str(broken)]
+    assert told[0]["findings"] == []
+    assert told[1]["findings"][0]["rule"] == "metadata-file"
+    with BagWriter(tmp_path / "unhashed", ros_distro="jazzy") as writer:
+        writer.add_topic(TopicInfo("/a", "p/msg/C", TEXT))
+    code, out, _ = entrain(capsys, "check", tmp_path / "unhashed")
+    assert code == 0
+    assert out.startswith("warning: type-hash")
+
+
+def test_recover_says_what_is_missing(capsys, bag, tmp_path):
+    file = bag / "walk_0.mcap"
+    content = file.read_bytes()
+    file.write_bytes(content[: len(content) // 3])
+    code, out, err = entrain(capsys, "recover", bag, tmp_path / "whole")
+    assert (code, err) == (0, "")
+    assert "messages rescued into" in out
+    assert "missing: " in out
+    assert entrain(capsys, "check", tmp_path / "whole")[0] == 0
+    told = json.loads(entrain(capsys, "recover", bag, tmp_path / "again", "--json")[1])
+    assert 0 <= told["messages"] < 3
+    assert told["losses"]
+
+
+def test_export_makes_tables(capsys, bag, tmp_path):
+    code, out, err = entrain(capsys, "export", bag, tmp_path / "tables")
+    assert (code, err) == (0, "")
+    assert out == f"/a: {tmp_path / 'tables' / 'a.csv'}\n"
+    with (tmp_path / "tables" / "a.csv").open() as table:
+        rows = list(csv.DictReader(table))
+    assert [row["log_time [ns]"] for row in rows] == ["1000000000", "2000000000", "3000000000"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected", "words"),
+    [
+        (["info", "NOWHERE"], 2, "no such file or folder"),
+        (["check", "BAG", "NOWHERE"], 2, "no such file or folder"),
+        (["recover", "BAG", "BAG"], 2, "already there"),
+        (["export", "BAG", "BAG"], 2, "already there"),
+        (["export", "BAG", "OUT", "--topics", "/b"], 1, "no topic /b"),
+        (["info", "EMPTY"], 1, "is empty"),
+        (["recover", "EMPTY", "OUT"], 1, "is empty"),
+    ],
+)
+def test_what_cannot_be_done_is_one_line(capsys, bag, tmp_path, arguments, expected, words):
+    (tmp_path / "empty.mcap").touch()
+    paths = {
+        "BAG": bag,
+        "NOWHERE": tmp_path / "nowhere",
+        "OUT": tmp_path / "out",
+        "EMPTY": tmp_path / "empty.mcap",
+    }
+    code, out, err = entrain(capsys, *(paths.get(argument, argument) for argument in arguments))
+    assert (code, out) == (expected, "")
+    assert err.count("\n") == 1
+    assert err.startswith(f"entrain bag {arguments[0]}: ")
+    assert words in err
+
+
+@pytest.mark.parametrize("action", ["info", "check", "recover", "export"])
+def test_every_action_has_help_with_examples(capsys, action):
+    with pytest.raises(SystemExit) as ended:
+        main(["bag", action, "--help"])
+    assert ended.value.code == 0
+    assert "examples:" in capsys.readouterr().out

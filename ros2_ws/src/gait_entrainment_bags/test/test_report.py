@@ -1,0 +1,99 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Outcome and figures of a run, checked against the simulation that they tell of."""
+
+import json
+import math
+import struct
+
+import numpy as np
+import pytest
+
+from gait_entrainment.conventions import Side
+from gait_entrainment.gait import analyze
+from gait_entrainment.outcome import outcome_of, summary
+from gait_entrainment.protocol import Protocol, PulsePlan
+from gait_entrainment.simulation import Simulation, simulate
+from gait_entrainment_bags.figures import draw_figures
+from gait_entrainment_bags.recorded_run import AnkleTorques, RecordedRun
+
+
+@pytest.fixture(scope="module")
+def simulation():
+    return simulate(Protocol())
+
+
+def test_the_final_lag_is_told_with_its_place_in_double_stance(simulation):
+    told = outcome_of(simulation)
+    pulse = simulation.analysis.pulses[-1]
+    # Of the perturbed leg's toe-off and the other leg's strike before it, straight from events.
+    strike = max(e.stamp for e in simulation.events if not e.kind and e.stamp < pulse.toe_off)
+    assert told["double_stance"] == pytest.approx((pulse.toe_off - strike) / 1e9)
+    assert told["final_phase_lag"] == pytest.approx(pulse.phase_lag, abs=1e-8)
+    percent = 100 * (pulse.onset - strike) / (pulse.toe_off - strike)
+    assert f"{percent:.0f} % into double stance" in summary(told)
+
+
+def test_a_slow_passage_that_looks_locked_comes_with_a_warning(simulation):
+    # docs/analysis.md: no lock is there, and more pulses leave it.
+    plan = PulsePlan(period_offset=-0.07, initial_phase=0.6)
+    told = summary(outcome_of(simulate(Protocol(pulses=plan))))
+    assert "entrained since stride 42" in told
+    assert "slow passage" in told
+    assert "slow passage" not in summary(outcome_of(simulation))
+
+
+def test_what_is_not_known_is_null_in_json():
+    protocol = Protocol(baseline=2, washout=0, pulses=PulsePlan(count=1))
+    nothing = analyze([], [], Side.RIGHT)
+    told = outcome_of(Simulation(protocol, (), (), (), None, math.nan, None, nothing))
+    text = json.dumps(told, allow_nan=False)
+    assert json.loads(text)["unperturbed_stride_period"] is None
+    assert json.loads(text)["verdict"] == "undecided"
+    assert "undecided: neither locked nor drifting" in summary(told)
+
+
+def test_the_figures_are_drawn(simulation, tmp_path):
+    stamps = np.arange(0, simulation.events[-1].stamp, 5_000_000)
+    zeros = np.zeros(len(stamps))
+    run = RecordedRun(
+        protocol=simulation.protocol,
+        events=simulation.events,
+        onsets=simulation.onsets,
+        measured_period=simulation.measured_period,
+        pulse_period=simulation.train.period,
+        analysis=simulation.analysis,
+        timings=simulation.timings,
+        torques=AnkleTorques(stamps, zeros + 50, zeros, zeros),
+        messages=0,
+        lost=None,
+        real_time_factor=math.nan,
+    )
+    paths = draw_figures(run, tmp_path)
+    names = ("stride_period", "phase_lag", "pulse_timing", "ankle_torque")
+    assert [p.stem for p in paths] == list(names)
+    for path in paths:
+        content = path.read_bytes()
+        assert content.startswith(b"\x89PNG")
+        width, height = struct.unpack(">II", content[16:24])
+        assert width > 600
+        assert height > 300
+
+
+def test_a_run_without_pulses_or_strides_can_be_drawn_too(tmp_path):
+    empty = np.empty(0)
+    run = RecordedRun(
+        protocol=Protocol(),
+        events=(),
+        onsets=(),
+        measured_period=math.nan,
+        pulse_period=math.nan,
+        analysis=analyze([], [], Side.RIGHT),
+        timings=(),
+        torques=AnkleTorques(empty.astype(np.int64), empty, empty, empty),
+        messages=0,
+        lost=None,
+        real_time_factor=math.nan,
+    )
+    assert len(draw_figures(run, tmp_path)) == 4

@@ -1,0 +1,10 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The commands that this package adds to `entrain`, one module each: name, and what it is for."""
+
+COMMANDS = {
+    "node": "one node of an experiment, where others run on other hosts or in other containers",
+    "replay": "a bag played to the gait analyzer over ROS 2",
+    "run": "the experiment over real ROS 2 nodes, recorded",
+}

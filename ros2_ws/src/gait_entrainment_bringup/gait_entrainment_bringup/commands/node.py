@@ -1,0 +1,64 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""entrain node: one node of an experiment, for runs over several hosts or containers."""
+
+import argparse
+import importlib
+import sys
+import tempfile
+from pathlib import Path
+
+from gait_entrainment.protocol import ProtocolError, write_protocol
+from gait_entrainment.robot import DeviceError, LimitError
+from gait_entrainment_bringup.commands.run import (
+    add_run_options,
+    check_driver,
+    check_output,
+    checked_protocol,
+    chosen_parameters,
+)
+from gait_entrainment_bringup.node_list import NODES, bag_folder, parameter_arguments
+from gait_entrainment_nodes.messaging.domain import DomainError, wanted_domain
+from gait_entrainment_nodes.messaging.environment import PACKAGE, set_environment
+
+DESCRIPTION = (
+    "Run one node with the parameters that follow from the protocol and the options. The "
+    "experiment conducts the protocol at once; bag_recorder ends by itself once the record is "
+    "complete; the others run until they are stopped."
+)
+EXAMPLES = """examples:
+  ROS_DOMAIN_ID=42 entrain node walker_sim               here, the rest on another host, which has
+  ROS_DOMAIN_ID=42 entrain run --elsewhere walker_sim
+  entrain node experiment protocol.yaml                  conducts it, and ends with it
+
+Each node is given what entrain run would give it: give every one the same protocol and options.
+"""
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    parser.add_argument("node", choices=NODES, metavar="NODE", help=", ".join(NODES))
+    add_run_options(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the node to its end; 1 where it failed, 2 for a protocol or an option that is wrong."""
+    try:
+        domain = wanted_domain() or 0
+        protocol = checked_protocol(options)
+        bag = options.out or bag_folder(protocol)
+        if options.node == "perturbator":
+            check_driver(protocol.driver, options)
+        if options.node == "bag_recorder":
+            check_output(bag)
+    except (DomainError, ProtocolError, LimitError, DeviceError) as error:
+        print(f"entrain node: {error}", file=sys.stderr)
+        return 2 if isinstance(error, ProtocolError) else 1
+    set_environment(domain)
+    parameters = chosen_parameters(protocol, bag, options)
+    parameters["experiment"]["protocol"] = write_protocol(protocol)
+    with tempfile.TemporaryDirectory(prefix="entrain_") as folder:
+        arguments = parameter_arguments({options.node: parameters[options.node]}, Path(folder))
+        sys.argv = [options.node, *arguments]
+        return int(importlib.import_module(f"{PACKAGE}.nodes.{options.node}").main())

@@ -1,0 +1,207 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+The nodes of an experiment and of a replay: one list for the commands and the launch files.
+
+What a user may set is in config/nodes.yaml. Here is what follows from the protocol, the mode and
+the bag.
+"""
+
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from gait_entrainment.protocol import Protocol, read_protocol
+from gait_entrainment.robot import find_driver
+from gait_entrainment_bags import BagError, BagReader
+from gait_entrainment_nodes.messaging.environment import shared_file
+
+# In the order in which they are started. Executable and node have the same name.
+NODES = ("bag_recorder", "walker_sim", "perturbator", "gait_analyzer", "experiment")
+# Only looks on: started where somebody wants to see the walk, waited for by nobody.
+DISPLAY = "walker_display"
+# In the order in which they are stopped: torque first, the record last.
+STOP_ORDER = ("perturbator", "experiment", "walker_sim", "gait_analyzer", DISPLAY, "bag_recorder")
+# Nodes that publish what is counted at the end of a run.
+PUBLISHERS = ("walker_sim", "perturbator", "gait_analyzer", "experiment")
+# In real time promises are short, so that more can be decided late, but longer than a hiccup.
+REAL_TIME_LOOKAHEAD = 0.3
+# A real robot's torque is known only once it has been measured and promised: so much later than
+# the wall clock [s] the walker shows what it felt.
+MEASURED_DELAY = 0.1
+
+# Names of the root that are moved into a namespace: each experiment keeps its own time.
+MOVED = (
+    "/clock",
+    "/diagnostics",
+    "/tf",
+    "/tf_static",
+    # Absolute in RViz's configuration alone.
+    "/robot_description",
+    "/walker_display/markers",
+)
+# Nodes of a replay; where it is recorded, the recorder comes last.
+REPLAY_NODES = ("bag_player", "gait_analyzer")
+# In a replay made anew, or of the processes that were recorded.
+NOT_REPLAYED = (
+    "*/gait/strides",
+    "*/gait/pulse_phases",
+    "*/gait/entrainment",
+    "*/published_counts",
+    "*/bag_recorder/progress",
+    "*/clock",
+    "/rosout",
+    "/parameter_events",
+)
+ANALYZED = ("gait_events", "perturbation/torque_profile", "walker_sim/progress")
+MEASURED = ("perturbation/pulses", "perturbator/state")  # where onsets are those measured
+
+
+def settings_file() -> Path:
+    """Return the file of what a user may set of the nodes."""
+    return shared_file("gait_entrainment_bringup", "config/nodes.yaml")
+
+
+def parameters(
+    protocol: Protocol,
+    bag: str,
+    custom_data: str,
+    *,
+    real_time: bool,
+    armed: bool = False,
+    onset: str = "commanded",
+) -> dict[str, dict[str, Any]]:
+    """
+    Return the parameters of every node for one run, by node name.
+
+    Parameters
+    ----------
+    protocol
+        What to conduct.
+    bag
+        Folder of the bag to record.
+    custom_data
+        JSON object that the bag keeps.
+    real_time
+        Real time instead of lock-step.
+    armed
+        Whether a real robot may deliver torque without another word.
+    onset
+        Where the analyzer lets a pulse begin: "commanded" or "measured".
+
+    """
+    side = protocol.side.name.lower()
+    walker = {name: getattr(protocol.walker, name) for name in protocol.walker.__match_args__}
+    experiment: dict[str, Any] = {"participants": [node for node in NODES if node != "experiment"]}
+    if real_time:
+        experiment["longest_lookahead"] = REAL_TIME_LOOKAHEAD
+    measured = real_time and not find_driver(protocol.driver).simulated
+    given = {
+        "walker_sim": {
+            **walker,
+            "first_heel_strike": side,
+            "real_time": real_time,
+            "acknowledged": not real_time,
+            "presentation_delay": MEASURED_DELAY if measured else 0.0,
+        },
+        "perturbator": {
+            "side": side,
+            "driver": protocol.driver,
+            "seed": protocol.seed,
+            "armed": armed,
+        },
+        "gait_analyzer": {"side": side, "onset": onset},
+        "experiment": experiment,
+        "bag_recorder": {
+            "output": bag,
+            "publishers": list(PUBLISHERS),
+            "custom_data": custom_data,
+        },
+        DISPLAY: _drawn(protocol),
+    }
+    return {name: given[name] | {"use_sim_time": not real_time} for name in given}
+
+
+def _drawn(protocol: Protocol) -> dict[str, Any]:
+    """Return what the display must know of the walker."""
+    return {"leg_length": protocol.walker.leg_length, "foot_length": protocol.walker.foot_length}
+
+
+def replay_parameters(
+    path: Path, namespace: str | None = None, listeners: int = 1
+) -> tuple[str, dict[str, dict[str, Any]]]:
+    """
+    Return what a replay of a bag to the analyzer needs.
+
+    Parameters
+    ----------
+    path
+        The bag: a folder or an ``.mcap`` file.
+    namespace
+        To play into, with a slash before it; None for the one that was recorded.
+    listeners
+        Subscriptions that what is analyzed must have before the first message.
+
+    Returns
+    -------
+    namespace
+        Of the replay, without a slash at its end; "" for the root.
+    parameters
+        By node name; of the display only where the bag holds no picture of its own.
+
+    Raises
+    ------
+    BagError
+        where the bag cannot be read, or holds no run of this project.
+
+    """
+    with BagReader(path) as bag:
+        topics = list(bag.topics)
+        recorded = next((name for name in topics if name.endswith("/gait_events")), None)
+        if recorded is None or "protocol" not in bag.custom_data:
+            raise BagError(f"{path}: not a run of this project: no protocol or no gait events")
+        protocol = read_protocol(bag.custom_data["protocol"])
+        onset = bag.custom_data.get("onset", "commanded")
+    recorded = recorded.removesuffix("/gait_events")
+    namespace = recorded if namespace is None else namespace.rstrip("/")
+    moved = [name for name in topics if namespace != recorded and name.startswith(f"{recorded}/")]
+    analyzed = (*ANALYZED, *MEASURED) if onset == "measured" else ANALYZED
+    expected = [f"{namespace}/{n}" for n in analyzed if f"{recorded}/{n}" in topics]
+    given = {
+        "bag_player": {
+            "bag": str(path.absolute()),
+            "exclude": list(NOT_REPLAYED),
+            "remap": [f"{name}:={namespace}{name.removeprefix(recorded)}" for name in moved]
+            or [""],
+            "expect": expected * listeners,
+            "use_sim_time": False,
+        },
+        "gait_analyzer": {
+            "side": protocol.side.name.lower(),
+            "onset": onset,
+            "use_sim_time": True,
+        },
+    }
+    if f"{recorded}/robot_description" not in topics:
+        given[DISPLAY] = _drawn(protocol) | {"use_sim_time": True}
+    return namespace, given
+
+
+def bag_folder(protocol: Protocol) -> Path:
+    """Return where a run is recorded unless the user says otherwise."""
+    return Path("bags") / f"{datetime.now():%Y%m%d-%H%M%S}_{protocol.name}"
+
+
+def parameter_arguments(given: dict[str, dict[str, Any]], folder: Path) -> list[str]:
+    """
+    Write parameters by node name into a file in a folder.
+
+    Returns the arguments by which a node loads config/nodes.yaml and then that file.
+    """
+    file = folder / "parameters.yaml"
+    file.write_text(yaml.safe_dump({f"/**/{n}": {"ros__parameters": p} for n, p in given.items()}))
+    files = (settings_file(), file)
+    return ["--ros-args", *(word for f in files for word in ("--params-file", str(f)))]

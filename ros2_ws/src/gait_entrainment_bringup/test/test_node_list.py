@@ -1,0 +1,118 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""One list of nodes, one set of parameters: given and listed ones are all that are declared."""
+
+from pathlib import Path
+
+import pytest
+import rclpy
+import yaml
+
+from gait_entrainment.protocol import DEFAULT_PROTOCOL
+from gait_entrainment_bringup.node_list import (
+    DISPLAY,
+    NODES,
+    PUBLISHERS,
+    STOP_ORDER,
+    parameter_arguments,
+    parameters,
+    replay_parameters,
+    settings_file,
+)
+from gait_entrainment_nodes.nodes.bag_player import BagPlayer
+from gait_entrainment_nodes.nodes.bag_recorder import BagRecorder
+from gait_entrainment_nodes.nodes.experiment import Experiment
+from gait_entrainment_nodes.nodes.gait_analyzer import GaitAnalyzerNode
+from gait_entrainment_nodes.nodes.perturbator import Perturbator
+from gait_entrainment_nodes.nodes.walker_display import WalkerDisplay
+from gait_entrainment_nodes.nodes.walker_sim import WalkerSim
+
+BAG = Path(__file__).parents[4] / "bags" / "paper_example"
+CLASSES = (
+    WalkerSim,
+    Perturbator,
+    GaitAnalyzerNode,
+    Experiment,
+    BagRecorder,
+    BagPlayer,
+    WalkerDisplay,
+)
+# Not for the file: of ROS itself, of the mode or the launch file, of a node started by hand.
+ELSEWHERE = {
+    *(f"{name}.use_sim_time" for name in (*NODES, "bag_player")),
+    *(f"{name}.start_type_description_service" for name in (*NODES, "bag_player", DISPLAY)),
+    "experiment.longest_lookahead",
+    "experiment.protocol",
+    "bag_recorder.topics",
+    "bag_player.remap",
+}
+
+
+def declared(arguments):
+    """Start every node with arguments; return its parameters by full name."""
+    rclpy.init(args=arguments)
+    nodes = [make() for make in CLASSES]
+    found = {
+        f"{node.get_name()}.{name}": parameter.value
+        for node in nodes
+        for name, parameter in node._parameters.items()
+        if name != "output"
+    }
+    for node in nodes:
+        node.destroy_node()
+    rclpy.shutdown()
+    return found
+
+
+def full_names(tree, prefix=""):
+    """Return the names of nested parameters."""
+    for name, item in tree.items():
+        if isinstance(item, dict):
+            yield from full_names(item, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}"
+
+
+def test_file_lists_what_a_user_may_set_at_its_default(tmp_path):
+    file = yaml.safe_load(settings_file().read_text())
+    listed = set(
+        full_names({n.removeprefix("/**/"): p["ros__parameters"] for n, p in file.items()})
+    )
+    found = []
+    for folder in (tmp_path / "with", tmp_path / "without"):
+        folder.mkdir()
+        given = parameters(DEFAULT_PROTOCOL, str(folder / "bag"), "{}", real_time=False)
+        given["bag_player"] = replay_parameters(BAG)[1]["bag_player"]
+        arguments = parameter_arguments(given, folder)
+        if folder.name == "without":
+            arguments = [word for word in arguments if word != str(settings_file())]
+            arguments.remove("--params-file")
+        # A node refuses a parameter that it does not have.
+        found.append(declared(arguments))
+    assert found[0] == found[1]
+    elsewhere = set(full_names(given)) | ELSEWHERE
+    assert listed == (set(found[0]) - elsewhere)
+
+
+@pytest.mark.parametrize("real_time", [False, True])
+def test_parameters_are_given_to_every_node(real_time):
+    given = parameters(DEFAULT_PROTOCOL, "/bag", "{}", real_time=real_time)
+    assert set(given) == {*NODES, DISPLAY}
+    walker = given["walker_sim"]
+    assert walker["ankle_stiffness"] == 87.3
+    assert walker["real_time"] is real_time
+    # Only in lock-step does the walker wait for the recorder.
+    assert walker["acknowledged"] is not real_time
+    assert ("longest_lookahead" in given["experiment"]) is real_time
+    sides = {given["perturbator"]["side"], given["gait_analyzer"]["side"]}
+    assert sides == {"right"} == {walker["first_heel_strike"]}
+    assert given["bag_recorder"]["publishers"] == list(PUBLISHERS)
+    assert "experiment" not in given["experiment"]["participants"]
+
+
+def test_torque_is_stopped_first_and_the_record_last():
+    assert sorted(STOP_ORDER) == sorted([*NODES, DISPLAY])
+    assert STOP_ORDER[0] == "perturbator"
+    assert STOP_ORDER[-1] == "bag_recorder"
+    assert set(PUBLISHERS) == set(NODES) - {"bag_recorder"}

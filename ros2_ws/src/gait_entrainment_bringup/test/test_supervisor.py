@@ -1,0 +1,108 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The supervisor: processes stopped in order, those that do not obey by force."""
+
+import os
+import signal
+import threading
+import time
+
+import pytest
+
+from gait_entrainment_bringup import supervisor as module
+from gait_entrainment_bringup.supervisor import LOG_LINES, PATIENCE, Supervisor
+
+OBEDIENT = """#!/bin/sh
+trap 'echo "$0 stopped $(date +%s%N)"; exit 0' TERM
+echo up
+while :; do sleep 0.02; done
+"""
+STUBBORN = """#!/bin/sh
+trap '' TERM
+echo up
+while :; do sleep 0.02; done
+"""
+BROKEN = """#!/bin/sh
+for i in 1 2 3 4 5 6 7 8 9 10 11 12; do echo "line $i" >&2; done
+exit 3
+"""
+
+
+@pytest.fixture
+def programs(tmp_path, monkeypatch):
+    """Make shell scripts that stand for the nodes of the package."""
+    folder = tmp_path / "lib" / module.PACKAGE
+    folder.mkdir(parents=True)
+    scripts = {"one": OBEDIENT, "two": OBEDIENT, "three": OBEDIENT, "four": OBEDIENT}
+    for name, text in {**scripts, "stubborn": STUBBORN, "broken": BROKEN}.items():
+        (folder / name).write_text(text)
+        (folder / name).chmod(0o755)
+    monkeypatch.setattr(module, "get_package_prefix", lambda _: str(tmp_path))
+    logs = tmp_path / "logs"
+    logs.mkdir()
+    supervisor = Supervisor(logs, os.environ)
+    yield supervisor
+    supervisor.stop(list(supervisor._processes))
+
+
+def started(supervisor, *names):
+    for name in names:
+        supervisor.start(name, [])
+    deadline = time.monotonic() + 10
+    while not all("up" in supervisor.last_lines(name) for name in names):
+        assert time.monotonic() < deadline
+
+
+def stopped_at(supervisor, name):
+    return int(supervisor.last_lines(name).split()[-1])
+
+
+def test_first_ends_before_the_next_is_asked_and_last_comes_last(programs):
+    started(programs, "one", "two", "three", "four")
+    assert programs.ended() == {}
+    assert programs.stop(["three", "one", "two", "four"]) == []
+    assert programs.ended() == dict.fromkeys(("one", "two", "three", "four"), 0)
+    first, last = stopped_at(programs, "three"), stopped_at(programs, "four")
+    between = [stopped_at(programs, "one"), stopped_at(programs, "two")]
+    assert first < min(between) <= max(between) < last
+
+
+def test_who_does_not_obey_is_killed(programs):
+    started(programs, "one", "stubborn")
+    begin = time.monotonic()
+    assert programs.stop(["stubborn", "one"]) == ["stubborn"]
+    assert time.monotonic() - begin >= PATIENCE
+    assert programs.ended() == {"stubborn": -signal.SIGKILL, "one": 0}
+
+
+def test_second_ctrl_c_does_not_break_off_the_stopping(programs):
+    started(programs, "one", "stubborn", "two")
+    impatient = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
+    impatient.start()
+    assert programs.stop(["stubborn", "one", "two"]) == ["stubborn"]
+    impatient.join()
+    assert programs.ended() == {"stubborn": -signal.SIGKILL, "one": 0, "two": 0}
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_suspended_process_can_obey(programs):
+    started(programs, "one")
+    os.kill(programs._processes["one"].pid, signal.SIGSTOP)
+    assert programs.stop(["one"]) == []
+    assert programs.ended() == {"one": 0}
+
+
+def test_end_of_a_process_is_noticed_with_its_last_lines(programs):
+    programs.start("broken", [])
+    assert programs.wait("broken", 10) == 3
+    assert programs.ended() == {"broken": 3}
+    lines = programs.last_lines("broken").splitlines()
+    assert len(lines) == LOG_LINES
+    assert lines[-1] == "  broken| line 12"
+    assert programs.last_lines("never started") == ""
+
+
+def test_waiting_has_an_end(programs):
+    started(programs, "one")
+    assert programs.wait("one", 0.01) is None

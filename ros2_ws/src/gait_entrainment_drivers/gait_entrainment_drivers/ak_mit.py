@@ -1,0 +1,140 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+CubeMars AK motors in MIT mode, on the wire.
+
+A command is 8 bytes, most significant bit first: position 16, velocity 12, stiffness kp 12,
+damping kd 12, torque 12 bits. A reply is the motor's id, position 16, velocity 12, torque 12
+bits; newer firmware adds temperature and error.
+
+Numbers are scaled by 2^n - 1 over the span and clamped. The manual's 2^n / span overflows at full
+scale, and then decodes as *minus* full torque. Zero lies between two codes and is sent as the
+lower one: on +/-25 N m that is -0.006 N m.
+
+Public drivers disagree about the ranges, above all of velocity: they depend on motor **and**
+firmware, and a motor does not tell which it is. Check them before anyone is strapped to it, by
+weighing: a motor asked for a torque must show it at a lever on a scale.
+"""
+
+from dataclasses import dataclass
+
+from gait_entrainment.robot.faults import Fault
+
+POSITION = 12.5  # [rad]
+STIFFNESS = 500.0  # kp, upper bound
+DAMPING = 5.0  # kd, upper bound
+ENTER = bytes.fromhex("fffffffffffffffc")
+EXIT = bytes.fromhex("fffffffffffffffd")
+SET_ZERO = bytes.fromhex("fffffffffffffffe")
+
+
+@dataclass(frozen=True)
+class AkMotor:
+    """Ranges of one motor: symmetric about zero."""
+
+    velocity: float  # [rad/s]
+    torque: float  # [N m]
+
+
+MOTORS = {
+    "AK60-6": AkMotor(45.0, 15.0),
+    "AK70-10": AkMotor(50.0, 25.0),
+    "AK80-6": AkMotor(76.0, 12.0),
+    "AK80-9": AkMotor(50.0, 18.0),
+    "AK10-9": AkMotor(50.0, 65.0),
+}
+FAULTS = {
+    1: Fault("motor_too_hot", "The motor reports over-temperature."),
+    2: Fault("over_current", "The motor reports over-current."),
+    3: Fault("over_voltage", "The motor reports over-voltage."),
+    4: Fault("under_voltage", "The motor reports under-voltage."),
+    5: Fault("encoder_failed", "The motor reports an encoder fault."),
+    6: Fault("driver_too_hot", "The motor's power stage reports over-temperature."),
+    7: Fault("motor_locked", "The motor reports that it is locked."),
+}
+
+
+@dataclass(frozen=True)
+class Command:
+    """One command."""
+
+    position: float = 0.0  # [rad]
+    velocity: float = 0.0  # [rad/s]
+    stiffness: float = 0.0  # kp [N m/rad]
+    damping: float = 0.0  # kd [N m s/rad]
+    torque: float = 0.0  # feed-forward [N m]
+
+
+@dataclass(frozen=True)
+class Reply:
+    """One reply."""
+
+    motor_id: int
+    position: float  # [rad]
+    velocity: float  # [rad/s]
+    torque: float  # [N m]
+    error: int = 0  # 0 where all is well, or where the firmware tells none
+
+
+def pack_command(command: Command, motor: AkMotor) -> bytes:
+    """Return the 8 bytes of a command; what is out of range is clamped, NaN is refused."""
+    bits = _encode(command.position, -POSITION, POSITION, 16)
+    bits = bits << 12 | _encode(command.velocity, -motor.velocity, motor.velocity, 12)
+    bits = bits << 12 | _encode(command.stiffness, 0.0, STIFFNESS, 12)
+    bits = bits << 12 | _encode(command.damping, 0.0, DAMPING, 12)
+    bits = bits << 12 | _encode(command.torque, -motor.torque, motor.torque, 12)
+    return bits.to_bytes(8, "big")
+
+
+def unpack_command(data: bytes, motor: AkMotor) -> Command:
+    """Return what a command of 8 bytes means to the motor."""
+    bits = int.from_bytes(data, "big")
+    return Command(
+        position=_decode(bits >> 48, -POSITION, POSITION, 16),
+        velocity=_decode(bits >> 36, -motor.velocity, motor.velocity, 12),
+        stiffness=_decode(bits >> 24, 0.0, STIFFNESS, 12),
+        damping=_decode(bits >> 12, 0.0, DAMPING, 12),
+        torque=_decode(bits, -motor.torque, motor.torque, 12),
+    )
+
+
+def pack_reply(reply: Reply, motor: AkMotor, length: int, temperature: int = 65) -> bytes:
+    """Return the 6 or 8 bytes of a reply; the temperature byte counts from -40 degrees."""
+    bits = _encode(reply.position, -POSITION, POSITION, 16)
+    bits = bits << 12 | _encode(reply.velocity, -motor.velocity, motor.velocity, 12)
+    bits = bits << 12 | _encode(reply.torque, -motor.torque, motor.torque, 12)
+    data = bytes([reply.motor_id]) + bits.to_bytes(5, "big")
+    return data if length == 6 else data + bytes([temperature, reply.error])
+
+
+def unpack_reply(data: bytes, motor: AkMotor) -> Reply | None:
+    """Return a reply of 6 or 8 bytes; None for any other length, which is no reply."""
+    if len(data) not in (6, 8):
+        return None
+    bits = int.from_bytes(data[1:6], "big")
+    return Reply(
+        motor_id=data[0],
+        position=_decode(bits >> 24, -POSITION, POSITION, 16),
+        velocity=_decode(bits >> 12, -motor.velocity, motor.velocity, 12),
+        torque=_decode(bits, -motor.torque, motor.torque, 12),
+        error=data[7] if len(data) == 8 else 0,
+    )
+
+
+def resolution(motor: AkMotor) -> float:
+    """Return one step of the torque code [N m]."""
+    return 2 * motor.torque / 0xFFF
+
+
+def _encode(value: float, low: float, high: float, bits: int) -> int:
+    if value != value:
+        raise ValueError("NaN cannot be sent to a motor")
+    clamped = min(max(value, low), high)
+    # The small term keeps a value that was decoded from a code on that code, despite rounding.
+    return int((clamped - low) / (high - low) * ((1 << bits) - 1) + 1e-6)
+
+
+def _decode(code: int, low: float, high: float, bits: int) -> float:
+    largest = (1 << bits) - 1
+    return low + (code & largest) * (high - low) / largest

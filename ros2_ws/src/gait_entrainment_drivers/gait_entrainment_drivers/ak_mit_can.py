@@ -1,0 +1,95 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Driver of a CubeMars AK motor in MIT mode on any bus that python-can knows."""
+
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+from gait_entrainment.conventions import Side, setting
+from gait_entrainment.robot.faults import DeviceError, Fault
+from gait_entrainment_drivers.ak_mit import (
+    ENTER,
+    EXIT,
+    FAULTS,
+    MOTORS,
+    Command,
+    Reply,
+    pack_command,
+    resolution,
+    unpack_reply,
+)
+from gait_entrainment_drivers.can_motor import CanMotorOptions, CanMotorRobot
+from gait_entrainment_drivers.host_loop import Reading
+
+
+@dataclass(frozen=True)
+class AkMitCanOptions(CanMotorOptions):
+    """Bus, motor and transmission."""
+
+    motor: str = field(
+        default="AK80-9",
+        metadata={"meaning": "type, which fixes the ranges", "unit": "", "choices": tuple(MOTORS)},
+    )
+    motor_id: int = setting(1, "id of the motor", "", (1, 127))
+
+
+class AkMitCanRobot(CanMotorRobot):
+    """See the module's docstring; docs/drivers.md has wiring and hazards."""
+
+    Options = AkMitCanOptions
+    PROTOCOL = "in MIT mode"
+    CHECK = "mode and motor_id"
+
+    def __init__(self, side: Side, options: AkMitCanOptions, seed: int) -> None:  # noqa: ARG002
+        self._motor = MOTORS[options.motor]
+        super().__init__(side, options, f"motor {options.motor_id}", self._motor.torque)
+        self._zero = pack_command(Command(), self._motor)
+        self._resolution = resolution(self._motor) * abs(options.ratio)
+
+    def _open(self) -> None:
+        self._open_bus()
+        # Leaving motor mode is harmless whatever the motor is doing, and is answered.
+        reply = self._ask(lambda: self._command(EXIT), self._reply)
+        if reply.error:
+            raise DeviceError(
+                f"{self._name} reports: {_fault(reply.error).meaning} "
+                "Remove the cause and switch the motor off and on"
+            )
+
+    def _enable(self) -> None:
+        # The motor holds its last command, also across modes: zero before and after.
+        self._command(self._zero)
+        self._ask(lambda: self._command(ENTER), self._reply)
+        self._require_zero_torque(f"is it {self._options.motor}?")
+
+    def _exchange(self, torque: float, patience: float) -> Reading | None:
+        ratio = self._options.ratio
+        self._command(pack_command(Command(torque=torque / ratio), self._motor))
+        reply = self._answer(self._reply, time.monotonic() + patience)
+        if reply is None:
+            return None
+        measured = reply.torque * ratio
+        if abs(measured) < self._resolution:  # zero has no code of its own
+            measured = 0.0
+        faults = (_fault(reply.error),) if reply.error else ()
+        return Reading(measured, reply.position / ratio, faults)
+
+    def _disable(self) -> None:
+        self._command(self._zero)
+        self._command(EXIT)
+
+    def _command(self, data: bytes) -> None:
+        self._send(self._options.motor_id, data)
+
+    def _reply(self, message: Any) -> Reply | None:
+        reply = unpack_reply(bytes(message.data), self._motor)
+        if reply is None or reply.motor_id == self._options.motor_id:
+            return reply
+        self._others.add(reply.motor_id)
+        return None
+
+
+def _fault(error: int) -> Fault:
+    return FAULTS.get(error, Fault(f"motor_error_{error}", f"The motor reports error {error}."))

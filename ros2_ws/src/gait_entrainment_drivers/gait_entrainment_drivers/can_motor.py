@@ -1,0 +1,149 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What drivers of a motor on a CAN bus share: options, the bus, asking until it answers."""
+
+import contextlib
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, TypeVar
+
+from gait_entrainment.conventions import Side, setting
+from gait_entrainment.robot.contract import Capabilities
+from gait_entrainment.robot.faults import DeviceError, LimitError
+from gait_entrainment_drivers.can_bus import open_bus
+from gait_entrainment_drivers.host_loop import HostTimedRobot
+
+_T = TypeVar("_T")
+
+# A motor that is there answers within a millisecond; on a busy host this is ample [s].
+ANSWER_TIMEOUT = 0.5
+# How often a question is repeated while waiting, since a frame may be lost [s].
+_ASK_PERIOD = 0.05
+
+
+@dataclass(frozen=True)
+class CanMotorOptions:
+    """Bus, transmission and loop."""
+
+    interface: str = field(
+        default="socketcan", metadata={"meaning": "python-can interface", "unit": ""}
+    )
+    channel: str = field(default="can0", metadata={"meaning": "channel of the bus", "unit": ""})
+    port: int = setting(0, "UDP port of udp_multicast; 0 is python-can's own", "", (0, 65535))
+    bitrate: int = setting(1_000_000, "of the bus", "bit/s", (10_000, 1_000_000))
+    ratio: float = setting(
+        1.0,
+        "ankle torque per motor torque; negative where the motor turns against it",
+        "1",
+        (-20.0, 20.0),
+    )
+    rate: float = setting(500.0, "torque commands per second", "Hz", (50.0, 1000.0))
+    silence: float = setting(0.05, "longest silence of the motor", "s", (0.005, 1.0))
+    lateness: float = setting(0.05, "by which the loop may wake up late", "s", (0.005, 1.0))
+
+    def __post_init__(self) -> None:
+        """Check what has no range of its own."""
+        if self.ratio == 0:
+            raise LimitError("driver: ratio: 0; allowed: any other number")
+
+
+class CanMotorRobot(HostTimedRobot):
+    """
+    A motor whose torque is streamed to it in frames with 11-bit ids.
+
+    A subclass says how it is called in messages, opens the bus first of all in ``_open``, and
+    implements ``_enable``, ``_exchange`` and ``_disable``; ``_disable`` must bring zero torque.
+
+    ``name`` is the motor's, in messages; ``motor_torque`` its peak [N m] before the transmission.
+    """
+
+    PROTOCOL: ClassVar[str]  # as in "motor 1 does not answer PROTOCOL on can0"
+    CHECK: ClassVar[str]  # what a person should check, besides power, wiring and bit rate
+
+    def __init__(self, side: Side, options: Any, name: str, motor_torque: float) -> None:
+        super().__init__(side, options.rate, options.silence, options.lateness)
+        self._options = options
+        self._name = name
+        self._bus: Any = None
+        self._others: set[int] = set()  # ids of other motors that were heard
+        self.capabilities = Capabilities(
+            peak_torque=motor_torque * abs(options.ratio),
+            torque_rate=float("inf"),
+            own_pulse_timer=False,
+            measures_torque=True,
+            simulated=False,
+            state_rate=options.rate,
+        )
+
+    def _open_bus(self) -> None:
+        options = self._options
+        self._others.clear()
+        self._bus = open_bus(options.interface, options.channel, options.bitrate, options.port)
+
+    def _shut(self) -> None:
+        if self._bus is not None:
+            with contextlib.suppress(Exception):
+                self._disable()
+            self._bus.shutdown()
+            self._bus = None
+
+    def _send(self, identifier: int, data: bytes = b"", *, remote: bool = False) -> None:
+        import can
+
+        self._bus.send(
+            can.Message(
+                arbitration_id=identifier, data=data, is_extended_id=False, is_remote_frame=remote
+            )
+        )
+
+    def _answer(self, understand: Callable[[Any], _T | None], give_up: float) -> _T | None:
+        """
+        Return the newest answer among the frames, waiting for the first until a time [s].
+
+        After that time none is read any more: frames may come faster than they are read.
+        """
+        newest = None
+        while True:
+            patience = give_up - time.monotonic()
+            if patience < 0:
+                return newest
+            message = self._bus.recv(patience if newest is None else 0.0)
+            if message is None:
+                return newest
+            if message.is_error_frame or message.is_remote_frame or message.is_extended_id:
+                continue
+            answer = understand(message)
+            newest = newest if answer is None else answer
+
+    def _ask(self, ask: Callable[[], None], understand: Callable[[Any], _T | None]) -> _T:
+        """Ask until there is an answer."""
+        give_up = time.monotonic() + ANSWER_TIMEOUT
+        while time.monotonic() < give_up:
+            ask()
+            answer = self._answer(understand, time.monotonic() + _ASK_PERIOD)
+            if answer is not None:
+                return answer
+        options = self._options
+        others = f" (others do: {', '.join(map(str, sorted(self._others)))})"
+        raise DeviceError(
+            f"{self._name} does not answer {self.PROTOCOL} on {options.interface} "
+            f"{options.channel}{others if self._others else ''}: check its power, wiring, "
+            f"{self.CHECK}, and that the bus runs at {options.bitrate} bit/s"
+        )
+
+    def _require_zero_torque(self, doubt: str) -> None:
+        """Raise DeviceError where the motor, enabled, keeps showing torque at zero command."""
+        give_up = time.monotonic() + ANSWER_TIMEOUT
+        while True:
+            reading = self._exchange(0.0, _ASK_PERIOD)
+            torque = float("nan") if reading is None else reading.torque
+            if abs(torque) <= 0.05 * self.capabilities.peak_torque:
+                return
+            if time.monotonic() > give_up:
+                raise DeviceError(
+                    f"{self._name} shows {torque:g} N m at zero command: {doubt} "
+                    "is the joint free?"
+                )
+            time.sleep(1 / self._options.rate)

@@ -1,0 +1,97 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+ODrive axes by CANSimple, on the wire.
+
+An 11-bit id is the node's id and a command: ``node << 5 | command``. Numbers are little-endian,
+torque and estimates 32-bit floats. What an axis tells, it tells when asked by a remote frame, and
+the heartbeat also by itself, every 100 ms unless it is set otherwise.
+"""
+
+import math
+import struct
+from dataclasses import dataclass
+
+from gait_entrainment.robot.faults import Fault
+
+HEARTBEAT, STOP, SET_STATE, ENCODER = 0x01, 0x02, 0x07, 0x09
+SET_MODE, SET_TORQUE, CLEAR_ERRORS, TORQUES = 0x0B, 0x0E, 0x18, 0x1C
+IDLE, CLOSED_LOOP = 1, 8
+# Control mode torque, input mode passthrough.
+TORQUE_MODE = bytes.fromhex("01000000 01000000")
+WATCHDOG_EXPIRED, STOP_REQUESTED = 0x01000000, 0x02000000
+# By error bit; firmware 0.6.
+FAULTS = {
+    0x00000008: Fault("encoder_failed", "The ODrive misses its encoder's estimate."),
+    0x00000020: Fault("driver_failed_in_motor", "The ODrive reports a fault of its power stage."),
+    0x00000100: Fault("over_voltage", "The ODrive reports over-voltage."),
+    0x00000200: Fault("under_voltage", "The ODrive reports under-voltage."),
+    0x00000400: Fault("over_current", "The ODrive reports over-current of its supply."),
+    0x00001000: Fault("motor_current_exceeded", "The ODrive reports too much motor current."),
+    0x00002000: Fault("motor_too_hot", "The ODrive reports over-temperature of the motor."),
+    0x00004000: Fault("driver_too_hot", "The ODrive reports over-temperature of its power stage."),
+    0x00008000: Fault("too_fast", "The ODrive reports that its velocity limit was exceeded."),
+    WATCHDOG_EXPIRED: Fault("motor_watchdog", "The ODrive's own watchdog has expired."),
+    STOP_REQUESTED: Fault("emergency_stop", "The ODrive was told to stop by somebody."),
+}
+DISARMED = Fault("motor_disarmed", "The ODrive has left closed-loop control by itself.")
+
+
+@dataclass(frozen=True)
+class Heartbeat:
+    """What an axis tells of itself."""
+
+    error: int  # bits; 0 where all is well
+    state: int  # IDLE, CLOSED_LOOP, or one that no torque comes in
+
+
+def frame_id(node: int, command: int) -> int:
+    """Return the id of a frame to or from a node, 0 to 63."""
+    return node << 5 | command
+
+
+def pack_state(state: int) -> bytes:
+    """Return the data of SET_STATE."""
+    return struct.pack("<I", state)
+
+
+def pack_torque(torque: float, peak: float) -> bytes:
+    """Return the data of SET_TORQUE [N m], clamped to +/- a peak; NaN is refused."""
+    if math.isnan(torque):
+        raise ValueError("NaN cannot be sent to a motor")
+    return struct.pack("<f", min(max(torque, -peak), peak))
+
+
+def unpack_torque(data: bytes) -> float:
+    """Return the torque of SET_TORQUE [N m]."""
+    return float(struct.unpack("<f", data)[0])
+
+
+def pack_pair(first: float, second: float) -> bytes:
+    """Return the data of ENCODER [rev, rev/s] or TORQUES [target, estimate, N m]."""
+    return struct.pack("<ff", first, second)
+
+
+def unpack_pair(data: bytes) -> tuple[float, float] | None:
+    """Return the two floats of ENCODER or TORQUES; None for a frame of another length."""
+    return struct.unpack("<ff", data) if len(data) == 8 else None
+
+
+def pack_heartbeat(heartbeat: Heartbeat) -> bytes:
+    """Return the data of HEARTBEAT, whose result and flag are zero."""
+    return struct.pack("<IB3x", heartbeat.error, heartbeat.state)
+
+
+def unpack_heartbeat(data: bytes) -> Heartbeat | None:
+    """Return a heartbeat; None for a frame that is too short."""
+    return Heartbeat(*struct.unpack_from("<IB", data)) if len(data) >= 5 else None
+
+
+def faults_of(error: int) -> tuple[Fault, ...]:
+    """Return the faults that error bits stand for."""
+    bits = [1 << n for n in range(32) if error >> n & 1]
+    return tuple(
+        FAULTS.get(bit, Fault(f"motor_error_{bit:#x}", f"The ODrive reports error {bit:#x}."))
+        for bit in bits
+    )

@@ -1,0 +1,269 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Drivers that each break one promise of the contract, made from those that keep them all."""
+
+import math
+import time
+from dataclasses import dataclass, replace
+
+from gait_entrainment.robot import Fault
+from gait_entrainment.robot.emulated import EmulatedAnkleRobot
+from gait_entrainment.robot.ideal import IdealAnkleRobot
+
+
+@dataclass(frozen=True)
+class OptionsWithoutMeaning:
+    speed: float = 1.0
+
+
+class NoPeakTorque(IdealAnkleRobot):
+    def __init__(self, side, options, seed):
+        super().__init__(side, options, seed)
+        self.capabilities = replace(self.capabilities, peak_torque=0.0)
+
+
+class UnexplainedOptions(IdealAnkleRobot):
+    Options = OptionsWithoutMeaning
+
+
+class CannotReconnect(IdealAnkleRobot):
+    closed = False
+
+    def configure(self):
+        super().configure()
+        if self.closed:
+            raise OSError("the port is still open")
+
+    def close(self):
+        super().close()
+        self.closed = True
+
+
+class FailsToDeactivate(IdealAnkleRobot):
+    def deactivate(self):
+        raise OSError("no answer")
+
+
+class PushesWithoutTrain(IdealAnkleRobot):
+    def promise(self, until):
+        profile = super().promise(until)
+        return replace(profile, torques=tuple(torque + 0.6 for torque in profile.torques))
+
+
+class FaultWhileAllIsWell(IdealAnkleRobot):
+    def read(self):
+        return [replace(s, faults=(Fault("odd", "Nothing is wrong."),)) for s in super().read()]
+
+
+class SwallowsAPulse(IdealAnkleRobot):
+    def schedule(self, train):
+        super().schedule(replace(train, count=max(train.count - 1, 1)))
+
+
+class WrongSign(IdealAnkleRobot):
+    def schedule(self, train):
+        super().schedule(replace(train, torque=-train.torque))
+
+
+class OnsetsNotTold(IdealAnkleRobot):
+    def promise(self, until):
+        return replace(super().promise(until), onsets=())
+
+
+class HalfTheImpulse(IdealAnkleRobot):
+    def schedule(self, train):
+        super().schedule(replace(train, duration=train.duration / 2))
+
+
+class DependsOnTheCuts(EmulatedAnkleRobot):
+    """Lets its torque follow once more at the end of each promise."""
+
+    def promise(self, until):
+        profile = super().promise(until)
+        self._torque *= 0.9
+        return profile
+
+
+class Overshoots(IdealAnkleRobot):
+    def schedule(self, train):
+        super().schedule(replace(train, torque=1.3 * train.torque))
+
+
+class Saturates(IdealAnkleRobot):
+    def schedule(self, train):
+        super().schedule(replace(train, torque=min(max(train.torque, -10.0), 10.0)))
+
+
+class CannotRefuse(IdealAnkleRobot):
+    """Claims any train before the guard has a say: only the kit can tell."""
+
+    def begin(self, start):
+        super().begin(start)
+        self._begun_at = start
+
+    def promise(self, until):
+        profile = super().promise(until)
+        if self._train is None and until - self._begun_at > 200_000_000:
+            return replace(profile, torques=tuple(2.0 for _ in profile.torques))
+        return profile
+
+
+class GoesOnAfterCancelling(IdealAnkleRobot):
+    def cancel(self):
+        pass
+
+
+class DeafAfterCancelling(IdealAnkleRobot):
+    cancelled = False
+
+    def cancel(self):
+        super().cancel()
+        self.cancelled = True
+
+    def schedule(self, train):
+        if not self.cancelled:
+            super().schedule(train)
+
+
+class GoesOnAfterAStop(IdealAnkleRobot):
+    def stop(self):
+        pass
+
+
+class StopRaises(IdealAnkleRobot):
+    def stop(self):
+        super().stop()
+        raise OSError("no bus")
+
+
+class CloseRaises(IdealAnkleRobot):
+    def close(self):
+        super().close()
+        raise OSError("no bus")
+
+
+class StopBlocks(IdealAnkleRobot):
+    def stop(self):
+        super().stop()
+        time.sleep(1.2)
+
+
+class TakesTrainsAfterAStop(IdealAnkleRobot):
+    def stop(self):
+        self._train = None
+
+
+class RemembersItsTrain(IdealAnkleRobot):
+    """Keeps the train across close and begin."""
+
+    kept = None
+
+    def schedule(self, train):
+        super().schedule(train)
+        self.kept = train
+
+    def begin(self, start):
+        super().begin(start)
+        self._train = self.kept
+
+
+class DoesNotAdjoin(IdealAnkleRobot):
+    def promise(self, until):
+        profile = super().promise(until)
+        return replace(profile, times=(profile.times[0] + 1, *profile.times[1:]))
+
+
+class TellsNan(IdealAnkleRobot):
+    def promise(self, until):
+        profile = super().promise(until)
+        return replace(profile, torques=tuple(math.nan for _ in profile.torques))
+
+
+class StatesGoBack(EmulatedAnkleRobot):
+    def read(self):
+        return list(super().read())[::-1]
+
+
+class StatesAreRare(EmulatedAnkleRobot):
+    def read(self):
+        return list(super().read())[::2]
+
+
+class StatesWithoutMeasurement(EmulatedAnkleRobot):
+    def read(self):
+        return [replace(state, measured=math.nan) for state in super().read()]
+
+
+class CommandsNotTold(EmulatedAnkleRobot):
+    def read(self):
+        return [replace(state, commanded=0.0) for state in super().read()]
+
+
+class ComesLate(IdealAnkleRobot):
+    def schedule(self, train):
+        super().schedule(replace(train, first_onset=train.first_onset + 80_000_000))
+
+
+class ComesEarly(IdealAnkleRobot):
+    def schedule(self, train):
+        super().schedule(replace(train, first_onset=train.first_onset - 5_000_000))
+
+
+class Dawdles(IdealAnkleRobot):
+    def promise(self, until):
+        time.sleep(0.012)
+        return super().promise(until)
+
+
+class Hangs(IdealAnkleRobot):
+    calls = 0
+
+    def promise(self, until):
+        self.calls += 1
+        if self.calls == 30:
+            time.sleep(0.25)
+        return super().promise(until)
+
+
+# Each with the checks that must catch it, and a word of the sentence.
+BROKEN = [
+    (NoPeakTorque, "construction", "peak_torque is 0"),
+    (UnexplainedOptions, "construction", "speed does not tell its meaning"),
+    (CannotReconnect, "lifecycle", "port is still open"),
+    (CannotReconnect, "reconnecting", "port is still open"),
+    (FailsToDeactivate, "lifecycle", "Deactivating failed: driver_failed"),
+    (PushesWithoutTrain, "idle", "0.6 N m without a train"),
+    (PushesWithoutTrain, "order", "without a train"),
+    (FaultWhileAllIsWell, "idle", "fault: odd"),
+    (FaultWhileAllIsWell, "states", "reports odd|latched"),
+    (SwallowsAPulse, "pulses", "Onsets"),
+    (SwallowsAPulse, "one_at_a_time", "1 of 2 pulses"),
+    (WrongSign, "pulses", "had -"),
+    (OnsetsNotTold, "pulses", "Onsets"),
+    (HalfTheImpulse, "pulses", "had 0.6 N m s"),
+    (DependsOnTheCuts, "cuts", "asked in pieces"),
+    (Overshoots, "at_limits", "torque_exceeded"),
+    (Saturates, "at_limits", "reached 10 N m"),
+    (CannotRefuse, "beyond_limits", "although every train was refused"),
+    (GoesOnAfterCancelling, "cancelling", "after cancelling"),
+    (DeafAfterCancelling, "cancelling", "No torque came"),
+    (GoesOnAfterAStop, "stopping_in_mid_pulse", "after the stop"),
+    (StopBlocks, "stopping_in_mid_pulse", "did not return"),
+    (StopRaises, "stopping_in_every_state", "raised OSError"),
+    (CloseRaises, "stopping_in_every_state", "raised OSError"),
+    (TakesTrainsAfterAStop, "stopping_in_every_state", "delivered a train"),
+    (RemembersItsTrain, "new_run", "run before"),
+    (RemembersItsTrain, "reconnecting", "after reconnecting"),
+    (DoesNotAdjoin, "idle", "does not adjoin"),
+    (TellsNan, "idle", "not all finite"),
+    (StatesGoBack, "states", "not ascending"),
+    (StatesAreRare, "states", "States came at 2.. Hz"),
+    (StatesWithoutMeasurement, "states", "measured torque of nan"),
+    (StatesWithoutMeasurement, "timing", "show in no state"),
+    (CommandsNotTold, "states", "No state shows"),
+    (ComesLate, "timing", r"\+80.0 ms"),
+    (ComesEarly, "timing", "show in no state"),
+    (Dawdles, "prompt_calls", "Nine in ten calls"),
+    (Hangs, "prompt_calls", "slowest 2"),
+]  # fmt: skip

@@ -1,0 +1,274 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The CAN driver against the motor emulator in another process, hazards included."""
+
+import signal
+import subprocess
+import sys
+import time
+
+import can
+import pytest
+
+from gait_entrainment.conventions import Side
+from gait_entrainment.robot import DeviceError, LimitError, PulseTrain, TimingAudit, find_driver
+from gait_entrainment_drivers.ak_mit import ENTER, EXIT, MOTORS, Command, pack_command
+from gait_entrainment_drivers.ak_mit_can import AkMitCanOptions, AkMitCanRobot
+from gait_entrainment_drivers.ak_motor_emulator import EmulatedAkMotor
+
+from .emulator_process import emulator, read_trace, until
+
+MS = 1_000_000
+
+
+def robot_on(driver, **options):
+    text = driver + "".join(f",{key}={value}" for key, value in options.items())
+    return find_driver(text).make(Side.RIGHT)
+
+
+def enabled(robot):
+    robot.configure()
+    robot.activate()
+    robot.arm()
+    robot.begin(time.time_ns())
+    return robot
+
+
+def pulses(robot, count=2, torque=8.0, duration=0.15, after=0.1):
+    first = time.time_ns() + round(after * 1e9)
+    robot.schedule(PulseTrain(Side.RIGHT, first, 0.7, count, torque, duration))
+    return first
+
+
+def follow(robot, seconds):
+    """Promise and read until a time is over; return profiles and states."""
+    profiles, states = [], []
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        robot.heard()
+        profiles.append(robot.promise(time.time_ns()))
+        states += robot.read()
+        if robot.faults:
+            break
+        time.sleep(0.01)
+    return profiles, states
+
+
+@pytest.mark.parametrize("reply_bytes", [6, 8])
+def test_pulses_arrive_and_are_measured(reply_bytes, tmp_path):
+    trace = tmp_path / "trace"
+    with (
+        emulator("--reply-bytes", str(reply_bytes), "--loss", "0.02", trace=trace) as driver,
+        robot_on(driver) as robot,
+    ):
+        enabled(robot)
+        first = pulses(robot)
+        profiles, states = follow(robot, 1.3)
+        assert not robot.faults
+    onsets = [onset for profile in profiles for onset in profile.onsets]
+    assert onsets == [first, first + 700 * MS]
+    pieces = [
+        (begin, end, torque)
+        for profile in profiles
+        for begin, end, torque in zip(
+            profile.times, [*profile.times[1:], profile.valid_until], profile.torques, strict=True
+        )
+    ]
+    impulse = sum((end - begin) / 1e9 * torque for begin, end, torque in pieces)
+    # Two pulses of 8 N m and 0.15 s, up to the ticks of the loop and frames that were lost.
+    assert impulse == pytest.approx(2 * 8 * 0.15, rel=0.15)
+    audit = TimingAudit()
+    for onset in onsets:
+        audit.add_pulse(onset, 8.0, 0.15)
+    timings = [*audit.add_states(states), *audit.finish()]
+    for timing in timings:
+        assert timing.commanded <= timing.sent
+        # Interpolated between two states: a motor that answers within the tick in which it was
+        # told is placed up to a tick earlier.
+        before = max(state.stamp for state in states if state.stamp < timing.sent)
+        assert before <= timing.measured
+    rows = read_trace(trace)
+    assert rows[-1][1] == pytest.approx(0.0, abs=0.01)  # zero before the end
+    assert max(row[2] for row in rows) == pytest.approx(8.0, abs=0.05)
+
+
+def test_it_is_refused_without_arming():
+    with emulator() as driver, robot_on(driver) as robot:
+        robot.configure()
+        robot.activate()
+        robot.begin(time.time_ns())
+        with pytest.raises(DeviceError, match="not armed"):
+            pulses(robot)
+
+
+def test_a_pulse_that_is_over_already_is_refused_without_a_fault():
+    with emulator() as driver, robot_on(driver) as robot:
+        enabled(robot)
+        robot.promised_until = 0
+        with pytest.raises(LimitError, match="is over by"):
+            pulses(robot, after=-0.5)
+        assert not robot.faults
+
+
+def test_a_silent_motor_is_a_fault_and_ends_the_train():
+    with emulator("--silent-after", "0.05") as driver, robot_on(driver) as robot:
+        enabled(robot)
+        pulses(robot, duration=0.3)
+        _, states = follow(robot, 5.0)
+        assert [fault.name for fault in robot.faults] == ["device_silent"]
+        assert robot.train is None
+        assert states[-1].commanded == 0.0 or robot.read()[-1].commanded == 0.0
+
+
+def test_an_error_of_the_motor_is_a_fault_with_its_name():
+    with emulator("--error", "2", "--error-after", "0.05") as driver, robot_on(driver) as robot:
+        enabled(robot)
+        pulses(robot, duration=0.3)
+        follow(robot, 5.0)
+        assert [fault.name for fault in robot.faults] == ["over_current"]
+        with pytest.raises(DeviceError, match="latched"):
+            pulses(robot)
+        # Recovery is an explicit step, and is refused while the error is there.
+        robot.close()
+        with pytest.raises(DeviceError, match=r"over-current\. Remove the cause"):
+            robot.configure()
+
+
+def test_a_stop_in_mid_pulse_brings_zero_and_reconnecting_works(tmp_path):
+    trace = tmp_path / "trace"
+    with emulator(trace=trace) as driver, robot_on(driver) as robot:
+        enabled(robot)
+        pulses(robot, duration=0.3)
+        until(lambda: max((row[1] for row in read_trace(trace)), default=0.0) > 7)
+        robot.stop()
+        until(lambda: abs(read_trace(trace)[-1][2]) < 0.05)
+        robot.close()
+        enabled(robot)
+        pulses(robot)
+        profiles, _ = follow(robot, 0.4)
+        assert max(torque for profile in profiles for torque in profile.torques) > 7
+
+
+_HOST = """
+import sys, time
+from gait_entrainment.conventions import Side
+from gait_entrainment.robot import PulseTrain, find_driver
+robot = find_driver(sys.argv[1]).make(Side.RIGHT)
+robot.configure(); robot.activate(); robot.arm()
+robot.begin(time.time_ns())
+robot.schedule(PulseTrain(Side.RIGHT, time.time_ns() + 100_000_000, 9.0, 1, 8.0, 0.5))
+{end}
+time.sleep(30)
+"""
+
+
+def host_that(end, driver):
+    return subprocess.Popen(
+        [sys.executable, "-c", _HOST.format(end=end), driver], stderr=subprocess.DEVNULL
+    )
+
+
+def torque_of(trace):
+    return [row for row in read_trace(trace) if row[1] > 7]
+
+
+def test_a_killed_host_leaves_the_motor_pushing_unless_its_own_watchdog_is_on(tmp_path):
+    """The hazard that no software on the host can remove."""
+    held, guarded = tmp_path / "held", tmp_path / "guarded"
+    for trace, timeout in ((held, "0"), (guarded, "0.05")):
+        with emulator("--timeout", timeout, trace=trace) as driver:
+            host = host_that("", driver)
+            until(lambda trace=trace: trace.exists() and torque_of(trace))
+            host.send_signal(signal.SIGKILL)
+            host.wait(10)
+            lines = len(read_trace(trace))
+            until(lambda trace=trace, lines=lines: len(read_trace(trace)) > lines + 400)
+    assert read_trace(held)[-1][2] == pytest.approx(8.0, abs=0.1)
+    assert read_trace(guarded)[-1][2] == pytest.approx(0.0, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    "end",
+    [
+        "time.sleep(0.3); raise SystemExit",
+        "time.sleep(0.3)\nwith robot: raise ValueError",
+    ],
+)
+def test_a_host_that_ends_by_itself_leaves_zero_torque(end, tmp_path):
+    trace = tmp_path / "trace"
+    with emulator(trace=trace) as driver:
+        host = host_that(end, driver)
+        host.wait(20)
+        assert torque_of(trace)
+        until(lambda: abs(read_trace(trace)[-1][1]) < 0.01)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ("motor=AK70-9", "motor: 'AK70-9'; allowed: AK60-6, AK70-10"),
+        ("motor_id=0", "motor_id: '0'; allowed: 1 to 127"),
+        ("motor_id=one", "motor_id: 'one'"),
+        ("ratio=0", "ratio: 0"),
+        ("rate=5000", "rate: '5000'"),
+    ],
+)
+def test_a_wrong_option_is_told_in_one_line(options, words):
+    with pytest.raises(LimitError, match=words) as error:
+        find_driver(f"ak_mit_can:{options}")
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ("interface=socketcan,channel=nosuchcan7", "nosuchcan7 cannot be opened"),
+        ("interface=nosuchbus", "nosuchbus can0 cannot be opened"),
+        (
+            "interface=virtual,channel=empty",
+            "motor 1 does not answer in MIT mode on virtual empty",
+        ),
+    ],
+)
+def test_a_missing_bus_or_motor_is_told_in_one_line(options, words):
+    robot = find_driver(f"ak_mit_can:{options}").make(Side.RIGHT)
+    with pytest.raises(DeviceError, match=words) as error:
+        robot.configure()
+    assert "\n" not in str(error.value)
+    assert not robot.enabled
+
+
+def test_another_motors_id_is_named():
+    with (
+        emulator("--motor-id", "5") as driver,
+        pytest.raises(DeviceError, match="motor 1 does not answer"),
+    ):
+        robot_on(driver).configure()
+
+
+def test_the_emulated_motor_holds_its_command_across_modes_as_the_real_one_does():
+    motor = EmulatedAkMotor(MOTORS["AK80-9"], 1, bandwidth=1e3, timeout=0.0, reply_bytes=8)
+    ten = pack_command(Command(torque=10.0), MOTORS["AK80-9"])
+    motor.receive(ten, 0.0)
+    motor.advance(1.0)
+    assert motor.torque == 0.0  # not enabled
+    motor.receive(ENTER, 1.0)
+    motor.advance(100.0)
+    assert motor.torque == pytest.approx(10.0, abs=0.01)  # the command from before, for ever
+    motor.receive(EXIT, 100.0)
+    motor.advance(101.0)
+    assert motor.torque == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_bus_on_which_answers_never_end_does_not_hold_the_loop_up():
+    class Babbling:
+        def recv(self, timeout):
+            assert timeout >= 0
+            assert time.monotonic() < begun + 1.0, "the loop reads on and on"
+            return can.Message(arbitration_id=1, is_extended_id=False)
+
+    begun = time.monotonic()
+    robot = AkMitCanRobot(Side.RIGHT, AkMitCanOptions(), 0)
+    robot._bus = Babbling()
+    assert robot._answer(lambda _: 5.0, begun + 0.02) == 5.0

@@ -1,0 +1,153 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The conformance kit: drivers that keep their promises pass, and every broken one is caught."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from dataclasses import replace
+
+import pytest
+
+from gait_entrainment.commands import main
+from gait_entrainment.robot import conformance, find_driver
+from gait_entrainment.robot.drivers import OWN_DRIVERS, Driver
+from gait_entrainment_drivers.conformance import CHECKS, Tolerances, run_check, run_checks
+
+from .broken_robots import BROKEN
+from .emulator_process import emulator
+
+# A machine that others share wakes a process up late: the kit's own limits are for a quiet one.
+PATIENT = Tolerances(onset=0.25, zero_within=1.0, call=0.1, slowest_call=2.0, impulse=0.6)
+
+
+@pytest.mark.parametrize(
+    "text", ["ideal", "emulated", "emulated:bandwidth=8,delay=0.03,noise=0.2,state_rate=1000"]
+)
+def test_the_simulated_drivers_keep_every_promise(text):
+    results = list(run_checks(find_driver(text)))
+    assert [result for result in results if not result.kept] == []
+    assert len(results) == len(CHECKS)
+
+
+def test_the_can_driver_keeps_every_promise():
+    with emulator() as text:
+        results = list(run_checks(find_driver(text), PATIENT))
+    assert [result for result in results if not result.kept] == []
+    figures = {result.check: result.figures for result in results}
+    assert figures["timing"]["median_ms"] > 0
+    assert "time_to_zero_ms" in figures["stopping_in_mid_pulse"]
+
+
+@pytest.mark.parametrize(
+    ("broken", "check", "words"), BROKEN, ids=[f"{b.__name__}-{c}" for b, c, _ in BROKEN]
+)
+def test_a_broken_driver_is_caught(broken, check, words):
+    driver = Driver("broken", broken, broken.Options())
+    result = run_check(getattr(conformance, check), driver)
+    assert re.search(words, result.broken), result.broken
+    assert "\n" not in result.broken
+
+
+def test_every_check_can_fail():
+    caught = {check for _, check, _ in BROKEN}
+    # Those that need real time, or a fault in the guard itself, are caught below.
+    assert {check.__name__ for check in CHECKS} - caught == {"stale_commands"}
+
+
+def test_silence_that_nobody_notices_is_caught(monkeypatch):
+    from gait_entrainment.robot.guard import GuardedRobot
+
+    monkeypatch.setattr(GuardedRobot, "_watch", lambda _: None)
+    with emulator() as text:
+        result = run_check(conformance.stale_commands, find_driver(text), PATIENT)
+    assert "silence was not noticed" in result.broken
+
+
+def test_the_command_prints_a_sentence_for_each_promise(capsys):
+    assert main(["driver", "check", "ideal"]) == 0
+    out = capsys.readouterr().out
+    assert out.count("kept   ") == len(CHECKS)
+    assert main(["driver", "check", "ideal", "--json"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["broken"] == 0
+    assert {check["check"] for check in report["checks"]} == {c.__name__ for c in CHECKS}
+
+
+def test_a_broken_promise_is_exit_code_1(capsys, monkeypatch):
+    monkeypatch.setitem(OWN_DRIVERS, "late", "late:Late")
+    late = next(b for b, check, _ in BROKEN if b.__name__ == "ComesLate")
+    monkeypatch.setattr("gait_entrainment.robot.drivers._load", lambda *_: late)
+    assert main(["driver", "check", "late"]) == 1
+    out, err = capsys.readouterr()
+    assert "BROKEN timing" in out
+    assert "+80.0 ms" in out
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["nobody"], "'nobody' is unknown; allowed: .*ideal"),
+        (["ideal:x=1"], "option 'x=1'; allowed: none"),
+        (["ideal", "--torque", "nan"], "--torque: nan"),
+        (["ak_mit_can"], "applies real torque.*--arm"),
+        (["ak_mit_can:motor=AK1", "--arm"], "motor: 'AK1'; allowed: AK60-6"),
+        (["ak_mit_can:channel=nosuchcan7", "--arm"], "nosuchcan7 cannot be opened"),
+        (["ak_mit_can:interface=virtual,channel=x", "--arm"], "motor 1 does not answer"),
+    ],
+)
+def test_a_mistake_gives_one_line(capsys, arguments, words):
+    assert main(["driver", "check", *arguments]) == 1
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    assert re.search(words, err)
+
+
+def test_the_list_tells_every_driver_and_option(capsys):
+    assert main(["driver", "list"]) == 0
+    out = capsys.readouterr().out
+    for words in ("ideal: ", "emulated: ", "ak_mit_can: ", "motor=AK80-9", "AK60-6, AK70-10"):
+        assert words in out
+    assert "bandwidth=20.0 Hz  torque bandwidth (-3 dB) of the lag; 0.5 to 300" in out
+    assert main(["driver", "list", "--json"]) == 0
+    listed = json.loads(capsys.readouterr().out)
+    assert "torque bandwidth" in listed["emulated"]["options"][0]["meaning"]
+
+
+def run_plugin(folder, *options):
+    (folder / "test_it.py").write_text(
+        "def test_it(ankle_robot_check):\n    ankle_robot_check()\n"
+    )
+    command = [sys.executable, "-m", "pytest", "-q", "--disable-plugin-autoload", "-p"]
+    command += ["gait_entrainment_drivers.pytest_plugin", "-p", "no:cacheprovider", *options]
+    # What colcon test asks of the outer pytest is not for this one.
+    environment = {k: v for k, v in os.environ.items() if k != "PYTEST_ADDOPTS"}
+    return subprocess.run(
+        [*command, "--rootdir", str(folder), str(folder)],
+        capture_output=True, text=True, cwd=folder, check=False, env=environment,
+    )  # fmt: skip
+
+
+def test_the_plugin_makes_one_test_of_each_check(tmp_path):
+    (tmp_path / "pytest.ini").write_text("[pytest]\nankle_robots = ideal\n")
+    done = run_plugin(tmp_path, "--ankle-robot", "emulated:delay=0.08")
+    # Late by more than the kit allows: the one promise that is broken.
+    assert done.returncode == 1
+    assert f"1 failed, {2 * len(CHECKS) - 1} passed" in done.stdout
+    assert "allowed: -2.0 to +60.0 ms" in done.stdout
+
+
+def test_the_plugin_leaves_real_torque_alone(tmp_path):
+    done = run_plugin(tmp_path, "--ankle-robot", "ak_mit_can")
+    assert f"{len(CHECKS)} skipped" in done.stdout
+
+
+def test_tolerances_are_the_labs_own():
+    strict = replace(Tolerances(), onset=0.001)
+    result = run_check(conformance.timing, find_driver("emulated"), strict)
+    assert "allowed: -2.0 to +1.0 ms" in result.broken

@@ -1,0 +1,226 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The CAN drivers frame by frame: transmission, foreign frames, order of what is sent."""
+
+import math
+
+import can
+import pytest
+
+from gait_entrainment.conventions import Side
+from gait_entrainment.robot import DeviceError, odrive_can
+from gait_entrainment_drivers.ak_mit import (
+    ENTER,
+    EXIT,
+    FAULTS,
+    MOTORS,
+    AkMotor,
+    Command,
+    Reply,
+    pack_command,
+    pack_reply,
+    resolution,
+)
+from gait_entrainment_drivers.ak_mit_can import AkMitCanOptions, AkMitCanRobot
+from gait_entrainment_drivers.ak_motor_emulator import EmulatedAkMotor
+from gait_entrainment_drivers.odrive import (
+    CLOSED_LOOP,
+    ENCODER,
+    HEARTBEAT,
+    IDLE,
+    STOP,
+    TORQUE_MODE,
+    TORQUES,
+    Heartbeat,
+    frame_id,
+    pack_heartbeat,
+    pack_pair,
+    pack_state,
+)
+from gait_entrainment_drivers.odrive_can import OdriveCanOptions, OdriveCanRobot
+from gait_entrainment_drivers.odrive_emulator import EmulatedOdrive
+
+AK = MOTORS["AK80-9"]
+RATIOS = [-9.0, -0.5, 1.0, 3.0]
+
+
+class Wire:
+    """A bus with one motor on it; a second passes with each frame, so that torque settles."""
+
+    def __init__(self, motor):
+        self.motor = motor
+        self.sent = []
+        self.strongest = 0.0  # torque that the motor ever showed [N m]
+        self.waiting = []
+        self.now = 0.0
+
+    def send(self, message):
+        data = bytes(message.data)
+        self.sent.append(data)
+        assert not message.is_extended_id
+        self.now += 1.0
+        replies = self.motor.obey(
+            message.arbitration_id, data, remote=message.is_remote_frame, now=self.now
+        )
+        self.motor.advance(self.now + 0.5)
+        self.strongest = max(self.strongest, abs(self.motor.torque))
+        self.waiting += [
+            can.Message(arbitration_id=identifier, data=answer, is_extended_id=False)
+            for identifier, answer in replies
+        ]
+
+    def recv(self, timeout):  # noqa: ARG002
+        return self.waiting.pop(0) if self.waiting else None
+
+    def shutdown(self):
+        pass
+
+
+def ak(ratio=1.0, motor=None):
+    robot = AkMitCanRobot(Side.RIGHT, AkMitCanOptions(ratio=ratio), 0)
+    robot._bus = Wire(motor or EmulatedAkMotor(AK, 1, 100.0, 0.0, 8))
+    return robot, robot._bus
+
+
+def odrive(ratio=1.0):
+    robot = OdriveCanRobot(Side.RIGHT, OdriveCanOptions(ratio=ratio), 0)
+    robot._bus = Wire(EmulatedOdrive(0, 100.0, 0.0))
+    return robot, robot._bus
+
+
+@pytest.mark.parametrize("make", [ak, odrive])
+@pytest.mark.parametrize("ratio", RATIOS)
+def test_torque_goes_through_the_transmission_and_back(make, ratio):
+    robot, wire = make(ratio)
+    robot._enable()
+    assert robot.capabilities.peak_torque == pytest.approx(18.0 * abs(ratio))
+    step = resolution(AK)
+    for torque in (4.0, -2.5):
+        robot._exchange(torque, 0.01)
+        assert wire.motor.torque == pytest.approx(torque / ratio, abs=step)
+        reading = robot._exchange(torque, 0.01)
+        assert reading.torque == pytest.approx(torque, abs=2 * step * abs(ratio))
+    robot._exchange(0.0, 0.01)
+    if make is ak:  # zero has no code of its own
+        assert robot._exchange(0.0, 0.01).torque == 0.0
+
+
+@pytest.mark.parametrize("ratio", RATIOS)
+def test_angle_and_torque_are_the_ankles(ratio):
+    robot, wire = ak(ratio)
+    wire.motor = Telling([(0, pack_reply(Reply(1, 1.5, 0.0, 0.0), AK, 8))])
+    assert robot._exchange(0.0, 0.01).angle == pytest.approx(1.5 / ratio, abs=1e-3 / abs(ratio))
+    robot, wire = odrive(ratio)
+    estimates = pack_pair(0.25, 0.0)  # a quarter of a turn
+    wire.motor = Telling(
+        [(frame_id(0, ENCODER), estimates), (frame_id(0, TORQUES), pack_pair(7.0, 2.0))]
+    )
+    reading = robot._exchange(7.0, 0.01)
+    assert reading.angle == pytest.approx(math.pi / 2 / ratio)
+    assert reading.torque == pytest.approx(2.0 * ratio)  # the estimate, not the target
+
+
+def test_an_odrive_whose_heartbeat_is_switched_off_is_asked_for_it(monkeypatch):
+    monkeypatch.setattr(odrive_can, "HEARTBEAT_PERIOD", 0.0)
+    robot, wire = odrive()  # this bus carries answers only
+    robot._enable()
+    assert robot._exchange(1.0, 0.01).faults == ()
+    wire.motor.obey(frame_id(0, STOP), b"", remote=False, now=wire.now)
+    assert [fault.name for fault in robot._exchange(1.0, 0.01).faults] == ["emergency_stop"]
+
+
+class Telling:
+    """A motor that answers each frame in the same way."""
+
+    torque = 0.0
+
+    def __init__(self, frames):
+        self.frames = frames
+
+    def obey(self, identifier, data, *, remote, now):  # noqa: ARG002
+        return self.frames
+
+    def advance(self, now):
+        pass
+
+
+@pytest.mark.parametrize("make", [ak, odrive])
+def test_a_command_that_the_motor_still_holds_is_never_delivered(make):
+    robot, wire = make()
+    motor = wire.motor
+    if make is odrive:
+        motor._mode = TORQUE_MODE
+    motor.command = 10.0  # of a host that was killed
+    robot._enable()
+    assert motor.enabled
+    assert wire.strongest < 0.01
+    robot._exchange(10.0, 0.01)
+    robot._shut()
+    assert not motor.enabled
+    assert abs(motor.command) < 0.01  # motors hold it across modes
+
+
+def test_ak_motors_get_zero_before_each_change_of_mode():
+    robot, wire = ak()
+    zero = pack_command(Command(), AK)
+    robot._enable()
+    robot._disable()
+    for change in (ENTER, EXIT):
+        assert wire.sent[wire.sent.index(change) - 1] == zero
+
+
+@pytest.mark.parametrize("make", [ak, odrive])
+def test_frames_that_are_no_data_frames_of_the_motor_are_no_answer(make):
+    robot, wire = make()
+    wire.motor = Telling([])
+    answer = pack_reply(Reply(1, 0.0, 0.0, 9.0), AK, 8)
+    identifier = 0
+    if make is odrive:
+        answer, identifier = pack_pair(9.0, 9.0), frame_id(0, TORQUES)
+    for kind in ("is_extended_id", "is_remote_frame", "is_error_frame"):
+        flags = {"is_extended_id": False, kind: True}
+        data = b"" if kind == "is_remote_frame" else answer
+        wire.waiting.append(can.Message(arbitration_id=identifier, data=data, **flags))
+    for data in (answer[:5], answer[:7], b""):
+        wire.waiting.append(
+            can.Message(arbitration_id=identifier, data=data, is_extended_id=False)
+        )
+    assert robot._exchange(0.0, 0.05) is None
+    assert not wire.waiting
+
+
+@pytest.mark.parametrize("make", [ak, odrive])
+@pytest.mark.parametrize("torque", [-2.0, 2.0])
+def test_a_motor_with_torque_at_zero_command_is_switched_off_and_named(make, torque, monkeypatch):
+    monkeypatch.setattr("gait_entrainment_drivers.can_motor.ANSWER_TIMEOUT", 0.05)
+    robot, wire = make()
+    if make is ak:
+        frames = [(0, pack_reply(Reply(1, 0.0, 0.0, torque), AK, 8))]
+    else:
+        closed = pack_heartbeat(Heartbeat(0, CLOSED_LOOP))
+        frames = [(frame_id(0, HEARTBEAT), closed), (frame_id(0, TORQUES), pack_pair(0.0, torque))]
+    wire.motor = Telling(frames)
+    with pytest.raises(DeviceError, match=r"at zero command: is it (AK80-9|calibrated)\?"):
+        robot.activate()
+    assert wire.sent[-1] == (EXIT if make is ak else pack_state(IDLE))
+
+
+def test_what_the_manual_says():
+    assert EXIT.hex() == "fffffffffffffffd"
+    assert {
+        "AK60-6": AkMotor(45.0, 15.0),
+        "AK70-10": AkMotor(50.0, 25.0),
+        "AK80-6": AkMotor(76.0, 12.0),
+        "AK80-9": AkMotor(50.0, 18.0),
+        "AK10-9": AkMotor(50.0, 65.0),
+    } == MOTORS
+    assert [FAULTS[number].name for number in range(1, 8)] == [
+        "motor_too_hot",
+        "over_current",
+        "over_voltage",
+        "under_voltage",
+        "encoder_failed",
+        "driver_too_hot",
+        "motor_locked",
+    ]

@@ -1,0 +1,60 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A driver of another package, built apart by colcon, takes the place of ours: nothing changes."""
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[4]
+EXAMPLE = ROOT / "examples" / "pneumatic_ankle_robot"
+pytestmark = pytest.mark.skipif(not EXAMPLE.exists(), reason="the repository is not here")
+
+
+@pytest.fixture(scope="module")
+def outside(tmp_path_factory):
+    """Build the example in a workspace of its own; return what runs a command in it."""
+    workspace = tmp_path_factory.mktemp("outside")
+    shutil.copytree(EXAMPLE, workspace / "src" / EXAMPLE.name)
+
+    def run(command, *, sourced=True):
+        setup = "source install/local_setup.bash && " if sourced else ""
+        return subprocess.run(
+            ["bash", "-c", f"source {ROOT}/env.bash && {setup}{command}"],
+            cwd=workspace, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+
+    built = run("colcon --log-base log build --base-paths src", sourced=False)
+    assert built.returncode == 0, built.stdout + built.stderr
+    return run
+
+
+def test_the_driver_is_found_and_keeps_every_promise(outside):
+    assert "pneumatic: " in outside("entrain driver list").stdout
+    checked = outside("entrain driver check pneumatic:filling=0.02")
+    assert checked.returncode == 0, checked.stdout
+    assert ", 0 broken" in checked.stdout
+
+
+def test_the_experiment_runs_with_it_and_entrains(outside):
+    done = outside("entrain simulate --driver pneumatic --json")
+    outcome = json.loads(done.stdout)
+    assert outcome["entrained"] is True
+    assert outcome["parameters"]["driver"] == "pneumatic"
+    ideal = json.loads(outside("entrain simulate --json").stdout)
+    # A torque that comes 10 ms later, by half of it on average, is locked so much earlier.
+    shift = outcome["final_phase_lag"] - ideal["final_phase_lag"]
+    assert -0.010 < shift < -0.002
+
+
+def test_its_own_test_is_the_kit(outside):
+    done = outside(
+        "cd src/pneumatic_ankle_robot && python -m pytest -q --disable-plugin-autoload"
+        " -p gait_entrainment_drivers.pytest_plugin -p no:cacheprovider"
+    )
+    assert done.returncode == 0, done.stdout
+    assert "36 passed" in done.stdout

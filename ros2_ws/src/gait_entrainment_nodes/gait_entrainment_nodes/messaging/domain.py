@@ -1,0 +1,82 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A ROS domain for each run, so that concurrent runs do not hear each other."""
+
+import os
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+# Domains whose ports lie below those that Linux gives to other connections.
+DOMAINS = range(1, 102)
+# The largest domain that DDS can give ports to.
+LARGEST_DOMAIN = 232
+# Under which name claims are made.
+CLAIMS = "gait_entrainment/domain"
+
+
+class DomainError(RuntimeError):
+    """No domain can be had; the message says what to do."""
+
+
+def wanted_domain() -> int | None:
+    """Return ROS_DOMAIN_ID, None where it is unset; DomainError where it is no domain."""
+    wanted = os.environ.get("ROS_DOMAIN_ID")
+    if wanted is not None and not (wanted.isdigit() and int(wanted) <= LARGEST_DOMAIN):
+        raise DomainError(
+            f"ROS_DOMAIN_ID: {wanted!r}; allowed: 0 to {LARGEST_DOMAIN}, or unset for a free one"
+        )
+    return None if wanted is None else int(wanted)
+
+
+@contextmanager
+def claimed_domain() -> Iterator[int]:
+    """
+    Claim a ROS domain for the time of a run: ROS_DOMAIN_ID where it is set, else a free one.
+
+    A claim is the name of an abstract Unix socket. Such names belong to the network namespace,
+    and so do the ports by which runs would hear each other: it holds between users and between
+    containers that share a network, and ends with the process, however that ends.
+
+    Raises
+    ------
+    DomainError
+        where ROS_DOMAIN_ID is not a domain, or is claimed by another run.
+
+    """
+    wanted = wanted_domain()
+    for domain in DOMAINS if wanted is None else [wanted]:
+        claim = _claim(domain)
+        if claim is not None:
+            with claim:
+                yield domain
+            return
+    if wanted is None:
+        raise DomainError(f"every ROS domain from {DOMAINS[0]} to {DOMAINS[-1]} is in use")
+    raise DomainError(
+        f"ROS_DOMAIN_ID: {wanted} is in use by another run; choose another or unset it"
+    )
+
+
+def domains_in_use() -> list[int]:
+    """Return the domains in which runs of this machine go on."""
+    claimed = []
+    for domain in range(LARGEST_DOMAIN + 1):
+        claim = _claim(domain)
+        if claim is None:
+            claimed.append(domain)
+        else:
+            claim.close()
+    return claimed
+
+
+def _claim(domain: int) -> socket.socket | None:
+    """Return the socket whose name is the claim on a domain, None where another holds it."""
+    claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    try:
+        claim.bind(f"\0{CLAIMS}/{domain}")
+    except OSError:
+        claim.close()
+        return None
+    return claim

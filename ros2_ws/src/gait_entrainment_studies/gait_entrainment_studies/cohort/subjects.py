@@ -1,0 +1,97 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Simulated subjects, drawn from stated distributions. An extension: none is in the paper."""
+
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+
+from gait_entrainment.parameters import ParameterError, WalkerParameters
+from gait_entrainment_studies.locking.pulsed_gait import Floats
+
+
+def _pair(mean: float, deviation: float, meaning: str, unit: str) -> Any:
+    return field(default=(mean, deviation), metadata={"meaning": meaning, "unit": unit})
+
+
+@dataclass(frozen=True)
+class SubjectDistributions:
+    """
+    Normal distributions (mean, standard deviation), cut off at two standard deviations.
+
+    Assumptions of ours, for adults in general: the human study's own are not known here.
+
+    Raises ValueError for a mean or deviation out of range.
+    """
+
+    leg_length: tuple[float, float] = _pair(0.92, 0.05, "leg length", "m")
+    mass: tuple[float, float] = _pair(75.0, 12.0, "mass", "kg")
+    peak_torque: tuple[float, float] = _pair(
+        0.17, 0.01, "peak ankle torque over body weight x leg length", "1"
+    )
+    variation: tuple[float, float] = _pair(
+        0.02, 0.005, "coefficient of variation of the stride period", "1"
+    )
+
+    def __post_init__(self) -> None:
+        """Hold each distribution against its range."""
+        for item in fields(self):
+            mean, deviation = getattr(self, item.name)
+            # Two deviations off it must still be positive.
+            if not (mean > 2 * deviation >= 0 and mean < np.inf):
+                raise ValueError(
+                    f"{item.name} {mean:g} +/- {deviation:g} [{item.metadata['unit']}] is out of"
+                    " range; allowed: a mean above twice the deviation, none negative"
+                )
+
+
+@dataclass(frozen=True)
+class Subjects:
+    """The subjects drawn, and how many draws had no gait and were drawn again."""
+
+    walkers: tuple[WalkerParameters, ...]
+    variation: Floats
+    redrawn: int
+
+
+def draw_subjects(distributions: SubjectDistributions, count: int, seed: int) -> Subjects:
+    """Draw subjects; feet are 0.2 leg lengths and angles those of Table 1, as in the paper."""
+    generator = np.random.default_rng(seed)
+    table_1 = WalkerParameters()
+    turn = table_1.max_plantarflexion - table_1.double_stance_start
+    walkers: list[WalkerParameters] = []
+    variation: list[float] = []
+    redrawn = 0
+    while len(walkers) < count:
+        values = {
+            item.name: _truncated(generator, *getattr(distributions, item.name))
+            for item in fields(distributions)
+        }
+        length, mass = values["leg_length"], values["mass"]
+        torque = values["peak_torque"] * mass * table_1.gravity * length
+        try:
+            walker = WalkerParameters(
+                mass=mass,
+                leg_length=length,
+                foot_length=0.2 * length,
+                ankle_stiffness=torque / turn,
+            )
+        except ParameterError:
+            redrawn += 1
+            if redrawn > 20 * count:
+                raise ValueError(
+                    "peak_torque: hardly a subject drawn has a gait; allowed: about 0.14 to 0.21"
+                ) from None
+            continue
+        walkers.append(walker)
+        variation.append(values["variation"])
+    return Subjects(tuple(walkers), np.array(variation), redrawn)
+
+
+def _truncated(generator: np.random.Generator, mean: float, deviation: float) -> float:
+    while True:
+        value = generator.standard_normal()
+        if abs(value) <= 2:
+            return float(mean + deviation * value)

@@ -1,0 +1,100 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+For which ankle stiffness a period-one gait exists, at one leg angle and along it.
+
+Below the just-vault-over stiffness the walker falls; above the just-fly-off stiffness the leading
+leg would have to pull. Both are closed forms but for a search over double stance (parameters).
+"""
+
+import math
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+
+from gait_entrainment.parameters import ParameterError, WalkerParameters
+
+
+class Limit(str, Enum):
+    """Where in the gait the end of the range is felt."""
+
+    APEX = "apex of single stance"
+    DOUBLE_STANCE = "within double stance"
+    HEEL_STRIKE = "beginning of double stance"
+    BEFORE_HEEL_STRIKE = "end of single stance"
+
+
+@dataclass(frozen=True)
+class StiffnessRange:
+    """Stiffness [N m/rad] between which a gait exists; none where the range is empty."""
+
+    leg_angle: float
+    just_vault_over: float
+    just_fly_off: float
+    falls_at: Limit
+    flies_off_at: Limit
+
+    @property
+    def exists(self) -> bool:
+        """Whether any stiffness gives a gait at this leg angle."""
+        return self.just_vault_over < self.just_fly_off
+
+
+class _AnyStiffness(WalkerParameters):
+    """A walker whose linkage closes, with a gait or without: to ask where a gait would end."""
+
+    def _check_gait(self) -> None:
+        """Accept any stiffness."""
+
+    def range(self) -> StiffnessRange:
+        # Eq. 9 takes the barrier at the apex; a higher one can only be in double stance.
+        apex = self.mass * self.gravity * self._apex_height
+        needed = apex / self._energy_per_stiffness(self.max_plantarflexion)
+        at_apex = self.toe_off_angle > 0 and self.just_vault_over_stiffness == needed
+        start = self.double_stance_start
+        fly_off = {
+            Limit.HEEL_STRIKE: self._hold(start) / self._lift_per_stiffness(start),
+            Limit.BEFORE_HEEL_STRIKE: self._hold_before_collision / self._lift_before_collision,
+        }
+        # The search over double stance includes its ends, so equal means there.
+        least = self.just_fly_off_stiffness
+        place = Limit.DOUBLE_STANCE
+        for limit, stiffness in fly_off.items():
+            if math.isclose(stiffness, least, rel_tol=1e-12):
+                place = limit
+        return StiffnessRange(
+            self.leg_angle,
+            self.just_vault_over_stiffness,
+            least,
+            Limit.APEX if at_apex else Limit.DOUBLE_STANCE,
+            place,
+        )
+
+
+def stiffness_range(
+    parameters: WalkerParameters, leg_angle: float | None = None
+) -> StiffnessRange:
+    """
+    Return the range of stiffness with a gait, all else as in `parameters`.
+
+    Raises ParameterError where the linkage does not close at the leg angle [rad].
+    """
+    values = {name: getattr(parameters, name) for name in parameters.__dataclass_fields__}
+    walker = _AnyStiffness(**values)
+    if leg_angle is not None:
+        walker = replace(walker, leg_angle=leg_angle)
+    return walker.range()
+
+
+def existence_map(parameters: WalkerParameters, points: int = 200) -> list[StiffnessRange]:
+    """Return the ranges along the leg angle, over all angles at which the linkage closes."""
+    least = math.asin(parameters.foot_length / (2 * parameters.leg_length))
+    ranges = []
+    for leg_angle in np.linspace(least, math.pi / 4, points + 2)[1:-1]:
+        try:
+            ranges.append(stiffness_range(parameters, float(leg_angle)))
+        except ParameterError:
+            continue
+    return ranges

@@ -1,0 +1,259 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Branches of locked gaits, their borders, and the locked gaits at one pulse period.
+
+Along each branch (pulse begins before double stance, inside it, or outlasts it) the period is a
+smooth function of where the pulse lies. The branches meet in corners, where a border of the pulse
+meets heel strike or toe-off. So the pulse periods with a stable lock are intervals that end in a
+corner or in a fold, and both are solved for, not searched by simulation.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from scipy.optimize import brentq
+
+from gait_entrainment_studies.locking.pulsed_gait import Floats, Gaits, PulsedGait
+
+# The scan along a branch, closer at its ends, where periods bend most, but not at the corners
+# themselves, where rounding would tell. What it brackets is then solved for, so its step decides
+# only what could be overlooked.
+_SCAN = 0.5 - 0.5 * np.cos(np.linspace(1e-3, np.pi - 1e-3, 65))
+
+# Borders are solved to this ankle angle [rad]: at 0.1 rad/s and faster, below 1e-11 s.
+_ANGLE_TOLERANCE = 1e-12
+
+# Right beside a turn [rad].
+_BESIDE = 1e-8
+
+# Whether a gait is feasible, stable, and on a branch with a growing period.
+_Marks = tuple[bool, bool, bool]
+
+
+class Place(str, Enum):
+    """Where the pulse of a gait lies."""
+
+    EARLY = "pulse begins before double stance"
+    INSIDE = "pulse inside double stance"
+    LATE = "pulse outlasts double stance"
+
+
+class Border(str, Enum):
+    """What ends a piece of a branch."""
+
+    END_AT_HEEL_STRIKE = "corner: pulse end at heel strike"
+    START_AT_HEEL_STRIKE = "corner: pulse start at heel strike"
+    END_AT_TOE_OFF = "corner: pulse end at toe-off"
+    START_AT_TOE_OFF = "corner: pulse start at toe-off"
+    FOLD = "fold"
+    FLIP = "flip"
+    NEIMARK_SACKER = "Neimark-Sacker"
+    NO_GAIT = "fall or fly-off"
+
+
+@dataclass(frozen=True)
+class End:
+    """One end of a piece of a branch: what it is, and the gait there."""
+
+    border: Border
+    angle: float
+    """Ankle angle that parametrizes the branch [rad]."""
+    period: float
+    onset: float
+    lag: float
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Part of a branch along which the period is monotone and the stability the same."""
+
+    place: Place
+    first: End
+    last: End
+    feasible: bool
+    stable: bool
+
+    @property
+    def least_period(self) -> End:
+        """The end with the shorter period."""
+        return min(self.first, self.last, key=lambda end: end.period)
+
+    @property
+    def greatest_period(self) -> End:
+        """The end with the longer period."""
+        return max(self.first, self.last, key=lambda end: end.period)
+
+
+@dataclass(frozen=True)
+class LockedGait:
+    """A 1:1 phase-locked gait: a fixed point of the map at its pulse period."""
+
+    place: Place
+    period: float
+    onset: float
+    """Pulse onset after the other leg's heel strike [s]."""
+    lag: float
+    """Pulse onset after the perturbed leg's toe-off [s]."""
+    phase: float
+    """Pulse onset in the perturbed leg's gait cycle."""
+    speed: float
+    """Speed of the mass right after the perturbed leg's push-off begins [m/s]."""
+    multipliers: tuple[complex, complex]
+    stable: bool
+
+
+def pieces_of(gait: PulsedGait) -> list[Piece]:
+    """Return all pieces of all branches, in the order of the pulse onset."""
+    return [
+        piece
+        for place, first, last, borders in _branches(gait)
+        for piece in _split(gait, place, first, last, borders)
+    ]
+
+
+def locked_gaits(
+    gait: PulsedGait, period: float, pieces: list[Piece] | None = None
+) -> list[LockedGait]:
+    """
+    Return every 1:1 phase-locked gait at a pulse period [s], stable or not, by pulse onset.
+
+    Where the pulse acts nowhere, any onset repeats itself at exactly the unperturbed period; that
+    neutral continuum is not a lock and is left out.
+    """
+    found = []
+    for piece in pieces_of(gait) if pieces is None else pieces:
+        low, high = piece.least_period.period, piece.greatest_period.period
+        if not piece.feasible or not low <= period <= high:
+            continue
+        along = _along(gait, piece.place)
+        angles = piece.first.angle, piece.last.angle
+        angle = _solve(lambda x, along=along: along(x).period - period, *angles)  # type: ignore[misc]
+        solution = along(np.array([angle]))
+        if solution.end[0] > solution.start[0]:
+            found.append(_locked(gait, piece.place, solution))
+    return found
+
+
+def stable_intervals(pieces: list[Piece]) -> list[Piece]:
+    """Return the stable pieces: each is an interval of pulse periods that the gait can follow."""
+    return [piece for piece in pieces if piece.stable]
+
+
+def _branches(gait: PulsedGait) -> Iterator[tuple[Place, float, float, tuple[Border, Border]]]:
+    """Yield the branches: place, range of the ankle angle along them, and their corners."""
+    struck, off = gait.heel_strike, gait.toe_off
+    first_end, last_start = gait.first_end, gait.last_start
+    if last_start > struck:
+        inside = Border.START_AT_HEEL_STRIKE, Border.END_AT_TOE_OFF
+        yield Place.EARLY, struck, first_end, (Border.END_AT_HEEL_STRIKE, inside[0])
+        yield Place.INSIDE, struck, last_start, inside
+        yield Place.LATE, last_start, off, (inside[1], Border.START_AT_TOE_OFF)
+    else:
+        # Between the two, the pulse covers all of double stance and its onset does not matter.
+        yield Place.EARLY, struck, off, (Border.END_AT_HEEL_STRIKE, Border.END_AT_TOE_OFF)
+        yield Place.LATE, struck, off, (Border.START_AT_HEEL_STRIKE, Border.START_AT_TOE_OFF)
+
+
+def _along(gait: PulsedGait, place: Place) -> Callable[[Floats], Gaits]:
+    return {Place.EARLY: gait.early, Place.INSIDE: gait.inside, Place.LATE: gait.late}[place]
+
+
+def _split(
+    gait: PulsedGait, place: Place, first: float, last: float, corners: tuple[Border, Border]
+) -> Iterator[Piece]:
+    """Cut a branch where period or stability turns."""
+    along = _along(gait, place)
+    angles = first + (last - first) * _SCAN
+    marks = _marks(along(angles))
+    begin, mark = _end(corners[0], first, along), marks[0]
+    for i in range(1, _SCAN.size):
+        for angle, border, after in _turns(along, *angles[i - 1 : i + 1], *marks[i - 1 : i + 1]):
+            end = _end(border, angle, along)
+            yield Piece(place, begin, end, *mark[:2])
+            begin, mark = end, after
+    yield Piece(place, begin, _end(corners[1], last, along), *mark[:2])
+
+
+def _turns(
+    along: Callable[[Floats], Gaits], low: float, high: float, before: _Marks, after: _Marks
+) -> Iterator[tuple[float, Border, _Marks]]:
+    """Yield what turns between two angles with these marks: where, what, and the marks then."""
+    if before == after:
+        return
+    angle, border, here = _turn(along, low, high, before, after)
+    if high - low < 4 * _BESIDE:
+        yield angle, border, after
+        return
+    # More than one may turn, as where a flip lies close to a fold: look right beside it.
+    beside = np.clip([angle - _BESIDE, angle + _BESIDE], low, high)
+    if border is Border.FOLD:
+        left, here = _marks(along(beside))
+        yield from _turns(along, low, beside[0], before, left)
+    yield angle, border, here
+    yield from _turns(along, beside[1], high, here, after)
+
+
+def _marks(gaits: Gaits) -> list[_Marks]:
+    """Tell of each gait whether it is feasible, stable, and whether its period grows."""
+    with np.errstate(invalid="ignore"):
+        growing = gaits.feasible & (gaits.slope > 0)
+        return list(
+            zip(gaits.feasible.tolist(), gaits.stable.tolist(), growing.tolist(), strict=True)
+        )
+
+
+def _turn(
+    along: Callable[[Floats], Gaits], low: float, high: float, before: _Marks, after: _Marks
+) -> tuple[float, Border, _Marks]:
+    """Find something that turns between two angles with these marks: where, what, marks then."""
+    if before[0] and after[0] and before[2] != after[2]:
+        return _solve(lambda angle: along(angle).slope, low, high), Border.FOLD, after
+    while high - low > _ANGLE_TOLERANCE:
+        middle = 0.5 * (low + high)
+        marks = _marks(along(np.array([middle])))[0]
+        if marks == before:
+            low = middle
+        else:
+            high, after = middle, marks
+    if before[0] != after[0]:
+        return (low if before[0] else high), Border.NO_GAIT, after
+    if before[2] != after[2]:
+        return low, Border.FOLD, after
+    largest = along(np.array([low])).multipliers[0, 0]
+    return low, Border.FLIP if largest.imag == 0 else Border.NEIMARK_SACKER, after
+
+
+def _solve(function: Callable[[Floats], Floats], low: float, high: float) -> float:
+    """Return the root of a function of the ankle angle; at an end where rounding hides it."""
+
+    def value(angle: float) -> float:
+        return float(function(np.array([angle]))[0])
+
+    ends = value(low), value(high)
+    if ends[0] * ends[1] >= 0:
+        return low if abs(ends[0]) <= abs(ends[1]) else high
+    return float(brentq(value, low, high, xtol=_ANGLE_TOLERANCE))
+
+
+def _end(border: Border, angle: float, along: Callable[[Floats], Gaits]) -> End:
+    gait = along(np.array([angle])).at(0)
+    return End(border, angle, float(gait.period), float(gait.onset), float(gait.lag))
+
+
+def _locked(gait: PulsedGait, place: Place, solution: Gaits) -> LockedGait:
+    one = solution.at(0)
+    first, second = one.multipliers
+    return LockedGait(
+        place=place,
+        period=float(one.period),
+        onset=float(one.onset),
+        lag=float(one.lag),
+        phase=float(one.phase),
+        speed=gait.speed(float(one.apex)),
+        multipliers=(complex(first), complex(second)),
+        stable=bool(one.stable),
+    )

@@ -1,0 +1,159 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Walks under a train of pulses, by the walker in time: what the solved locks are confirmed with.
+
+A walk that has not locked is called slipping only when the pulses have gone through a whole gait
+cycle: then every phase has been tried. Near a border that takes of the order of 2 tau_0 over the
+distance to it in strides, so a shorter walk proves nothing and is reported as censored.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+from functools import lru_cache
+
+import numpy as np
+
+from gait_entrainment.conventions import nanoseconds
+from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment.walker.batch import Pulses, Walk, _torque_changes, walk_steps
+from gait_entrainment.walker.model import Model, make_model, start_apex
+from gait_entrainment.walker.segment import FALL, SEGMENT
+from gait_entrainment_studies.locking.pulsed_gait import Floats
+
+# A lag that creeps by less than this per stride [s], for several strides, is called locked. So a
+# pulse period closer than this to a border is decided by the solver, not by walking.
+CREEP = 1e-7
+_QUIET_STRIDES = 5
+
+# Gait cycles that the pulses must slip through: one, and what the first strides may have skipped.
+_SLIPPED_CYCLES = 1.25
+
+# What whole nanoseconds can count [s], with room for a pulse.
+_CLOCK = 9e9
+
+
+class Outcome(str, Enum):
+    """What became of a walk under pulses."""
+
+    LOCKED = "locked"
+    ALTERNATING = "locked 2:2: every other stride alike"
+    SLIPPING = "slipping"
+    CENSORED = "censored: neither locked nor slipped through a cycle"
+    """Too short to tell; or, past a flip, bound to the pulses without ever repeating."""
+    FELL = "fell"
+    FLEW_OFF = "flew off"
+
+
+@dataclass(frozen=True)
+class PulsedWalk:
+    """A walk with a pulse on one leg every `period`; times in s since that leg's heel strike 0."""
+
+    period: float
+    heel_strikes: Floats
+    """Of the perturbed leg, from number 0 on."""
+    toe_offs: Floats
+    """Of the perturbed leg, one in each stride."""
+    onsets: Floats
+    ending: Outcome | None
+    """FELL or FLEW_OFF where the walker did so before the last stride."""
+
+    @property
+    def stride_periods(self) -> Floats:
+        """Durations of the perturbed leg's strides."""
+        return np.diff(self.heel_strikes)
+
+    @property
+    def unwrapped_lags(self) -> Floats:
+        """Onset of pulse n minus toe-off of stride n, which is a lag up to whole strides."""
+        count = min(self.onsets.size, self.toe_offs.size)
+        lags: Floats = self.onsets[:count] - self.toe_offs[:count]
+        return lags
+
+    @property
+    def lags(self) -> Floats:
+        """Pulse onset minus the nearest toe-off of the perturbed leg; NaN if that is not known."""
+        onsets = self.onsets[self.onsets <= self.toe_offs[-1]]
+        after = np.clip(np.searchsorted(self.toe_offs, onsets), 1, self.toe_offs.size - 1)
+        before, following = onsets - self.toe_offs[after - 1], onsets - self.toe_offs[after]
+        lags: Floats = np.where(before <= -following, before, following)
+        # A stride before the first toe-off of the walk there was another one.
+        lags[onsets < self.toe_offs[0] - self.stride_periods[0] / 2] = np.nan
+        return lags
+
+    @property
+    def last_lag(self) -> float:
+        """Onset of the last pulse minus the nearest toe-off, of those that have been walked."""
+        onset = self.onsets[self.onsets <= self.toe_offs[-1]][-1]
+        differences = onset - self.toe_offs[-2:]
+        return float(differences[np.argmin(np.abs(differences))])
+
+    def outcome(self, creep: float = CREEP) -> Outcome:
+        """Whether it has locked, and whether it was long enough to say that it does not."""
+        if self.ending is not None:
+            return self.ending
+        lags = self.unwrapped_lags
+        quiet = np.abs(np.diff(lags))[-_QUIET_STRIDES:] < creep
+        if quiet.size == _QUIET_STRIDES and quiet.all():
+            return Outcome.LOCKED
+        quiet = np.abs(lags[2:] - lags[:-2])[-2 * _QUIET_STRIDES :] < creep
+        if quiet.size == 2 * _QUIET_STRIDES and quiet.all():
+            return Outcome.ALTERNATING
+        if abs(lags[-1] - lags[0]) > _SLIPPED_CYCLES * self.stride_periods[-1]:
+            return Outcome.SLIPPING
+        return Outcome.CENSORED
+
+
+def walk_under_pulses(
+    parameters: WalkerParameters,
+    torque: float,
+    width: float,
+    period: float,
+    initial_phase: float,
+    strides: int,
+) -> PulsedWalk:
+    """
+    Walk `strides` strides from the unperturbed gait with pulses on one leg.
+
+    The first comes at this fraction of an unperturbed stride after the leg's heel strike 0.
+    Instants of the pulses are whole nanoseconds, as everywhere in the project.
+    """
+    model, stride = _prepared(parameters)
+    # Enough for strides a third longer than the pulse period or the walker's own.
+    count = int(4 / 3 * (strides + 1) * max(stride / period, 1.0)) + 1
+    # Pulses that come after the end of the clock are none.
+    count = min(count, 1 + int(_CLOCK / period))
+    onsets = np.rint(np.arange(count) * (min(period, _CLOCK) * 1e9)).astype(np.int64)
+    onsets += nanoseconds(initial_phase * stride)
+    pulses = Pulses(onsets, nanoseconds(width), torque)
+    walk, ends = _walk(model, 2 * strides, pulses)
+    ending = None
+    if walk.heel_strikes.size <= 2 * strides:
+        ending = Outcome.FELL if ends == FALL else Outcome.FLEW_OFF
+    toe_offs = walk.toe_offs[1::2]
+    last = walk.heel_strikes[-1]
+    return PulsedWalk(
+        period=period,
+        heel_strikes=walk.heel_strikes[::2],
+        toe_offs=toe_offs,
+        onsets=onsets[: np.searchsorted(onsets, last * 1e9)] * 1e-9,
+        ending=ending,
+    )
+
+
+@lru_cache(maxsize=64)
+def _prepared(parameters: WalkerParameters) -> tuple[Model, float]:
+    """Return the walker's constants, and its unperturbed stride period [s]."""
+    model = make_model(parameters)
+    walk, _ = _walk(model, 2, None)
+    return model, float(walk.heel_strikes[-1])
+
+
+def _walk(model: Model, steps: int, pulses: Pulses | None) -> tuple[Walk, int]:
+    """Walk as `walker.batch.walk` does, the constants made before; also what ended it."""
+    log, strikes, offs = np.zeros(1, SEGMENT), np.empty(steps), np.empty(steps)
+    apex = start_apex(model, None)
+    counts = walk_steps(model, log, *_torque_changes(pulses), apex, strikes, offs)
+    walk = Walk(np.concatenate([[0.0], strikes[: counts[0]]]), offs[: counts[1]])
+    return walk, int(log[0]["ends"])

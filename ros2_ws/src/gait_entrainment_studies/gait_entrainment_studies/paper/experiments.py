@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The paper's numerical experiments, repeated with the walker in time."""
+
+import math
+
+import numpy as np
+
+from gait_entrainment.conventions import EventKind, Side
+from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment.walker import Samples, Walker
+from gait_entrainment_studies.locking import Outcome, PulsedGait, PulsedWalk, walk_under_pulses
+from gait_entrainment_studies.locking.pulsed_gait import Floats
+
+PULSE_WIDTH = 0.1
+TORQUE_FRACTION = 0.1
+
+# Before a collision by this much [ns] the walker is surely in single stance.
+_BEFORE_STRIKE = 10**6
+
+
+def paper_pulses(parameters: WalkerParameters, steps_per_pulse: int = 2) -> PulsedGait:
+    """Return the walker under the paper's pulses: 0.1 s, a tenth of the peak ankle torque."""
+    torque = TORQUE_FRACTION * parameters.peak_torque
+    return PulsedGait(parameters, torque, PULSE_WIDTH, steps_per_pulse)
+
+
+def paper_walk(
+    parameters: WalkerParameters, period_offset: float, initial_phase: float, strides: int
+) -> PulsedWalk:
+    """Walk under the paper's pulses with this period [s] off the unperturbed stride period."""
+    gait = paper_pulses(parameters)
+    period = gait.unperturbed_period + period_offset
+    return walk_under_pulses(parameters, gait.torque, PULSE_WIDTH, period, initial_phase, strides)
+
+
+def speeds_after_collisions(
+    parameters: WalkerParameters, initial_speed: float, steps: int
+) -> Floats:
+    """
+    Walk from an initial speed [m/s] and return the speed after that many collisions.
+
+    Sampled in the single stance before and carried to the collision by energy, so that the
+    rounding of the collision's instant to nanoseconds does not enter.
+    """
+    p = parameters
+    walker = Walker(p, Side.RIGHT, initial_speed)
+    strikes: list[int] = []
+    seconds = 1
+    while len(strikes) < steps and walker.ending is None:
+        walker = Walker(p, Side.RIGHT, initial_speed)
+        seconds *= 2
+        events = walker.advance(seconds * 10**9)
+        strikes = [e.stamp for e in events if e.kind is EventKind.HEEL_STRIKE and e.step > 0]
+    samples = walker.sample(np.array(strikes[:steps], np.int64) - _BEFORE_STRIKE)
+    index = np.arange(samples.leading.size)
+    rate = samples.velocity[index, samples.leading]
+    lean = samples.position[index, samples.leading]
+    fallen = 2 * p.gravity * p.leg_length * (np.cos(lean) - math.cos(p.leg_angle))
+    speeds: Floats = p.restitution * np.sqrt((p.leg_length * rate) ** 2 + fallen)
+    return speeds
+
+
+def floquet_by_differences(parameters: WalkerParameters) -> float:
+    """Slope of the step-to-step function by fourth-order differences."""
+    fixed, h = parameters.speed_after_collision, 0.01
+
+    def step(speed: float) -> float:
+        return float(speeds_after_collisions(parameters, speed, 1)[0])
+
+    near = step(fixed + h) - step(fixed - h)
+    far = step(fixed + 2 * h) - step(fixed - 2 * h)
+    return (8 * near - far) / (12 * h)
+
+
+def floquet_by_convergence(parameters: WalkerParameters) -> float:
+    """Ratio at which a disturbance of the speed shrinks from step to step, late in a walk."""
+    fixed, steps = parameters.speed_after_collision, 6
+    fast, slow = (
+        speeds_after_collisions(parameters, fixed * factor, steps) for factor in (1.05, 0.95)
+    )
+    difference = fast - slow
+    return float(difference[-1] / difference[-2])
+
+
+def least_force(parameters: WalkerParameters) -> tuple[float, float]:
+    """Smallest force on the leading leg [N] over a step, sampled, and how far into it [s]."""
+    walker = Walker(parameters, Side.RIGHT)
+    stamps = np.arange(0, int(0.9e9), 10**5)
+    walker.advance(int(stamps[-1]))
+    samples = walker.sample(stamps)
+    force = samples.force[np.arange(stamps.size), samples.leading]
+    index = int(np.argmin(force))
+    return float(force[index]), float(stamps[index]) * 1e-9
+
+
+def outcomes_along(
+    parameters: WalkerParameters, offsets: Floats, initial_phases: Floats
+) -> list[Outcome]:
+    """
+    Walk at each pulse period offset [s] from every initial phase; the worst outcome of each.
+
+    Locked counts only if all are; a walk is made long enough to slip through a whole cycle.
+    """
+    period = paper_pulses(parameters).unperturbed_period
+    found = []
+    for offset in offsets:
+        strides = 600 + int(1.5 * period / abs(offset)) if offset else 2000
+        outcomes = [
+            paper_walk(parameters, float(offset), float(phase), strides).outcome()
+            for phase in initial_phases
+        ]
+        order = [
+            Outcome.LOCKED,
+            Outcome.CENSORED,
+            Outcome.SLIPPING,
+            Outcome.FELL,
+            Outcome.FLEW_OFF,
+        ]
+        found.append(max(outcomes, key=order.index))
+    return found
+
+
+def torque_profiles(
+    parameters: WalkerParameters, walk: PulsedWalk, points: int
+) -> list[tuple[Floats, Samples]]:
+    """Sample a walk under the paper's pulses anew: per stride, time since heel strike, samples."""
+    gait = paper_pulses(parameters)
+    walker = Walker(parameters, Side.RIGHT)
+    onsets = np.rint(walk.onsets * 1e9).astype(np.int64)
+    changes = np.column_stack([onsets, onsets + round(PULSE_WIDTH * 1e9)]).ravel()
+    end = int(walk.heel_strikes[-1] * 1e9)
+    walker.extend_torque(Side.RIGHT, changes, np.tile([gait.torque, 0.0], onsets.size), 2 * end)
+    walker.extend_torque(Side.LEFT, [], [], 2 * end)
+    walker.advance(end)
+    strides = []
+    for begin, stop in zip(walk.heel_strikes[:-1], walk.heel_strikes[1:], strict=True):
+        stamps = np.linspace(begin * 1e9, stop * 1e9, points).astype(np.int64)
+        strides.append(((stamps - stamps[0]) * 1e-9, walker.sample(np.minimum(stamps, end))))
+    return strides

@@ -1,0 +1,116 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+The phase response: what one single pulse, at each phase, does to the timing of the gait.
+
+A single pulse is one in so many steps that its effect has died out before the next. So the curve
+is a branch of `locking.PulsedGait` with that many steps per pulse, exact like those, and the lock
+that the curve predicts (shift = unperturbed minus pulse period) is a locked gait of that walker.
+The prediction neglects what a pulse leaves over for the next: a factor cos(2 alpha)^4 per stride.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment_studies.locking import LockedGait, PulsedGait, locked_gaits, pieces_of
+from gait_entrainment_studies.locking.pulsed_gait import Floats
+
+# What is left of a disturbance when the gait counts as recovered: below rounding.
+_RECOVERED = 1e-17
+
+
+@dataclass(frozen=True)
+class PhaseResponse:
+    """Response to single pulses, by phase of the onset; arrays (n,), times in s."""
+
+    stride_period: float
+    phase: Floats
+    """Onset in the perturbed leg's unperturbed gait cycle, ascending in [0, 1]."""
+    onset: Floats
+    """Onset after the other leg's heel strike."""
+    lag: Floats
+    """Onset after the perturbed leg's toe-off of the same stride."""
+    shift: Floats
+    """How much earlier all later heel strikes come, in the end."""
+    first_stride_shift: Floats
+    """How much earlier the heel strike comes that ends the stride of the pulse."""
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """The stable lock at a pulse period: predicted by single pulses, and exact."""
+
+    period_offset: float
+    predicted: LockedGait
+    exact: LockedGait
+
+    @property
+    def lag_error(self) -> float:
+        """Predicted minus exact lag [s]."""
+        return self.predicted.lag - self.exact.lag
+
+
+def single_pulse(parameters: WalkerParameters, torque: float, width: float) -> PulsedGait:
+    """Return the walker with so few pulses that it has recovered from each before the next."""
+    strides = math.ceil(math.log(_RECOVERED) / math.log(parameters.floquet_multiplier) / 2)
+    return PulsedGait(parameters, torque, width, steps_per_pulse=2 * max(strides, 1))
+
+
+def phase_response(
+    parameters: WalkerParameters, torque: float, width: float, points: int = 201
+) -> PhaseResponse:
+    """
+    Return the phase response with `points` points on each branch.
+
+    Where the walker would fall or fly off under the pulse the values are NaN.
+    """
+    single = single_pulse(parameters, torque, width)
+    step = single.unperturbed_period / single.steps_per_pulse
+    struck, off = single.heel_strike, single.toe_off
+    branches = [single.early(np.linspace(struck, single.first_end, points))]
+    if single.last_start > struck:
+        branches.append(single.inside(np.linspace(struck, single.last_start, points)))
+    branches.append(single.late(np.linspace(single.last_start, off, points)))
+    # Outside, where the leg does not trail, a pulse does nothing.
+    toe_off = float(branches[-1].double_stance[-1])
+    onsets, shifts, firsts = [np.array([-step, -width])], [np.zeros(2)], [np.zeros(2)]
+    for branch in branches:
+        sound = np.where(branch.feasible, 1.0, np.nan)
+        onsets.append(branch.onset)
+        shifts.append(sound * (single.unperturbed_period - branch.period))
+        firsts.append(sound * (step - branch.step))
+    onset = np.concatenate([*onsets, [toe_off, step]])
+    return PhaseResponse(
+        stride_period=2 * step,
+        phase=(onset + step) / (2 * step),
+        onset=onset,
+        lag=onset - toe_off,
+        shift=np.concatenate([*shifts, np.zeros(2)]),
+        first_stride_shift=np.concatenate([*firsts, np.zeros(2)]),
+    )
+
+
+def predictions(
+    parameters: WalkerParameters, torque: float, width: float, period_offsets: Floats
+) -> list[Prediction]:
+    """
+    Compare predicted and exact stable locks at pulse periods [s] off the unperturbed stride.
+
+    Where there are two attractors, each is compared with its like; a lock that only one of the
+    two knows is left out.
+    """
+    single = single_pulse(parameters, torque, width)
+    every = PulsedGait(parameters, torque, width)
+    single_pieces, pieces = pieces_of(single), pieces_of(every)
+    found = []
+    for offset in period_offsets:
+        predicted = locked_gaits(single, single.unperturbed_period + offset, single_pieces)
+        exact = locked_gaits(every, every.unperturbed_period + offset, pieces)
+        for lock in (gait for gait in exact if gait.stable):
+            likes = [like for like in predicted if like.stable and like.place is lock.place]
+            found += [Prediction(float(offset), like, lock) for like in likes]
+    return found

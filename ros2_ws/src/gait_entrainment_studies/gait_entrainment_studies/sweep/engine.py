@@ -1,0 +1,119 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Who makes the rows: processes of this machine, or the workers of a Dask cluster.
+
+Rows come back as they are made and are written at once; nothing else is kept.
+"""
+
+import asyncio
+import importlib
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from typing import Any
+
+from gait_entrainment_studies.sweep.plan import SweepError, SweepPlan
+from gait_entrainment_studies.sweep.row import Row, sweep_row
+
+# A scheduler that does not answer is named within this time [s].
+SCHEDULER_TIMEOUT = 6.0
+
+# Rows handed out ahead of those that are made: enough to keep every worker busy.
+_AHEAD = 2
+
+Rows = Iterator[tuple[int, Row]]
+
+
+def available_cores() -> int:
+    """Return the number of cores that this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+def rows_by_processes(plan: SweepPlan, indices: Sequence[int], jobs: int) -> Rows:
+    """Make rows in `jobs` processes, in any order; one job makes them in this process."""
+    if jobs == 1:
+        for index in indices:
+            yield index, sweep_row(plan, index)
+        return
+    # A copy of this process has everything loaded and starts at once; but a copy of one with
+    # threads may hang, so that one has its workers made by a server.
+    alone = threading.active_count() == 1
+    context = multiprocessing.get_context("fork" if alone else "forkserver")
+    # Ctrl-C reaches every process of the terminal; only this one answers it.
+    pool = ProcessPoolExecutor(
+        jobs, context, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)
+    )
+    try:
+        yield from _in_flight(lambda index: pool.submit(sweep_row, plan, index), indices, jobs)
+    except BrokenProcessPool:
+        raise SweepError(
+            f"one of {jobs} processes was killed, perhaps for want of memory: give the same"
+            " command again, or with fewer --jobs; what is made is kept"
+        ) from None
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _in_flight(submit: Callable[[int], "Future[Row]"], indices: Sequence[int], jobs: int) -> Rows:
+    waiting = iter(indices)
+    running: dict[Future[Row], int] = {}
+    while True:
+        for index in waiting:
+            running[submit(index)] = index
+            if len(running) >= _AHEAD * jobs:
+                break
+        if not running:
+            return
+        for future in wait(running, return_when=FIRST_COMPLETED).done:
+            yield running.pop(future), future.result()
+
+
+def rows_by_dask(plan: SweepPlan, indices: Sequence[int], scheduler: str) -> Rows:
+    """
+    Make rows on a Dask cluster.
+
+    Raises SweepError where its scheduler does not answer or a row cannot be made there.
+    """
+    try:
+        dask: Any = importlib.import_module("distributed")
+    except ImportError:
+        raise SweepError("--scheduler needs Dask: pip install distributed") from None
+    _ask_who_it_is(dask, scheduler)
+    with dask.Client(scheduler, timeout=SCHEDULER_TIMEOUT) as client:
+        futures = {client.submit(sweep_row, plan, index, pure=False): index for index in indices}
+        for future in dask.as_completed(list(futures)):
+            try:
+                row = future.result()
+            except Exception as error:  # whatever a worker raised, or that it is gone
+                what = f"{type(error).__name__}: {error}".partition("\n")[0]
+                raise SweepError(
+                    f"scheduler {scheduler}: a row could not be made ({what}): see that it runs,"
+                    " its workers with this version of gait_entrainment; the same command goes on"
+                ) from None
+            yield futures.pop(future), row
+            future.release()
+
+
+def _ask_who_it_is(dask: Any, scheduler: str) -> None:
+    """Let the scheduler tell its kind: Dask's client waits forever for another service."""
+
+    async def kind() -> str:
+        async with dask.rpc(scheduler) as remote:
+            identity = await asyncio.wait_for(remote.identity(), SCHEDULER_TIMEOUT)
+        return str(identity["type"])
+
+    try:
+        answer = asyncio.run(kind())
+    except Exception as error:  # another service answers with anything
+        raise SweepError(
+            f"scheduler {scheduler} does not answer within {SCHEDULER_TIMEOUT:g} s"
+            f" ({type(error).__name__}): start it, or leave out --scheduler"
+        ) from None
+    if answer != "Scheduler":
+        raise SweepError(f"scheduler {scheduler} is a {answer}: give the scheduler's address")

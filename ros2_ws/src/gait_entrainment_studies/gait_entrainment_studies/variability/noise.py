@@ -1,0 +1,34 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Seeded noise from step to step: white, or with long-range correlation."""
+
+import numpy as np
+
+from gait_entrainment_studies.locking.pulsed_gait import Floats
+
+# Draws beyond this many standard deviations are cut off: no step has an absurd push-off.
+TRUNCATION = 3.0
+
+
+def step_noise(generator: np.random.Generator, steps: int, size: int, hurst: float) -> Floats:
+    """
+    Return fractional Gaussian noise (steps, size) of unit variance, truncated.
+
+    `hurst` 0.5 is white; above, up to 1, neighbours resemble each other over long stretches
+    (strides of adults: about 0.75). By circulant embedding (Davies and Harte 1987), exact.
+
+    Raises ValueError for a Hurst exponent out of range.
+    """
+    if not 0.5 <= hurst < 1:
+        raise ValueError(f"hurst {hurst:g} is out of range; allowed: 0.5 (white) to below 1")
+    lags = np.arange(steps + 1.0)
+    power = 2 * hurst
+    covariance = 0.5 * (np.abs(lags + 1) ** power - 2 * lags**power + np.abs(lags - 1) ** power)
+    circulant = np.concatenate([covariance, covariance[-2:0:-1]])
+    spectrum = np.clip(np.fft.fft(circulant).real, 0.0, None)
+    shape = size, circulant.size
+    white = generator.standard_normal(shape) + 1j * generator.standard_normal(shape)
+    noise = np.fft.fft(white * np.sqrt(spectrum / circulant.size)).real[:, :steps]
+    truncated: Floats = np.clip(noise.T, -TRUNCATION, TRUNCATION)
+    return truncated

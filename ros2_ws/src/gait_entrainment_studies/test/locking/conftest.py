@@ -1,0 +1,8 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+import sys
+from pathlib import Path
+
+# Tests are imported by path; what they share lies beside them.
+sys.path.insert(0, str(Path(__file__).parent))
