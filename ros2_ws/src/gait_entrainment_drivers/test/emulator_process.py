@@ -19,7 +19,7 @@ def emulator(*arguments, trace=None, program="ak_motor_emulator", driver="ak_mit
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind(("", 0))
         port = free.getsockname()[1]
-    command = [sys.executable, "-m", f"gait_entrainment.robot.{program}"]
+    command = [sys.executable, "-m", f"gait_entrainment_drivers.{program}"]
     command += ["--channel", CHANNEL, "--port", str(port), *arguments]
     if trace is not None:
         command += ["--trace", str(trace)]

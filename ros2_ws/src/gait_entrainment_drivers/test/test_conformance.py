@@ -13,8 +13,9 @@ from dataclasses import replace
 import pytest
 
 from gait_entrainment.commands import main
-from gait_entrainment.robot import conformance, find_driver
+from gait_entrainment.robot import find_driver
 from gait_entrainment.robot.drivers import OWN_DRIVERS, Driver
+from gait_entrainment_drivers import conformance
 from gait_entrainment_drivers.conformance import CHECKS, Tolerances, run_check, run_checks
 
 from .broken_robots import BROKEN

@@ -9,7 +9,8 @@ import can
 import pytest
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.robot import DeviceError, odrive_can
+from gait_entrainment.robot import DeviceError
+from gait_entrainment_drivers import odrive_can
 from gait_entrainment_drivers.ak_mit import (
     ENTER,
     EXIT,
