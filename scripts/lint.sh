@@ -11,6 +11,7 @@ check() {
 
 check ruff check --quiet --output-format concise .
 check ruff format --check --output-format concise .
+check python scripts/make_message_stubs.py
 check mypy
 check lint-imports --no-logo --no-cache
 check python scripts/check_licence_headers.py
