@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
 # Two commands suffice: `make demo` runs the main job, `make test` every test. Each first sets up
 # and builds what is missing. The work is done in scripts/; a particular Python is chosen by
 # `make PYTHON=python3.12 ...`.

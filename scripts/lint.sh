@@ -1,4 +1,7 @@
 #!/usr/bin/env bash
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
 # Every check that reads the sources without running them. Goes through all of them, then fails.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."

@@ -1,4 +1,7 @@
 #!/usr/bin/env bash
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
 # Bring .venv up to date: Python packages and, unless a full one is sourced, ROS 2 Jazzy itself.
 #
 #   scripts/setup.sh                   the first suitable Python on PATH
