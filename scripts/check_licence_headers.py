@@ -10,7 +10,16 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 HEADER = Path(__file__).read_text(encoding="utf-8").partition("\n\n")[0] + "\n"
 # Python, launch files among it; shell; CMake, make and Docker.
-PROGRAMS = ("*.py", "*.sh", "*.bash", "CMakeLists.txt", "*.cmake", "Makefile", "Dockerfile", ".ci/*")
+PROGRAMS = (
+    "*.py",
+    "*.sh",
+    "*.bash",
+    "CMakeLists.txt",
+    "*.cmake",
+    "Makefile",
+    "Dockerfile",
+    ".ci/*",
+)
 # What must be the first line of a file to have its meaning.
 FIRST_LINES = ("#!", "# syntax=")
 
@@ -34,9 +43,7 @@ def main() -> int:
         text=True,
     ).stdout.split("\0")
     bare = [
-        name
-        for name in listed
-        if name and (ROOT / name).exists() and not has_header(ROOT / name)
+        name for name in listed if name and (ROOT / name).exists() and not has_header(ROOT / name)
     ]
     for name in bare:
         print(f"{name}: no licence header: begin it like scripts/{Path(__file__).name}")

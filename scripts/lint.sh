@@ -18,5 +18,6 @@ check python scripts/make_message_stubs.py
 check mypy
 check lint-imports --no-logo --no-cache
 check python scripts/check_licence_headers.py
+check python scripts/check_sizes.py
 check pytest -q -m linter ros2_ws/src/*/test/test_linters.py
 exit $failed
