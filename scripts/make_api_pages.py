@@ -10,11 +10,13 @@ field's text (of a setting: its meaning and what is allowed), and pages end with
 
 import dataclasses
 import importlib
+import inspect
 import io
 import sys
 import tokenize
 from itertools import pairwise
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pdoc
@@ -23,6 +25,7 @@ from pdoc import doc_ast
 ROOT = Path(__file__).resolve().parents[1]
 PUBLIC = (
     "gait_entrainment.simulation",
+    "gait_entrainment.outcome",
     "gait_entrainment.protocol",
     "gait_entrainment.parameters",
     "gait_entrainment.gait",
@@ -37,6 +40,15 @@ EXAMPLES = {
     "gait_entrainment_bags": "strides_of_a_bag.py",
 }
 read_tree = doc_ast.walk_tree
+
+
+def offered(module: ModuleType) -> list[str]:
+    """Return the public names of a package: those that its __init__.py defines or imports."""
+    return [
+        name
+        for name, value in vars(module).items()
+        if not name.startswith("_") and not inspect.ismodule(value)
+    ]
 
 
 def field_comments(source: str) -> dict[str, str]:
@@ -67,11 +79,14 @@ def read_tree_with_comments(thing: Any) -> doc_ast.AstInfo:
 
 def main(folder: Path = ROOT / "docs/api") -> None:
     """Write the pages."""
-    for name, example in EXAMPLES.items():
+    for name in PUBLIC:
         module = importlib.import_module(name)
-        program = (ROOT / "docs/examples" / example).read_text(encoding="utf-8")
-        program = program.partition("\n\n")[2]  # without the licence
-        module.__doc__ = f"{module.__doc__}\n### Example\n\n```python\n{program}```\n"
+        if hasattr(module, "__path__"):
+            module.__all__ = getattr(module, "__all__", offered(module))
+        if name in EXAMPLES:
+            program = (ROOT / "docs/examples" / EXAMPLES[name]).read_text(encoding="utf-8")
+            program = program.partition("\n\n")[2]  # without the licence
+            module.__doc__ = f"{module.__doc__}\n### Example\n\n```python\n{program}```\n"
     doc_ast.walk_tree = read_tree_with_comments
     pdoc.render.configure(docformat="numpy", footer_text="gait_entrainment", logo=None)
     pdoc.pdoc(*PUBLIC, output_directory=folder)
