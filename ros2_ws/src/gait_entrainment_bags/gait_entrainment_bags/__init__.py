@@ -3,7 +3,7 @@
 
 """Bags: recording into MCAP with rosbag2's rules, reading, checking, rescuing, exporting."""
 
-from gait_entrainment_bags.checks import Finding, Severity, check
+from gait_entrainment_bags.checks import check
 from gait_entrainment_bags.definitions import Definition, find_definition
 from gait_entrainment_bags.errors import (
     BagError,
@@ -11,13 +11,15 @@ from gait_entrainment_bags.errors import (
     BagWriteError,
     DefinitionMissingError,
     DiskFullError,
+    NoBagError,
     UnreadableBagError,
 )
-from gait_entrainment_bags.mcap_file import BagMessage
+from gait_entrainment_bags.mcap_records import BagMessage
 from gait_entrainment_bags.metadata import INFINITE, QosProfile, TopicInfo
 from gait_entrainment_bags.playback import FASTEST, Moment, Playback, choose_topics
 from gait_entrainment_bags.reader import BagInfo, BagReader, info
 from gait_entrainment_bags.recovery import Recovery, recover
+from gait_entrainment_bags.rules import Finding, Severity
 from gait_entrainment_bags.tables import export
 from gait_entrainment_bags.writer import ENDED_EARLY, BagWriter
 
@@ -46,6 +48,7 @@ __all__ = [
     "BagError",
     "BagExistsError",
     "UnreadableBagError",
+    "NoBagError",
     "DefinitionMissingError",
     "BagWriteError",
     "DiskFullError",

@@ -11,18 +11,19 @@ import queue
 import threading
 from collections.abc import Collection, Iterator
 from fnmatch import fnmatchcase
+from itertools import islice
 from typing import NamedTuple
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment_bags.errors import BagError
-from gait_entrainment_bags.mcap_file import BagMessage
+from gait_entrainment_bags.mcap_records import BagMessage
 from gait_entrainment_bags.reader import BagReader
 
 FASTEST = float("inf")
 """Rate at which every message is due at once: whoever takes them sets the pace."""
 
-# Messages are read ahead in batches of so many, and so many batches.
-_BATCH, _BATCHES = 500, 8
+# Messages are read ahead in this many batches of this many messages.
+_BATCHES, _BATCH = 8, 500
 
 
 class Moment(NamedTuple):
@@ -75,18 +76,17 @@ class Playback:
         paused: bool = False,
         clock_period: float = 0.0,
     ) -> None:
-        if missing := sorted(set(topics) - bag.topics.keys()):
-            raise BagError(f"{bag.path}: no topic {', '.join(missing)} in the bag")
+        self._topics = list(bag.require_topics(topics))
         if not bag.message_count:
             raise BagError(f"{bag.path}: holds no message to play")
-        _require_rate(rate)
+        _require_positive("rate", rate)
+        _require_positive("duration", duration, " s")
         self.rate = rate
         self.paused = paused
         self.ended = False
         self.start = self.end = 0
         """First instant to play, and instant to stop before [ns since 1970]."""
         self._bag = bag
-        self._topics = list(topics)
         self._loop = loop
         self._tick_period = round(clock_period * NANOSECONDS_PER_SECOND)
         # The instant `_origin` of the bag is due at `_origin_at` on the steady clock.
@@ -94,8 +94,6 @@ class Playback:
         self._reading: _ReadAhead | None = None
         self._moments: Iterator[Moment] = iter(())
         self._next: Moment | None = None
-        if not duration > 0:
-            raise BagError(f"duration: {duration:g} s; allowed: above 0")
         whole = bag.duration / NANOSECONDS_PER_SECOND
         self.play(
             round(start_offset * NANOSECONDS_PER_SECOND),
@@ -131,7 +129,7 @@ class Playback:
         return self._advance(due)
 
     def take_next(self) -> Moment | None:
-        """Give the next moment while paused, whenever it is due; None where all were given."""
+        """Give the next moment while paused, whenever it is due; None once all were given."""
         if not self.paused or self.ended:
             return None
         moment = self._advance(self._origin_at)
@@ -152,16 +150,8 @@ class Playback:
             self.paused = False
 
     def set_rate(self, rate: float, now: int) -> None:
-        """
-        Play at another rate from now on.
-
-        Raises
-        ------
-        BagError
-            It is not above 0.
-
-        """
-        _require_rate(rate)
+        """Play at another rate from now on; raises BagError if it is not above 0."""
+        _require_positive("rate", rate)
         self._origin, self._origin_at = self.instant(now), now
         self.rate = rate
 
@@ -169,11 +159,7 @@ class Playback:
         """
         Go on from another instant of the bag [ns since 1970], at its first message.
 
-        Raises
-        ------
-        BagError
-            It lies outside of what is played.
-
+        Raises BagError if the instant lies outside of what is played.
         """
         if not self.start <= instant < self.end:
             raise BagError(f"time: {instant} ns; allowed: {self.start} to {self.end - 1} ns")
@@ -182,13 +168,9 @@ class Playback:
 
     def play(self, start_offset: int, duration: int, now: int) -> None:
         """
-        Play from an offset into the bag [ns] for so long [ns]; 0 for all that follows.
+        Play from an offset into the bag [ns] for a duration [ns]; 0 for all that follows.
 
-        Raises
-        ------
-        BagError
-            The offset lies outside of the bag.
-
+        Raises BagError if the offset lies outside of the bag.
         """
         if not 0 <= start_offset <= self._bag.duration:
             raise BagError(
@@ -257,13 +239,8 @@ def choose_topics(
     """
     List the topics of a bag that match one of the patterns, and none of the excluded.
 
-    Patterns are names, or hold ``*`` for any text, as ``/gait/*`` does; none at all match all.
-
-    Raises
-    ------
-    BagError
-        A pattern matches no topic of the bag.
-
+    Patterns are names, or hold ``*`` for any text, as ``/gait/*`` does; without any all match.
+    Raises BagError if a pattern matches no topic of the bag.
     """
     for pattern in patterns:
         if not any(fnmatchcase(name, pattern) for name in bag.topics):
@@ -276,9 +253,9 @@ def choose_topics(
     ]
 
 
-def _require_rate(rate: float) -> None:
-    if not rate > 0:
-        raise BagError(f"rate: {rate:g}; allowed: above 0")
+def _require_positive(name: str, value: float, unit: str = "") -> None:
+    if not value > 0:
+        raise BagError(f"{name}: {value:g}{unit}; allowed: above 0")
 
 
 class _ReadAhead:
@@ -309,15 +286,8 @@ class _ReadAhead:
 
     def _read(self) -> None:
         try:
-            batch: list[BagMessage] = []
-            for message in self._messages:
-                batch.append(message)
-                if len(batch) == _BATCH:
-                    self._batches.put(batch)
-                    batch = []
-                if self._stopped:
-                    return
-            self._batches.put(batch)
+            while (batch := list(islice(self._messages, _BATCH))) and not self._stopped:
+                self._batches.put(batch)
             self._batches.put(None)
         except Exception as error:
             self._batches.put(error)

@@ -33,16 +33,12 @@ from gait_entrainment_bags.metadata import (
     offered_qos_text,
 )
 
-COMPRESSIONS = {
-    "none": CompressionType.NONE,
-    "lz4": CompressionType.LZ4,
-    "zstd": CompressionType.ZSTD,
-}
 ENDED_EARLY = "ended_early"
 """Entry of the custom data of a bag whose recording ended before its time; says why."""
-MEBIBYTE = 2**20
-TIME_END = 2**64
-DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
+_COMPRESSIONS = {kind.name.lower(): kind for kind in CompressionType}  # none, lz4, zstd
+_MEBIBYTE = 2**20
+_TIME_END = 2**64
+_DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 class BagWriter:
@@ -62,7 +58,7 @@ class BagWriter:
     compression
         ``zstd``, ``lz4`` or ``none``.
     flush_interval
-        Seconds after which `write` completes a chunk though it is not full. Where messages may
+        Seconds after which `write` completes a chunk even if it is not full. If messages may
         stop coming, call `flush` as well, from a timer that runs on steady time.
     max_bytes, max_duration
         Begin a new file once the present one holds so many bytes, or spans so many seconds of
@@ -73,7 +69,8 @@ class BagWriter:
     BagExistsError
         The folder is already there.
     BagWriteError
-        It cannot be made or written to. No folder is left behind.
+        It cannot be made or written to; no folder is left behind. And from every method: writing
+        failed, and the bag takes no more; `recover` rescues what reached the disk.
 
     """
 
@@ -83,14 +80,14 @@ class BagWriter:
         *,
         ros_distro: str,
         custom_data: Mapping[str, str] | None = None,
-        chunk_size: int = MEBIBYTE,
+        chunk_size: int = _MEBIBYTE,
         compression: str = "zstd",
         flush_interval: float = 1.0,
         max_bytes: int = 0,
         max_duration: float = 0.0,
     ) -> None:
-        if compression not in COMPRESSIONS:
-            raise BagError(f"compression {compression!r}: one of {', '.join(COMPRESSIONS)}")
+        if compression not in _COMPRESSIONS:
+            raise BagError(f"compression {compression!r}: one of {', '.join(_COMPRESSIONS)}")
         if not chunk_size > 0 or max_bytes < 0 or not max_duration >= 0 or not flush_interval > 0:
             raise BagError(
                 "chunk_size and flush_interval must be above 0, max_bytes and max_duration at "
@@ -103,19 +100,16 @@ class BagWriter:
         """Messages written so far, by topic."""
 
         self._chunk_size = chunk_size
-        self._compression = COMPRESSIONS[compression]
+        self._compression = _COMPRESSIONS[compression]
         self._flush_interval = round(flush_interval * NANOSECONDS_PER_SECOND)
         self._max_bytes = max_bytes
         self._max_span = round(max_duration * NANOSECONDS_PER_SECOND)
         self._topics: dict[str, TopicInfo] = {}
-        self._schemas: dict[tuple[str, str], int] = {}  # of the present file: id by type and text
-        self._channels: dict[str, int] = {}  # of the present file: id by topic
         self._files: list[FileInformation] = []  # the last one is the present file
         self._first = self._last = 0  # log times of the present file
         self._count = 0  # messages in the present file
         self._flush_at: int | None = None  # on the steady clock; None: nothing is pending
         self._closed = False
-
         try:
             self.folder.mkdir(parents=True)
         except FileExistsError:
@@ -144,9 +138,7 @@ class BagWriter:
         Raises
         ------
         BagError
-            The topic was announced before, or its type is none.
-        BagWriteError
-            As for `write`.
+            The topic was announced before, or its type does not read ``package/msg/Type``.
 
         """
         if topic.name in self._topics:
@@ -174,23 +166,23 @@ class BagWriter:
         data
             The serialized message: CDR with its header of four bytes.
         log_time, publish_time
-            When the message was received (or the instant that it speaks of) and sent
+            When the message was received (or the instant that it is about) and sent
             [ns since the epoch].
 
         Raises
         ------
+        BagError
+            The topic was not announced, or a time is out of range; nothing was written.
         DiskFullError
             The disk is full. The bag has been closed with all that was written, this message
-            included, unless the text says otherwise; it takes no more.
-        BagWriteError
-            Writing failed for another reason; `recover` rescues what reached the disk.
+            included, unless the text says otherwise.
 
         """
         self._require_open()
         channel = self._channels.get(topic)
         if channel is None:
             raise BagError(f"{topic}: not announced by add_topic")
-        if not (0 <= log_time < TIME_END and 0 <= publish_time < TIME_END):
+        if not (0 <= log_time < _TIME_END and 0 <= publish_time < _TIME_END):
             raise BagError(
                 f"{topic}: a time lies outside of 0 to 2**64 - 1 ns: "
                 f"log time {log_time}, publish time {publish_time}"
@@ -215,11 +207,11 @@ class BagWriter:
         elif now >= self._flush_at:
             self.flush()
         if self._file.full:
-            self.custom_data[ENDED_EARLY] = f"disk full after {sum(self.counts.values())} messages"
+            full = f"disk full after {sum(self.counts.values())} messages"
+            self.custom_data[ENDED_EARLY] = full
             self.close()
             raise DiskFullError(
-                f"{self.folder}: disk full after {sum(self.counts.values())} messages; "
-                "all of them are in the bag, which is closed and readable"
+                f"{self.folder}: {full}; all of them are in the bag, which is closed and readable"
             )
         if (self._max_bytes and self._file.tell() >= self._max_bytes) or (
             self._max_span and self._last - self._first >= self._max_span
@@ -239,12 +231,6 @@ class BagWriter:
 
         A thread of its own then brings it to the disk, so that a loss of power loses only what
         came after; the caller does not wait for that. Without new messages it costs nothing.
-
-        Raises
-        ------
-        BagWriteError
-            As for `write`.
-
         """
         self._require_open()
         if self._flush_at is None:
@@ -257,15 +243,7 @@ class BagWriter:
             raise self._failure(error) from None
 
     def close(self) -> None:
-        """
-        Finish the bag: index, statistics, description. A second call does nothing.
-
-        Raises
-        ------
-        BagWriteError
-            The rest could not be written; `recover` rescues what reached the disk.
-
-        """
+        """Finish the bag: index, statistics, description. A second call does nothing."""
         if self._closed:
             return
         try:
@@ -289,9 +267,10 @@ class BagWriter:
         )
 
     def _open_file(self) -> None:
+        """Begin a file, and all that is known of it alone."""
         path = self.folder / f"{self.folder.name}_{len(self._files)}.mcap"
         # Room for a chunk that does not compress, the index and the descriptions.
-        self._file = _ReservingFile(path, 2 * self._chunk_size + MEBIBYTE)
+        self._file = _ReservingFile(path, 2 * self._chunk_size + _MEBIBYTE)
         self._files.append(FileInformation(path.name))
         output: Any = self._file
         self._writer = Writer(
@@ -300,9 +279,9 @@ class BagWriter:
             compression=self._compression,
             enable_data_crcs=True,
         )
-        self._schemas.clear()
-        self._channels.clear()
-        self._first, self._last, self._count = 2**64 - 1, 0, 0
+        self._schemas: dict[tuple[str, str], int] = {}  # id by type and text
+        self._channels: dict[str, int] = {}  # id by topic
+        self._first, self._last, self._count = _TIME_END - 1, 0, 0
         self._flush_at = None
         self._writer.start("ros2", f"gait_entrainment {LIBRARY_IDENTIFIER}")
         self._writer.add_metadata(RECORD_NAME, self._description().as_record())
@@ -333,12 +312,8 @@ class BagWriter:
             self._files[-1] = FileInformation(
                 self._file.path.name, self._first, self._last, self._count
             )
-        return BagDescription(
-            topics=tuple((topic, self.counts[topic.name]) for topic in self._topics.values()),
-            files=tuple(self._files),
-            custom_data=self.custom_data,
-            ros_distro=self.ros_distro,
-        )
+        topics = [(topic, self.counts[topic.name]) for topic in self._topics.values()]
+        return BagDescription(topics, self._files, self.custom_data, self.ros_distro)
 
     def _write_description(self) -> None:
         try:
@@ -350,7 +325,7 @@ class BagWriter:
 
 
 def _write_error(error: OSError, what: str) -> BagWriteError:
-    if error.errno in DISK_FULL:
+    if error.errno in _DISK_FULL:
         return DiskFullError(f"{what}: disk full")
     return BagWriteError(f"{what}: {first_line(error)}")
 
@@ -399,7 +374,7 @@ class _ReservingFile:
 
     def make_room(self, error: OSError) -> bool:
         """Give back the space that was put aside, if the disk is full and it still is aside."""
-        if error.errno not in DISK_FULL or self.full:
+        if error.errno not in _DISK_FULL or self.full:
             return False
         self.full = True
         self._reserve.close()
