@@ -3,7 +3,7 @@
 
 """Bags: recording into MCAP with rosbag2's rules, reading, checking, rescuing, exporting."""
 
-from gait_entrainment_bags.checks import check
+from gait_entrainment_bags.checks import Finding, Severity, check
 from gait_entrainment_bags.definitions import Definition, find_definition
 from gait_entrainment_bags.errors import (
     BagError,
@@ -19,7 +19,6 @@ from gait_entrainment_bags.metadata import INFINITE, QosProfile, TopicInfo
 from gait_entrainment_bags.playback import FASTEST, Moment, Playback, choose_topics
 from gait_entrainment_bags.reader import BagInfo, BagReader, info
 from gait_entrainment_bags.recovery import Recovery, recover
-from gait_entrainment_bags.rules import Finding, Severity
 from gait_entrainment_bags.tables import export
 from gait_entrainment_bags.writer import ENDED_EARLY, BagWriter
 

@@ -1,17 +1,25 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A linter for bags: which of rosbag2's rules a bag breaks, and who stumbles over that."""
+"""
+A linter for bags: which of rosbag2's rules a bag breaks, and who stumbles over that.
 
+The rules are those of rosbag2's Jazzy branch, of the MCAP specification and registry, and of the
+readers that are in use; docs/bags.md lists them.
+"""
+
+import enum
 import re
 from collections import Counter
-from contextlib import closing
+from contextlib import AbstractContextManager, closing
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path, PurePath
 from typing import Any
 
 from gait_entrainment_bags.decoding import CDR_HEADER_SIZE, decoder_for
 from gait_entrainment_bags.definitions import is_type_name, missing_definitions
-from gait_entrainment_bags.errors import BagError, UnreadableBagError
+from gait_entrainment_bags.errors import BagError, UnreadableBagError, noting
 from gait_entrainment_bags.mcap_file import McapFile
 from gait_entrainment_bags.mcap_records import BagMessage, Chunk, Contents
 from gait_entrainment_bags.metadata import (
@@ -28,9 +36,91 @@ from gait_entrainment_bags.metadata import (
     recorded_description,
 )
 from gait_entrainment_bags.reader import bag_files, differing_types
-from gait_entrainment_bags.rules import Finding, Report
 
 _TYPE_HASH = re.compile("RIHS01_[0-9a-f]{64}")
+
+
+class Severity(enum.Enum):
+    """How much a broken rule matters."""
+
+    ERROR = "error"  # a reader fails, or data is lost or wrong
+    WARNING = "warning"  # readers manage, with less
+
+
+_CONSEQUENCES = {
+    "mcap": "no reader opens it",
+    "closed": "rosbags refuses it, rosbag2 has to scan it; `entrain bag recover` makes it whole",
+    "intact": "readers stop there or give wrong data; `entrain bag recover` saves the rest",
+    "summary": "a reader has to go through the whole file to know what is in it, or falls back to "
+    "the order of the file",
+    "profile": "rosbags rejects the file",
+    "schema": "rosbag2 throws when it opens the file",
+    "schema-name": "rosbag2 finds no message package for it and skips the topic",
+    "schema-encoding": "viewers and decoders without the message package skip the topic",
+    "schema-text": "viewers and decoders without the message package skip the topic",
+    "message-encoding": "rosbag2 and rosbags cannot read the topic",
+    "offered-qos": "players publish with default QoS, so that late or reliable subscribers may "
+    "get nothing",
+    "qos-version": "rosbag2 throws when it opens the file",
+    "type-hash": "nobody can tell whether an installed definition is the recorded one",
+    "one-type": "readers decode one part of the topic by the wrong definition",
+    "cdr-header": "the message cannot be deserialized",
+    "message": "viewers and decoders fail on the topic",
+    "chunk-index": "readers fall back to the order of the file",
+    "message-index": "readers fall back to the order of the file, or miss messages",
+    "statistics": "numbers and times that readers show or seek by are wrong",
+    "rosbag2-record": "custom data and QoS are lost with metadata.yaml",
+    "metadata-file": "rosbag2 does not open the folder; `ros2 bag reindex` makes it anew",
+    "metadata-key": "rosbag2 throws when it opens the folder",
+    "metadata-version": "rosbag2 of Jazzy does not read it",
+    "metadata-qos": "rosbag2 throws when it opens the folder",
+    "metadata-files": "rosbag2 does not open the bag, or leaves a file out",
+    "metadata-topics": "rosbag2 does not play the topic, or shows wrong numbers",
+    "metadata-times": "`ros2 bag info` shows wrong times, start offsets go astray",
+}
+_MINOR = {"summary", "offered-qos", "type-hash", "chunk-index", "message-index", "rosbag2-record"}
+RULES = {
+    rule: (Severity.WARNING if rule in _MINOR else Severity.ERROR, consequence)
+    for rule, consequence in _CONSEQUENCES.items()
+}
+"""Severity and consequence by rule."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A broken rule: where and how (`detail`), and which reader fails in what way."""
+
+    rule: str
+    severity: Severity
+    detail: str
+    consequence: str
+
+    def __str__(self) -> str:
+        return f"{self.severity.value}: {self.rule}: {self.detail}: {self.consequence}"
+
+
+class _Report:
+    """Gathers where rules are broken."""
+
+    def __init__(self) -> None:
+        self._places: dict[str, list[str]] = {}
+
+    def add(self, rule: str, detail: str) -> None:
+        """Note a place where a rule is broken."""
+        self._places.setdefault(rule, []).append(detail)
+
+    def adding(self, rule: str) -> AbstractContextManager[None]:
+        """Note what cannot be read as a breach of this rule."""
+        return noting(partial(self.add, rule))
+
+    def findings(self) -> list[Finding]:
+        """Give one finding for each broken rule: the first place, and how many more there are."""
+        found = []
+        for rule, (severity, consequence) in RULES.items():
+            if places := self._places.get(rule):
+                more = f" (and {len(places) - 1} more)" if len(places) > 1 else ""
+                found.append(Finding(rule, severity, places[0] + more, consequence))
+        return found
 
 
 def check(path: Path | str) -> list[Finding]:
@@ -42,7 +132,7 @@ def check(path: Path | str) -> list[Finding]:
     of this project's writer give none.
     """
     path = Path(path)
-    report = Report()
+    report = _Report()
     with report.adding("mcap"):
         stocks = {}
         for file in bag_files(path):
@@ -54,7 +144,7 @@ def check(path: Path | str) -> list[Finding]:
     return report.findings()
 
 
-def _check_file(file: McapFile, report: Report) -> Contents:
+def _check_file(file: McapFile, report: _Report) -> Contents:
     """Check one MCAP file; give what it really holds."""
     path = file.path
     if file.header.profile != "ros2":
@@ -94,7 +184,7 @@ def _check_file(file: McapFile, report: Report) -> Contents:
 
 
 def _check_message(
-    path: Path, stock: Contents, message: BagMessage, decoded: set[str], report: Report
+    path: Path, stock: Contents, message: BagMessage, decoded: set[str], report: _Report
 ) -> None:
     """Check the header of a message, and decode the first one of a topic as a viewer would."""
     if message.data[:2] not in (b"\0\0", b"\0\1") or len(message.data) < CDR_HEADER_SIZE:
@@ -125,7 +215,7 @@ def _check_index(
     chunk: Chunk,
     listed: Chunk | None,
     messages: list[BagMessage],
-    report: Report,
+    report: _Report,
 ) -> None:
     """Hold a chunk and its messages as found against the chunk that the summary lists."""
     where = f"{file.path}: at byte {chunk.offset}"
@@ -147,7 +237,7 @@ def _check_index(
             report.add("message-index", f"{where}: the index does not list every message")
 
 
-def _check_statistics(path: Path, summary: Contents, stock: Contents, report: Report) -> None:
+def _check_statistics(path: Path, summary: Contents, stock: Contents, report: _Report) -> None:
     if (summary.start, summary.end) != (stock.start, stock.end) or +summary.counts != stock.counts:
         report.add(
             "statistics",
@@ -156,7 +246,7 @@ def _check_statistics(path: Path, summary: Contents, stock: Contents, report: Re
         )
 
 
-def _check_schemas(path: Path, stock: Contents, report: Report) -> None:
+def _check_schemas(path: Path, stock: Contents, report: _Report) -> None:
     for schema in stock.schemas.values():
         where = f"{path}: {schema.name}"
         if not is_type_name(schema.name):
@@ -167,7 +257,7 @@ def _check_schemas(path: Path, stock: Contents, report: Report) -> None:
             report.add("schema-text", f"{where}: lacks the definition of {', '.join(missing)}")
 
 
-def _check_channels(path: Path, stock: Contents, report: Report) -> None:
+def _check_channels(path: Path, stock: Contents, report: _Report) -> None:
     known: dict[str, TopicInfo] = {}
     version = recorded_description(stock.metadata).get("version", METADATA_VERSION)
     for channel, topic in zip(stock.channels, stock.topics, strict=True):
@@ -188,7 +278,7 @@ def _check_channels(path: Path, stock: Contents, report: Report) -> None:
             report.add("type-hash", f"{where}: no topic_type_hash RIHS01_ and 64 hex digits")
 
 
-def _check_qos_spelling(where: str, qos: str, version: Any, report: Report) -> None:
+def _check_qos_spelling(where: str, qos: str, version: Any, report: _Report) -> None:
     """Hold the spelling of a channel's policies against the version that the file names."""
     if not isinstance(version, int):
         return
@@ -210,7 +300,7 @@ def _check_qos_spelling(where: str, qos: str, version: Any, report: Report) -> N
         )
 
 
-def _check_metadata_file(folder: Path, stocks: dict[str, Contents], report: Report) -> None:
+def _check_metadata_file(folder: Path, stocks: dict[str, Contents], report: _Report) -> None:
     """Hold ``metadata.yaml`` against its own version and against what the files hold."""
     file = folder / METADATA_FILE
     said = read_metadata_file(folder)

@@ -5,6 +5,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 from gait_entrainment.errors import EntrainmentError
 
@@ -48,3 +49,15 @@ def noting(note: Callable[[str], object]) -> Iterator[None]:
         yield
     except UnreadableBagError as error:
         note(str(error))
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder that is not there yet; raises BagExistsError or BagWriteError."""
+    try:
+        folder.mkdir(parents=True)
+    except FileExistsError:
+        raise BagExistsError(
+            f"{folder}: is already there; choose another folder, nothing is overwritten"
+        ) from None
+    except OSError as error:
+        raise BagWriteError(f"{folder}: cannot be made: {error.strerror}") from None

@@ -20,7 +20,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from mcap.opcode import Opcode
-from mcap.records import DataEnd, Footer, Header, Metadata
+from mcap.records import DataEnd, Footer, Header, MetadataIndex
 
 from gait_entrainment_bags.errors import UnreadableBagError, noting
 from gait_entrainment_bags.mcap_records import (
@@ -43,6 +43,7 @@ from gait_entrainment_bags.metadata import first_line
 
 MAGIC = b"\x89MCAP0\r\n"
 _FOOTER_SIZE = RECORD.size + 20
+_FOOTER = RECORD.pack(Opcode.FOOTER, 20)  # how it begins
 # Of records outside of chunks these are looked into, in stretches of about a megabyte.
 _LOOSE = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.METADATA)
 _STRETCH = 2**20
@@ -129,10 +130,10 @@ class McapFile:
     def read_footer(self) -> Footer:
         """Read the footer; an error says that the file was never closed, or its end is lost."""
         offset = self.size - len(MAGIC) - _FOOTER_SIZE
-        if offset >= self.data_start and self.read(self.size - len(MAGIC), len(MAGIC)) == MAGIC:
-            opcode, content = self.record(offset)
-            if opcode == Opcode.FOOTER and len(content) == 20:
-                footer: Footer = parse(Footer, content)
+        if offset >= self.data_start:
+            end = self.read(offset, self.size - offset)
+            if end.startswith(_FOOTER) and end.endswith(MAGIC):
+                footer: Footer = parse(Footer, end[RECORD.size :])
                 return footer
         raise UnreadableBagError(
             f"{self.path}: was never closed, or its end is lost; `entrain bag recover` rescues "
@@ -154,7 +155,12 @@ class McapFile:
         contents = Contents()
         with self._broken("summary", begin):
             for opcode, start, stop in split(summary[: end - begin]):
-                contents.take(opcode, summary[start:stop])
+                content = summary[start:stop]
+                if opcode == Opcode.METADATA_INDEX:
+                    opcode, content = self.record(parse(MetadataIndex, content).offset)
+                    if opcode != Opcode.METADATA:
+                        raise ValueError("no metadata where it says it is")
+                contents.take(opcode, content)
         statistics = contents.statistics
         if (
             statistics is None
@@ -172,12 +178,6 @@ class McapFile:
                 f"{contents.message_count} by channel",
             )
         contents.start, contents.end = statistics.message_start_time, statistics.message_end_time
-        for index in contents.metadata_indexes:
-            opcode, content = self.record(index.offset)
-            if opcode != Opcode.METADATA:
-                raise self.damage(index.offset, "no metadata where the summary says it is")
-            with self._broken("metadata", index.offset):
-                contents.metadata.append(parse(Metadata, content))
         return contents
 
     # Chunks.

@@ -23,19 +23,12 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Metadata, MetadataIndex, Schema, Statistics
+from mcap.records import Channel, Metadata, Schema, Statistics
+from zstandard import ZstdError
 
 from gait_entrainment_bags.metadata import TopicInfo, topic_of
 
-BROKEN = (
-    McapError,
-    struct.error,
-    ValueError,
-    OverflowError,
-    RuntimeError,  # of lz4
-    MemoryError,
-    zstandard.ZstdError,
-)
+BROKEN = (McapError, ZstdError, struct.error, ValueError, OverflowError, RuntimeError, MemoryError)
 RECORD = struct.Struct("<BQ")  # opcode, length of the content
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 _CHUNK = struct.Struct("<QQQII")  # start, end, size, checksum, length of the compression's name
@@ -48,13 +41,11 @@ _FEW: dict[int, Any] = {
     Opcode.CHANNEL: Channel,
     Opcode.STATISTICS: Statistics,
     Opcode.METADATA: Metadata,
-    Opcode.METADATA_INDEX: MetadataIndex,
 }
 # What gives a chunk away among other bytes: length and name of its compression.
 _CHUNK_NAME = re.compile(rb"\x04\0\0\0zstd|\x03\0\0\0lz4")
 _CHUNK_NAME_OFFSET = RECORD.size + _CHUNK.size - 4
-CHUNK_HEAD = _CHUNK_NAME_OFFSET + 8
-"""Bytes from the start of a chunk by which `find_chunk` knows it."""
+CHUNK_HEAD = _CHUNK_NAME_OFFSET + 8  # bytes by which `find_chunks` knows a chunk
 # A chunk is held in memory at once. Writers make them a megabyte; this is for damaged sizes.
 LARGEST_CHUNK = 2**31
 
@@ -98,7 +89,6 @@ class Contents:
     end: int = 0
     statistics: Statistics | None = None
     metadata: list[Metadata] = field(default_factory=list)
-    metadata_indexes: list[MetadataIndex] = field(default_factory=list)
     damages: list[str] = field(default_factory=list)  # what cannot be read, and where
 
     @property
@@ -132,8 +122,6 @@ class Contents:
             self.statistics = record
         elif opcode == Opcode.METADATA:
             self.metadata.append(record)
-        elif opcode == Opcode.METADATA_INDEX:
-            self.metadata_indexes.append(record)
         elif opcode == Opcode.CHANNEL and record not in self.channels:
             known = record.id in self.names
             self.channels.append(record)

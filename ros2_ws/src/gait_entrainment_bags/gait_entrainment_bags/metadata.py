@@ -32,21 +32,14 @@ INFINITE = 2**63 - 1
 """Duration [ns] by which DDS says "no limit": 9223372036 s and 854775807 ns."""
 
 # The spelling of rosbag2's version 9 by the integers that earlier versions used.
-QOS_POLICIES: dict[str, dict[int, str]] = {
-    "history": dict(enumerate(["system_default", "keep_last", "keep_all", "unknown"])),
-    "reliability": dict(
-        enumerate(["system_default", "reliable", "best_effort", "unknown", "best_available"])
-    ),
-    "durability": dict(
-        enumerate(["system_default", "transient_local", "volatile", "unknown", "best_available"])
-    ),
-    "liveliness": {
-        0: "system_default",
-        1: "automatic",
-        3: "manual_by_topic",
-        4: "unknown",
-        5: "best_available",
-    },
+QOS_POLICIES = {
+    policy: {number: word for number, word in enumerate(words.split()) if word != "-"}
+    for policy, words in {
+        "history": "system_default keep_last keep_all unknown",
+        "reliability": "system_default reliable best_effort unknown best_available",
+        "durability": "system_default transient_local volatile unknown best_available",
+        "liveliness": "system_default automatic - manual_by_topic unknown best_available",
+    }.items()
 }
 _QOS_DURATIONS = ("deadline", "lifespan", "liveliness_lease_duration")
 
@@ -111,7 +104,7 @@ class TopicInfo:
     qos_profiles: tuple[QosProfile, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass
 class FileInformation:
     """One file of a bag; times in nanoseconds, 0 if it holds no message."""
 

@@ -185,6 +185,7 @@ class BagInfo:
 def info(path: Path | str) -> BagInfo:
     """Say what is in a bag, from its index alone; raises UnreadableBagError as BagReader does."""
     with BagReader(path) as reader:
+        names = sorted(reader.topics)
         return BagInfo(
             path=str(reader.path),
             files=tuple(str(file.path) for file, _ in reader._files),
@@ -192,10 +193,7 @@ def info(path: Path | str) -> BagInfo:
             start=reader.start,
             duration=reader.duration,
             message_count=reader.message_count,
-            topics=tuple(
-                (name, topic.type, reader.counts[name])
-                for name, topic in sorted(reader.topics.items())
-            ),
+            topics=tuple((name, reader.topics[name].type, reader.counts[name]) for name in names),
             custom_data=reader.custom_data,
             ros_distro=reader.ros_distro,
         )

@@ -100,24 +100,12 @@ def read_run(
     onset: str | None = None,
 ) -> RecordedRun:
     """
-    Read a bag of this project and analyze it anew.
+    Read a bag of this project, a folder or an ``.mcap`` file, and analyze it anew.
 
-    Parameters
-    ----------
-    path
-        Folder or ``.mcap`` file.
-    settings
-        The numbers in the verdict.
-    torques
-        Read the ankle torque of the strides that figures show.
-    onset
-        Where a pulse begins: "commanded" or "measured"; by default as the live analysis took it.
-
-    Raises
-    ------
-    BagError
-        It is no bag, is damaged, or lacks the protocol or the topics that are needed.
-
+    ``settings`` are the numbers in the verdict. ``torques`` reads the ankle torque of the strides
+    that figures show. A pulse begins at its "commanded" or "measured" ``onset``; by default as
+    the live analysis took it. Raises BagError if it is no bag, is damaged, or lacks the protocol
+    or the topics that are needed.
     """
     with BagReader(path) as bag:
         try:
@@ -265,26 +253,19 @@ class _Record:
 
     def read_torques(self, side: Side, strides: Sequence[Stride]) -> AnkleTorques:
         """Read the ankle torque of some strides; of all if the log times are not the stamps."""
-        rows: list[tuple[int, float, float, float]] = []
+        stamps: list[int] = []
+        rows: list[tuple[float, float, float]] = []
         name = self._names.get(topic_names.ANKLE_TORQUE, "")
         spans: list[tuple[int, float]] = [(stride.start, stride.end) for stride in strides]
         if strides and not self._stamped:
             spans = [(0, math.inf)]
-        for span in spans if name else []:
-            for _, message in self._bag.decoded([name], *span):
-                with _fields_expected(name):
-                    rows.append(
-                        (
-                            nanoseconds_of(message.header.stamp),
-                            message.intrinsic[side],
-                            message.delivered[side],
-                            message.effective_perturbation[side],
-                        )
-                    )
-        stamps, *columns = zip(*rows, strict=True) if rows else ((), (), (), ())
-        return AnkleTorques(
-            np.array(stamps, np.int64), *(np.array(column, float) for column in columns)
-        )
+        with _fields_expected(name):
+            for span in spans if name else []:
+                for _, message in self._bag.decoded([name], *span):
+                    torques = message.intrinsic, message.delivered, message.effective_perturbation
+                    stamps.append(nanoseconds_of(message.header.stamp))
+                    rows.append(tuple(torque[side] for torque in torques))
+        return AnkleTorques(np.array(stamps, np.int64), *np.array(rows).reshape(-1, 3).T)
 
 
 def _find(bag: BagReader, relative: str) -> str | None:

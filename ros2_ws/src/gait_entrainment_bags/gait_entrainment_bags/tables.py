@@ -8,7 +8,7 @@ import shutil
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from importlib import import_module
-from itertools import islice
+from itertools import chain, islice
 from operator import attrgetter, itemgetter
 from pathlib import Path
 from typing import Any
@@ -24,9 +24,9 @@ from gait_entrainment_bags.definitions import (
 )
 from gait_entrainment_bags.errors import (
     BagError,
-    BagExistsError,
     BagWriteError,
     UnreadableBagError,
+    make_folder,
 )
 from gait_entrainment_bags.metadata import TopicInfo, first_line
 from gait_entrainment_bags.reader import BagReader
@@ -86,12 +86,7 @@ def export(
         if silent := [name for name in topics if not reader.counts[name]]:
             raise BagError(f"{path}: no messages on {', '.join(silent)}: leave it out of --topics")
         _import_pyarrow()
-        try:
-            out.mkdir(parents=True)
-        except FileExistsError:
-            raise BagExistsError(f"{out}: is already there; choose another folder") from None
-        except OSError as error:
-            raise BagWriteError(f"{out}: cannot be made: {error.strerror}") from None
+        make_folder(out)
         written = {}
         try:
             for name in topics:
@@ -107,72 +102,53 @@ def export(
 
 
 def _write_table(reader: BagReader, topic: TopicInfo, file: Path) -> None:
+    arrow, csv, parquet = _import_pyarrow()
+    is_csv = file.suffix == ".csv"
     decode = decoder_for(topic)
     messages = reader.messages([topic.name])
-    table: _Table | None = None
-    while batch := list(islice(messages, _ROWS_AT_ONCE)):
-        decoded = [decode(message.data) for message in batch]
-        times = [[m.log_time for m in batch], [m.publish_time for m in batch]]
-        try:
-            table = table or _Table(file, columns_of(topic, decoded[0]))
-            table.append(times, decoded)
-        except IndexError:  # the decoder gives fewer bytes than an array has where a message ends
-            raise UnreadableBagError(
-                f"{topic.name}: not a {topic.type} in CDR: an array of fixed length is too short"
-            ) from None
-        except _ChangedNamesError:
-            raise BagError(
-                f"{topic.name}: the names of its elements change, so that no table of one column "
-                "per name can be made"
-            ) from None
-    if table is not None:
-        table.close()
+    first = next(messages)
+    rows = ((m.log_time, m.publish_time, decode(m.data)) for m in chain([first], messages))
+    try:
+        columns = columns_of(topic, decode(first.data))
+        schema = arrow.schema([_arrow_field(arrow, column, is_csv) for column in columns])
+        with (csv.CSVWriter if is_csv else parquet.ParquetWriter)(file, schema) as writer:
+            while batch := list(islice(rows, _ROWS_AT_ONCE)):
+                # A NaN is an empty cell in CSV, which is what `from_pandas` makes of it.
+                arrays = [
+                    arrow.array(_cells(column, batch, is_csv), field.type, from_pandas=is_csv)
+                    for column, field in zip(columns, schema, strict=True)
+                ]
+                writer.write_table(arrow.Table.from_arrays(arrays, schema=schema))
+    except IndexError:  # the decoder gives fewer bytes than an array has where a message ends
+        raise UnreadableBagError(
+            f"{topic.name}: not a {topic.type} in CDR: an array of fixed length is too short"
+        ) from None
+    except _ChangedNamesError:
+        raise BagError(
+            f"{topic.name}: the names of its elements change, so that no table of one column per "
+            "name can be made"
+        ) from None
 
 
 class _ChangedNamesError(Exception):
     """The elements of a message have other names, or another order, than in the first one."""
 
 
-class _Table:
-    """A table in a file, CSV or Parquet by its name, to which rows are added."""
+def _arrow_field(arrow: Any, column: Column, is_csv: bool) -> Any:
+    """Say where the unit stands, and of which type the cells are."""
+    name, metadata, kind = column.name, None, getattr(arrow, column.kind)()
+    if column.unit and is_csv:
+        name = f"{name} [{column.unit}]"
+    elif column.unit:
+        metadata = {"unit": column.unit}
+    if column.is_list:
+        kind = arrow.string() if is_csv else arrow.list_(kind)
+    return arrow.field(name, kind, metadata=metadata)
 
-    def __init__(self, file: Path, columns: list[Column]) -> None:
-        self._arrow, csv, parquet = _import_pyarrow()
-        self._is_csv = file.suffix == ".csv"
-        self._columns = columns
-        times = [Column(name, "ns", "uint64", _itself) for name in ("log_time", "publish_time")]
-        self._schema = self._arrow.schema([self._field(column) for column in times + columns])
-        writer = csv.CSVWriter if self._is_csv else parquet.ParquetWriter
-        self._writer = writer(file, self._schema)
 
-    def _field(self, column: Column) -> Any:
-        """Say where the unit stands, and of which type the cells are."""
-        name, metadata, kind = column.name, None, getattr(self._arrow, column.kind)()
-        if column.unit and self._is_csv:
-            name = f"{name} [{column.unit}]"
-        elif column.unit:
-            metadata = {"unit": column.unit}
-        if column.is_list:
-            kind = self._arrow.string() if self._is_csv else self._arrow.list_(kind)
-        return self._arrow.field(name, kind, metadata=metadata)
-
-    def append(self, times: list[list[int]], messages: list[Any]) -> None:
-        """Add rows: log times and publish times, and the decoded messages."""
-        cells: list[list[Any]] = list(times)
-        for column in self._columns:
-            values = list(map(column.value, messages))
-            as_text = self._is_csv and column.is_list
-            cells.append(list(map(json.dumps, values)) if as_text else values)
-        # A NaN is an empty cell in CSV, which is what `from_pandas` makes of it.
-        arrays = [
-            self._arrow.array(column, field.type, from_pandas=self._is_csv)
-            for column, field in zip(cells, self._schema, strict=True)
-        ]
-        self._writer.write_table(self._arrow.Table.from_arrays(arrays, schema=self._schema))
-
-    def close(self) -> None:
-        """Finish the file."""
-        self._writer.close()
+def _cells(column: Column, rows: list[Any], is_csv: bool) -> list[Any]:
+    values = map(column.value, rows)
+    return list(map(json.dumps, values) if is_csv and column.is_list else values)
 
 
 def _import_pyarrow() -> list[Any]:
@@ -184,19 +160,23 @@ def _import_pyarrow() -> list[Any]:
 
 
 def columns_of(topic: TopicInfo, example: Any) -> list[Column]:
-    """Lay out the columns of a topic; an example of a message may name those of its elements."""
+    """
+    Lay out the columns of a topic; an example of a message may name those of its elements.
+
+    They are filled from rows: log time, publish time, decoded message.
+    """
     parts = schema_parts(topic.type, topic.schema_text)
-    return list(_columns(parts, short_name(topic.type), "", "", _itself, example))
-
-
-def _itself(message: Any) -> Any:
-    return message
+    return [
+        Column("log_time", "ns", "uint64", itemgetter(0)),
+        Column("publish_time", "ns", "uint64", itemgetter(1)),
+        *_columns(parts, short_name(topic.type), "", "", itemgetter(2), example),
+    ]
 
 
 def _columns(
     parts: dict[str, str], type_name: str, prefix: str, outer_unit: str, get: _Getter, example: Any
 ) -> Iterator[Column]:
-    """Lay out the columns of the fields of a type, of which `get` takes a value from a message."""
+    """Lay out the columns of the fields of a type, of which `get` takes a value from a row."""
     fields = [_complete(field, type_name, outer_unit) for field in fields_of(parts[type_name])]
     names = _element_names(fields, example)
     for field in fields:
@@ -259,13 +239,13 @@ def _list_column(field: Field, path: str, value: _Getter) -> Column:
 
 
 def _then(get: _Getter, step: _Getter) -> _Getter:
-    return lambda message: step(get(message))
+    return lambda row: step(get(row))
 
 
 def _named_item(get: _Getter, value: _Getter, names: list[str], number: int) -> _Getter:
-    def item(message: Any) -> Any:
-        values = value(message)
-        if get(message).name != names or len(values) != len(names):
+    def item(row: Any) -> Any:
+        values = value(row)
+        if get(row).name != names or len(values) != len(names):
             raise _ChangedNamesError
         return values[number]
 

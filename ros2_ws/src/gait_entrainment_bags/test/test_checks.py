@@ -22,8 +22,8 @@ from gait_entrainment_bags import (
     UnreadableBagError,
     check,
 )
+from gait_entrainment_bags.checks import RULES
 from gait_entrainment_bags.metadata import offered_qos_text
-from gait_entrainment_bags.rules import RULES
 
 HASH = "RIHS01_" + "0" * 64
 # The same profile as versions before 9 spell it.

@@ -10,10 +10,9 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
-from gait_entrainment_bags.checks import check
+from gait_entrainment_bags.checks import Severity, check
 from gait_entrainment_bags.reader import info, require_bag
 from gait_entrainment_bags.recovery import recover
-from gait_entrainment_bags.rules import Severity
 from gait_entrainment_bags.tables import FORMATS, export
 
 DESCRIPTION = "Look into bags, check them, rescue them, make tables of them."
