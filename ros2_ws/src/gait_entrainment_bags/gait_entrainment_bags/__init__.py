@@ -23,32 +23,13 @@ from gait_entrainment_bags.tables import export
 from gait_entrainment_bags.writer import ENDED_EARLY, BagWriter
 
 __all__ = [
-    "BagWriter",
-    "ENDED_EARLY",
-    "BagReader",
-    "BagMessage",
-    "BagInfo",
-    "info",
-    "check",
-    "Finding",
-    "Severity",
-    "recover",
-    "Recovery",
+    "BagWriter", "ENDED_EARLY", "TopicInfo", "QosProfile", "INFINITE",  # write
+    "Definition", "find_definition",
+    "BagReader", "BagMessage", "BagInfo", "info",  # read
+    "check", "Finding", "Severity",
+    "recover", "Recovery",
     "export",
-    "Playback",
-    "Moment",
-    "FASTEST",
-    "choose_topics",
-    "TopicInfo",
-    "QosProfile",
-    "INFINITE",
-    "Definition",
-    "find_definition",
-    "BagError",
-    "BagExistsError",
-    "UnreadableBagError",
-    "NoBagError",
-    "DefinitionMissingError",
-    "BagWriteError",
-    "DiskFullError",
-]
+    "Playback", "Moment", "FASTEST", "choose_topics",
+    "BagError", "BagExistsError", "UnreadableBagError", "NoBagError", "DefinitionMissingError",
+    "BagWriteError", "DiskFullError",
+]  # fmt: skip

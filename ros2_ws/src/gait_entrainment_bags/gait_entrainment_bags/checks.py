@@ -17,6 +17,8 @@ from functools import partial
 from pathlib import Path, PurePath
 from typing import Any
 
+from mcap.records import Channel
+
 from gait_entrainment_bags.decoding import CDR_HEADER_SIZE, decoder_for
 from gait_entrainment_bags.definitions import is_type_name, missing_definitions
 from gait_entrainment_bags.errors import BagError, UnreadableBagError, noting
@@ -137,167 +139,154 @@ def check(path: Path | str) -> list[Finding]:
         stocks = {}
         for file in bag_files(path):
             with report.adding("mcap"), closing(McapFile(file)) as opened:
-                stocks[file.name] = _check_file(opened, report)
+                stocks[file.name] = _FileCheck(opened, report).run()
         if path.is_dir():
             with report.adding("metadata-file"):
                 _check_metadata_file(path, stocks, report)
     return report.findings()
 
 
-def _check_file(file: McapFile, report: _Report) -> Contents:
-    """Check one MCAP file; give what it really holds."""
-    path = file.path
-    if file.header.profile != "ros2":
-        report.add("profile", f"{path}: profile {file.header.profile!r} instead of 'ros2'")
-    closed = False
-    summary: Contents | None = None
-    with report.adding("closed"):
-        file.read_footer()
-        closed = True
-    if closed:
-        with report.adding("intact"):
-            summary = file.read_summary()
-            if summary is None:
-                report.add("summary", f"{path}: no summary of channels, statistics and chunks")
-    stock = Contents()
-    listed = {chunk.offset: chunk for chunk in summary.chunks} if summary else {}
-    decoded: set[str] = set()  # topics of which a message was decoded
-    for chunk, messages in file.walk(stock, summary):
-        for message in messages:
-            _check_message(path, stock, message, decoded, report)
+class _FileCheck:
+    """Checks one MCAP file."""
+
+    def __init__(self, file: McapFile, report: _Report) -> None:
+        self._file = file
+        self._report = report
+        self._stock = Contents()
+        self._decoded: set[str] = set()  # topics of which a message was decoded
+
+    def _add(self, rule: str, detail: str) -> None:
+        self._report.add(rule, f"{self._file.path}: {detail}")
+
+    def run(self) -> Contents:
+        """Check all of the file; give what it really holds."""
+        if self._file.header.profile != "ros2":
+            self._add("profile", f"profile {self._file.header.profile!r} instead of 'ros2'")
+        closed = False
+        summary: Contents | None = None
+        with self._report.adding("closed"):
+            self._file.read_footer()
+            closed = True
+        if closed:
+            with self._report.adding("intact"):
+                summary = self._file.read_summary()
+                if summary is None:
+                    self._add("summary", "no summary of channels, statistics and chunks")
+        listed = {chunk.offset: chunk for chunk in summary.chunks} if summary else {}
+        for chunk, messages in self._file.walk(self._stock, summary):
+            for message in messages:
+                self._check_message(message)
+            if summary is not None:
+                self._check_index(chunk, listed.get(chunk.offset), messages)
+        if closed:
+            for damage in self._stock.damages:
+                self._report.add("intact", damage)
+            with self._report.adding("intact"):
+                self._file.check_data()
+        self._check_schemas()
+        self._check_channels()
+        recorded = bool(recorded_description(self._stock.metadata))
+        if not recorded:
+            self._add("rosbag2-record", f"no metadata record {RECORD_NAME!r}")
         if summary is not None:
-            _check_index(file, stock, chunk, listed.get(chunk.offset), messages, report)
-    if closed:
-        for damage in stock.damages:
-            report.add("intact", damage)
-        with report.adding("intact"):
-            file.check_data()
-    if summary is not None:
-        _check_statistics(path, summary, stock, report)
-    _check_schemas(path, stock, report)
-    _check_channels(path, stock, report)
-    if not recorded_description(stock.metadata):
-        report.add("rosbag2-record", f"{path}: no metadata record {RECORD_NAME!r}")
-    elif summary is not None and not recorded_description(summary.metadata):
-        report.add("rosbag2-record", f"{path}: the summary does not list it")
-    return stock
+            self._check_statistics(summary)
+            if recorded and not recorded_description(summary.metadata):
+                self._add("rosbag2-record", "the summary does not list it")
+        return self._stock
 
+    def _check_message(self, message: BagMessage) -> None:
+        """Check the header of a message, and decode the first of a topic as a viewer would."""
+        if message.data[:2] not in (b"\0\0", b"\0\1") or len(message.data) < CDR_HEADER_SIZE:
+            begin = message.data[:CDR_HEADER_SIZE].hex(" ") or "nothing"
+            self._add("cdr-header", f"{message.topic}: begins with {begin}")
+            return
+        if message.topic in self._decoded:
+            return
+        self._decoded.add(message.topic)
+        topic = next(topic for topic in self._stock.topics if topic.name == message.topic)
+        if not is_type_name(topic.type):
+            return
+        # A type without fields is serialized as one byte, which is padded to four.
+        if not topic.schema_text.strip() and len(message.data) > CDR_HEADER_SIZE + 4:
+            self._add("schema-text", f"{topic.type}: is empty")
+            return
+        try:
+            decoder_for(topic)(message.data)
+        except UnreadableBagError as error:
+            self._add("message", str(error))
+        except BagError as error:
+            self._add("schema-text", str(error))
 
-def _check_message(
-    path: Path, stock: Contents, message: BagMessage, decoded: set[str], report: _Report
-) -> None:
-    """Check the header of a message, and decode the first one of a topic as a viewer would."""
-    if message.data[:2] not in (b"\0\0", b"\0\1") or len(message.data) < CDR_HEADER_SIZE:
-        begin = message.data[:CDR_HEADER_SIZE].hex(" ") or "nothing"
-        report.add("cdr-header", f"{path}: {message.topic}: begins with {begin}")
-        return
-    if message.topic in decoded:
-        return
-    decoded.add(message.topic)
-    topic = next((topic for topic in stock.topics if topic.name == message.topic), None)
-    if topic is None or not is_type_name(topic.type):
-        return
-    # A type without fields is serialized as one byte, which is padded to four.
-    if not topic.schema_text.strip() and len(message.data) > CDR_HEADER_SIZE + 4:
-        report.add("schema-text", f"{path}: {topic.type}: is empty")
-        return
-    try:
-        decoder_for(topic)(message.data)
-    except UnreadableBagError as error:
-        report.add("message", f"{path}: {error}")
-    except BagError as error:
-        report.add("schema-text", f"{path}: {error}")
+    def _check_index(self, chunk: Chunk, listed: Chunk | None, messages: list[BagMessage]) -> None:
+        """Hold a chunk and its messages as found against the chunk that the summary lists."""
+        where = f"at byte {chunk.offset}"
+        if listed is None:
+            self._add("chunk-index", f"{where}: messages that no chunk index lists")
+            return
+        if (listed.start, listed.end) != (chunk.start, chunk.end):
+            self._add("chunk-index", f"{where}: the times of the index are wrong")
+        names = self._stock.names
+        with self._report.adding("message-index"):
+            indexed = {
+                (names.get(channel), log_time, offset)
+                for channel, index in listed.index_offsets.items()
+                for log_time, offset in self._file.message_index(index, channel)
+            }
+            if indexed != {(m.topic, m.log_time, m.offset) for m in messages}:
+                self._add("message-index", f"{where}: the index does not list every message")
 
-
-def _check_index(
-    file: McapFile,
-    stock: Contents,
-    chunk: Chunk,
-    listed: Chunk | None,
-    messages: list[BagMessage],
-    report: _Report,
-) -> None:
-    """Hold a chunk and its messages as found against the chunk that the summary lists."""
-    where = f"{file.path}: at byte {chunk.offset}"
-    if listed is None:
-        report.add("chunk-index", f"{where}: messages that no chunk index lists")
-        return
-    if (listed.start, listed.end) != (chunk.start, chunk.end):
-        report.add("chunk-index", f"{where}: the times of the index are wrong")
-    names = stock.names
-    with report.adding("message-index"):
-        indexed = {
-            (names.get(channel, ""), log_time)
-            for channel, offset in listed.index_offsets.items()
-            for log_time, _ in file.message_index(offset, channel)
-        }
-        read = file.messages(listed, 0, names)
-        found = {(message.topic, message.log_time) for message in messages}
-        if indexed != found or len(read) != len(messages):
-            report.add("message-index", f"{where}: the index does not list every message")
-
-
-def _check_statistics(path: Path, summary: Contents, stock: Contents, report: _Report) -> None:
-    if (summary.start, summary.end) != (stock.start, stock.end) or +summary.counts != stock.counts:
-        report.add(
-            "statistics",
-            f"{path}: {summary.message_count} messages from {summary.start} to {summary.end} ns "
-            f"announced, {stock.message_count} from {stock.start} to {stock.end} ns found",
+    def _check_statistics(self, summary: Contents) -> None:
+        said, found = (
+            f"{it.message_count} messages from {it.start} to {it.end} ns"
+            for it in (summary, self._stock)
         )
+        if said != found or +summary.counts != self._stock.counts:
+            self._add("statistics", f"{said} announced, {found} found")
 
+    def _check_schemas(self) -> None:
+        for schema in self._stock.schemas.values():
+            text = schema.data.decode(errors="replace")
+            if not is_type_name(schema.name):
+                self._add("schema-name", f"{schema.name}: a type reads package/msg/Type")
+            elif schema.encoding != "ros2msg":
+                self._add("schema-encoding", f"{schema.name}: {schema.encoding!r}, not 'ros2msg'")
+            elif missing := ", ".join(missing_definitions(schema.name, text)):
+                self._add("schema-text", f"{schema.name}: lacks the definition of {missing}")
 
-def _check_schemas(path: Path, stock: Contents, report: _Report) -> None:
-    for schema in stock.schemas.values():
-        where = f"{path}: {schema.name}"
-        if not is_type_name(schema.name):
-            report.add("schema-name", f"{where}: a type reads package/msg/Type")
-        elif schema.encoding != "ros2msg":
-            report.add("schema-encoding", f"{where}: {schema.encoding!r} instead of 'ros2msg'")
-        elif missing := missing_definitions(schema.name, schema.data.decode(errors="replace")):
-            report.add("schema-text", f"{where}: lacks the definition of {', '.join(missing)}")
+    def _check_channels(self) -> None:
+        known: dict[str, TopicInfo] = {}
+        version = recorded_description(self._stock.metadata).get("version", METADATA_VERSION)
+        for channel, topic in zip(self._stock.channels, self._stock.topics, strict=True):
+            name = channel.topic
+            if channel.schema_id not in self._stock.schemas:
+                self._add("schema", f"{name}: schema {channel.schema_id} is not in the file")
+            elif difference := differing_types(known.setdefault(name, topic), topic):
+                self._add("one-type", f"{name}: has {difference}")
+            if channel.message_encoding != "cdr":
+                self._add("message-encoding", f"{name}: {channel.message_encoding!r}, not 'cdr'")
+            with self._report.adding("offered-qos"):
+                self._check_qos(channel, version)
+            if not _TYPE_HASH.fullmatch(topic.type_hash):
+                self._add("type-hash", f"{name}: no topic_type_hash RIHS01_ and 64 hex digits")
 
-
-def _check_channels(path: Path, stock: Contents, report: _Report) -> None:
-    known: dict[str, TopicInfo] = {}
-    version = recorded_description(stock.metadata).get("version", METADATA_VERSION)
-    for channel, topic in zip(stock.channels, stock.topics, strict=True):
-        where = f"{path}: {channel.topic}"
-        if channel.schema_id not in stock.schemas:
-            report.add("schema", f"{where}: schema {channel.schema_id} is not in the file")
-        elif difference := differing_types(known.setdefault(topic.name, topic), topic):
-            report.add("one-type", f"{where}: has {difference}")
-        if channel.message_encoding != "cdr":
-            report.add("message-encoding", f"{where}: {channel.message_encoding!r}, not 'cdr'")
+    def _check_qos(self, channel: Channel, version: Any) -> None:
+        """Hold the offered QoS against its form, and its spelling against the file's version."""
+        where = f"{self._file.path}: {channel.topic}: offered_qos_profiles"
         qos = channel.metadata.get("offered_qos_profiles")
-        with report.adding("offered-qos"):
-            if qos is None:
-                raise UnreadableBagError(f"{where}: no offered_qos_profiles")
-            parse_qos_profiles(qos, f"{where}: offered_qos_profiles")
-            _check_qos_spelling(where, qos, version, report)
-        if not _TYPE_HASH.fullmatch(channel.metadata.get("topic_type_hash", "")):
-            report.add("type-hash", f"{where}: no topic_type_hash RIHS01_ and 64 hex digits")
-
-
-def _check_qos_spelling(where: str, qos: str, version: Any, report: _Report) -> None:
-    """Hold the spelling of a channel's policies against the version that the file names."""
-    if not isinstance(version, int):
-        return
-    spelled = {
-        isinstance(profile[policy], str)
-        for profile in load_yaml(qos, where) or []
-        for policy in ("reliability", "durability", "liveliness")
-    }
-    if version < METADATA_VERSION and True in spelled:
-        report.add(
-            "qos-version",
-            f"{where}: policies are words, but the record {RECORD_NAME!r} is of version "
-            f"{version}, which has numbers",
-        )
-    elif version >= METADATA_VERSION and False in spelled:
-        report.add(
-            "offered-qos",
-            f"{where}: policies are numbers, which rosbag2 takes for unknown in version {version}",
-        )
+        if qos is None:
+            raise UnreadableBagError(f"{where}: is missing")
+        parse_qos_profiles(qos, where)
+        in_words = {
+            isinstance(profile[policy], str)
+            for profile in load_yaml(qos, where) or []
+            for policy in ("reliability", "durability", "liveliness")
+        }
+        old = isinstance(version, int) and version < METADATA_VERSION
+        if old and True in in_words:
+            text = f"policies are words, but version {version} of the file has numbers"
+            self._report.add("qos-version", f"{where}: {text}")
+        elif isinstance(version, int) and not old and False in in_words:
+            raise UnreadableBagError(f"{where}: policies are numbers, not words as of version 9")
 
 
 def _check_metadata_file(folder: Path, stocks: dict[str, Contents], report: _Report) -> None:

@@ -22,14 +22,8 @@ from gait_entrainment_bags.errors import BagError, UnreadableBagError
 from gait_entrainment_bags.metadata import TopicInfo, first_line
 
 CDR_HEADER_SIZE = 4
-_NOT_DECODED = (
-    struct.error,
-    ValueError,
-    IndexError,
-    NotImplementedError,
-    MemoryError,
-    RecursionError,  # a definition that contains itself
-)
+# The last one includes what is not implemented, and the recursion of what contains itself.
+_NOT_DECODED = (struct.error, ValueError, IndexError, MemoryError, RuntimeError)
 
 
 @cache

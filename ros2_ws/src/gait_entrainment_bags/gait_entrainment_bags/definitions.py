@@ -76,7 +76,10 @@ def _find_definition(type_name: str, prefixes: tuple[Path, ...]) -> Definition:
             text = _text_of(name, prefixes)
             parts[name] = f"{SEPARATOR}\nMSG: {short_name(name)}\n{text}" if parts else text
             waiting += _dependencies(name, text)
-    return Definition(type_name, "\n".join(parts.values()), _hash_of(type_name, prefixes))
+    for entry in _description_of(type_name, prefixes)["type_hashes"]:
+        if entry["type_name"] == type_name:
+            return Definition(type_name, "\n".join(parts.values()), entry["hash_string"])
+    raise DefinitionMissingError(f"{type_name}: its type description gives no hash")
 
 
 def _text_of(type_name: str, prefixes: tuple[Path, ...]) -> str:
@@ -99,13 +102,6 @@ def _field_line(field: Mapping[str, Any]) -> str:
         text = _VALUE_TYPES[value].format(described["string_capacity"])
     capacity = described["capacity"]
     return text + ("", f"[{capacity}]", f"[<={capacity}]", "[]")[sequence] + f" {field['name']}\n"
-
-
-def _hash_of(type_name: str, prefixes: tuple[Path, ...]) -> str:
-    for entry in _description_of(type_name, prefixes)["type_hashes"]:
-        if entry["type_name"] == type_name:
-            return str(entry["hash_string"])
-    raise DefinitionMissingError(f"{type_name}: its type description gives no hash")
 
 
 def _description_of(type_name: str, prefixes: tuple[Path, ...]) -> Any:
@@ -132,7 +128,7 @@ def _read(relative: str, type_name: str, prefixes: tuple[Path, ...]) -> str:
 
 @dataclass(frozen=True)
 class Field:
-    """A field of a definition: its type without bounds, built in or ``[package/]Type``."""
+    """A field of a definition: its type without bounds, built in or ``package/Type``."""
 
     name: str
     type: str
@@ -140,7 +136,7 @@ class Field:
     unit: str
 
 
-def fields_of(text: str) -> Iterator[Field]:
+def fields_of(text: str, package: str) -> Iterator[Field]:
     """
     Read the fields of a definition, constants left out, with the units in their comments.
 
@@ -157,6 +153,8 @@ def fields_of(text: str) -> Iterator[Field]:
             head_unit = head_unit or unit
         if field := _FIELD.match(code):
             type_name, array, size, name = field.groups()
+            if type_name not in BUILT_IN_TYPES and "/" not in type_name:
+                type_name = f"{package}/{type_name}"
             length = None if array is None else int(size) if size.isdecimal() else -1
             yield Field(name, type_name, length, unit or head_unit)
 
@@ -164,12 +162,12 @@ def fields_of(text: str) -> Iterator[Field]:
 def _dependencies(type_name: str, text: str) -> Iterator[str]:
     """Give the full names of the message types that a definition names, in its order."""
     package, kind, _ = _split(type_name)
-    for field in fields_of(text):
+    for field in fields_of(text, package):
         if field.type not in BUILT_IN_TYPES:
             owner, _, name = field.type.rpartition("/")
             # In a text made from a type description names with an underscore are those of the
             # same service or action.
-            yield f"{owner or package}/{kind if '_' in name else 'msg'}/{name}"
+            yield f"{owner}/{kind if '_' in name else 'msg'}/{name}"
 
 
 def schema_parts(type_name: str, schema_text: str) -> dict[str, str]:

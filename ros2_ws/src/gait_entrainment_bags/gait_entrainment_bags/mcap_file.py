@@ -71,10 +71,8 @@ class McapFile:
                 raise UnreadableBagError(f"{path}: is empty")
             if not MAGIC.startswith(self.read(0, min(self.size, len(MAGIC)))):
                 raise UnreadableBagError(f"{path}: is not an MCAP file")
-            opcode, content = self.record(len(MAGIC))
+            content = self.record(len(MAGIC), Opcode.HEADER)
             with self._broken("header", len(MAGIC)):
-                if opcode != Opcode.HEADER:
-                    raise ValueError("it is missing")
                 self.header: Header = parse(Header, content)
             self.data_start = len(MAGIC) + RECORD.size + len(content)
         except UnreadableBagError:
@@ -120,12 +118,13 @@ class McapFile:
             raise self.damage(offset, f"the file ends {missing} bytes before its record does")
         return opcode, length
 
-    def record(self, offset: int) -> tuple[int, bytes]:
-        """Read opcode and content of the record at an offset."""
+    def record(self, offset: int, expected: Opcode) -> bytes:
+        """Read the content of the record that is to be at an offset."""
         opcode, length = self.record_at(offset)
-        return opcode, self.read(offset + RECORD.size, length)
-
-    # The end of the file.
+        if opcode != expected:
+            what = expected.name.lower().replace("_", " ")
+            raise self.damage(offset, f"no {what} where there must be one")
+        return self.read(offset + RECORD.size, length)
 
     def read_footer(self) -> Footer:
         """Read the footer; an error says that the file was never closed, or its end is lost."""
@@ -157,9 +156,8 @@ class McapFile:
             for opcode, start, stop in split(summary[: end - begin]):
                 content = summary[start:stop]
                 if opcode == Opcode.METADATA_INDEX:
-                    opcode, content = self.record(parse(MetadataIndex, content).offset)
-                    if opcode != Opcode.METADATA:
-                        raise ValueError("no metadata where it says it is")
+                    opcode = Opcode.METADATA
+                    content = self.record(parse(MetadataIndex, content).offset, opcode)
                 contents.take(opcode, content)
         statistics = contents.statistics
         if (
@@ -180,24 +178,16 @@ class McapFile:
         contents.start, contents.end = statistics.message_start_time, statistics.message_end_time
         return contents
 
-    # Chunks.
-
     def chunk_data(self, chunk: Chunk) -> bytes:
         """Read the records of a chunk, decompressed and checked by size and checksum."""
         if not chunk.is_record:
             return self.read(chunk.offset, chunk.length)
-        opcode, content = self.record(chunk.offset)
-        if opcode != Opcode.CHUNK:
-            raise self.damage(chunk.offset, "no chunk where the index says there is one")
+        content = self.record(chunk.offset, Opcode.CHUNK)
         with self._broken("chunk", chunk.offset):
             return decompress(content)
 
     def messages(self, chunk: Chunk, rank: int, names: Mapping[int, str]) -> list[BagMessage]:
-        """
-        Read messages of a chunk, in the order of the file, of these topics (by channel).
-
-        The rank is the place of the chunk among all chunks of the bag.
-        """
+        """Read messages of the chunk of this rank in the bag, of these topics by channel."""
         place = rank * LARGEST_CHUNK
         with self._broken("chunk", chunk.offset):
             if chunk.index_offsets.keys() <= names.keys():  # all of it, or no index
@@ -214,20 +204,13 @@ class McapFile:
                 for log_time, offset in self.message_index(chunk.index_offsets[channel], channel)
             )
             records = self.chunk_data(chunk) if entries else b""
-            return [
-                parse_indexed_message(records, offset, log_time, place, names)
-                for offset, log_time in entries
-            ]
+            return [parse_indexed_message(records, *entry, place, names) for entry in entries]
 
     def message_index(self, offset: int, channel: int) -> list[tuple[int, int]]:
         """Read the message index of a channel: log times and offsets in the chunk."""
-        opcode, content = self.record(offset)
-        if opcode != Opcode.MESSAGE_INDEX:
-            raise self.damage(offset, "no message index where the chunk's index says there is one")
+        content = self.record(offset, Opcode.MESSAGE_INDEX)
         with self._broken("message index", offset):
             return parse_message_index(content, channel)
-
-    # Walking through all of the file.
 
     def records(self, offset: int) -> Iterator[tuple[int, int, int]]:
         """Give opcode, offset and length of the content of the data section's next records."""
@@ -244,19 +227,15 @@ class McapFile:
 
     def check_data(self) -> None:
         """Check the data section against the checksum at its end, if the writer left one."""
-        for opcode, end, length in self.records(self.data_start):
-            if opcode != Opcode.DATA_END:
-                continue
-            if length != 4:
-                raise self.damage(end, "broken end of the data section")
-            expected = parse(DataEnd, self.record(end)[1]).data_section_crc
-            checksum = 0
-            for offset in range(0, end, _STRETCH):
-                checksum = zlib.crc32(self.read(offset, min(_STRETCH, end - offset)), checksum)
-            if expected and checksum != expected:
-                raise self.damage(end, "the data section does not match its checksum")
-            return
-        raise self.damage(self.size, "the end of the data section is not marked")
+        opcode, end, length = deque(self.records(self.data_start), maxlen=1).pop()
+        if opcode != Opcode.DATA_END or length != 4:
+            raise self.damage(end, "the end of the data section is not marked")
+        expected = parse(DataEnd, self.record(end, Opcode.DATA_END)).data_section_crc
+        checksum = 0
+        for offset in range(0, end, _STRETCH):
+            checksum = zlib.crc32(self.read(offset, min(_STRETCH, end - offset)), checksum)
+        if expected and checksum != expected:
+            raise self.damage(end, "the data section does not match its checksum")
 
     def scan(self) -> Contents:
         """Take stock of the data section, whatever is damaged in it."""

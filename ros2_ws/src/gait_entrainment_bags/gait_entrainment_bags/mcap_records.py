@@ -64,6 +64,11 @@ class BagMessage(NamedTuple):
     publish_time: int
     data: bytes
 
+    @property
+    def offset(self) -> int:
+        """Offset of its record in its chunk."""
+        return self.place % LARGEST_CHUNK - RECORD.size
+
 
 @dataclass(frozen=True)
 class Chunk:

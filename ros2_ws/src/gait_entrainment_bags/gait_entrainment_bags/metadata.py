@@ -182,11 +182,7 @@ _EXAMPLE = BagDescription([(TopicInfo("", "", ""), 0)], [FileInformation("")]).a
 
 
 def read_metadata_file(folder: Path) -> dict[str, Any]:
-    """
-    Read ``metadata.yaml``, without its root key.
-
-    Raises UnreadableBagError if it is missing, or not what rosbag2 writes.
-    """
+    """Read ``metadata.yaml``, without its root key; UnreadableBagError if rosbag2 could not."""
     path = folder / METADATA_FILE
     try:
         text = path.read_text(encoding="utf-8")
@@ -304,11 +300,7 @@ def _dump_yaml(value: object) -> str:
 
 
 def load_yaml(text: str, where: str) -> Any:
-    """
-    Read YAML that somebody else wrote.
-
-    Raises UnreadableBagError if it is not YAML, or nested too deeply to be read.
-    """
+    """Read YAML of others; raises UnreadableBagError if it is none, or nested too deeply."""
     try:
         depth = 0
         for event in yaml.parse(text, Loader=_LOADER):

@@ -67,8 +67,7 @@ class Playback:
         self.rate = rate
         self.paused = paused
         self.ended = False
-        self.start = self.end = 0
-        """First instant to play, and instant to stop before [ns since 1970]."""
+        self.start = self.end = 0  # first instant to play, and the one to stop before [ns]
         self._bag = bag
         self._loop = loop
         self._tick_period = round(clock_period * NANOSECONDS_PER_SECOND)
@@ -76,12 +75,8 @@ class Playback:
         self._origin = self._origin_at = 0
         self._moments = self._moments_from(0)
         self._next: Moment | None = None
-        whole = bag.duration / NANOSECONDS_PER_SECOND
-        self.play(
-            round(start_offset * NANOSECONDS_PER_SECOND),
-            round(duration * NANOSECONDS_PER_SECOND) if duration <= whole else 0,
-            0,
-        )
+        lasting = min(duration * NANOSECONDS_PER_SECOND, bag.duration + 1)
+        self.play(round(start_offset * NANOSECONDS_PER_SECOND), round(lasting), 0)
 
     def begin(self, now: int) -> None:
         """Let the first instant be due now (steady time [ns])."""
@@ -130,22 +125,14 @@ class Playback:
         self.rate = rate
 
     def seek(self, instant: int, now: int) -> None:
-        """
-        Go on from another instant of the bag [ns since 1970], at its first message.
-
-        Raises BagError if the instant lies outside of what is played.
-        """
+        """Go on from an instant [ns since 1970]; raises BagError outside of what is played."""
         if not self.start <= instant < self.end:
             raise BagError(f"time: {instant} ns; allowed: {self.start} to {self.end - 1} ns")
         self._origin_at = now
         self._go_to(instant)
 
     def play(self, start_offset: int, duration: int, now: int) -> None:
-        """
-        Play from an offset into the bag [ns] for a duration [ns]; 0 for all that follows.
-
-        Raises BagError if the offset lies outside of the bag.
-        """
+        """Play from an offset [ns], which must lie in the bag, for a duration [ns]; 0: all."""
         if not 0 <= start_offset <= self._bag.duration:
             raise BagError(
                 f"start_offset: {start_offset / NANOSECONDS_PER_SECOND:g} s; allowed: 0 to "

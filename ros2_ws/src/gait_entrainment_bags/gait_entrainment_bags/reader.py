@@ -5,7 +5,7 @@
 
 import math
 from bisect import bisect_left
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import Any
@@ -149,20 +149,12 @@ class BagReader:
         plan.sort(key=lambda entry: (entry[2].start, entry[0]))
         return plan
 
-    def decoder(self, topic: str) -> Callable[[bytes], Any]:
-        """Give the decoder of a topic's messages, as `decoding.decoder_for` makes it."""
-        return decoder_for(self.topics[topic])
-
     def decoded(
         self, topics: Collection[str] | None = None, start: int = 0, end: float = math.inf
     ) -> Iterator[tuple[BagMessage, Any]]:
-        """
-        Give messages as `messages` does, each with its decoded form.
-
-        Raises BagError as `messages` does, or if the definition of a topic cannot be used.
-        """
+        """Give messages as `messages` does, decoded; BagError also if a definition is unusable."""
         names = self.topics if topics is None else self.require_topics(topics)
-        decoders = {name: self.decoder(name) for name in names}
+        decoders = {name: decoder_for(self.topics[name]) for name in names}
         for message in self.messages(topics, start, end):
             yield message, decoders[message.topic](message.data)
 

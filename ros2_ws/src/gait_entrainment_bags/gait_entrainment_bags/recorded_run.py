@@ -21,24 +21,15 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gait_entrainment import topic_names
+from gait_entrainment import messages, topic_names
 from gait_entrainment.conventions import Side
 from gait_entrainment.experiment import Conductor
 from gait_entrainment.gait import Analysis, GaitEvent, Stride, VerdictSettings, analyze
 from gait_entrainment.gait.analyzer import Result
-from gait_entrainment.messages import (
-    MessageError,
-    event_of,
-    nanoseconds_of,
-    profile_of,
-    pulse_of,
-    result_values,
-    state_of,
-    stop_of,
-)
 from gait_entrainment.outcome import outcome_of, timing_outcome
 from gait_entrainment.protocol import Protocol, ProtocolError, read_protocol
 from gait_entrainment.robot import MeasuredOnsets, PulseTiming, TorqueProfile
+from gait_entrainment_bags.decoding import decoder_for
 from gait_entrainment_bags.errors import BagError
 from gait_entrainment_bags.mcap_records import BagMessage
 from gait_entrainment_bags.reader import BagReader
@@ -183,14 +174,11 @@ class _Record:
         self._names = {relative: name for relative in _TYPES if (name := _find(bag, relative))}
         if missing := [relative for relative in _NEEDED if relative not in self._names]:
             raise BagError(f"{bag.path}: lacks the topics {', '.join(missing)}")
-        self._messages: dict[str, list[BagMessage]] = {
-            name: []
-            for relative, name in self._names.items()
-            if relative != topic_names.ANKLE_TORQUE
-        }
+        self._torque = self._names.pop(topic_names.ANKLE_TORQUE, "")
+        self._messages: dict[str, list[BagMessage]] = {name: [] for name in self._names.values()}
         self.real_time_factor = self._read()
         events = self._messages[self._names[topic_names.GAIT_EVENTS]]
-        self.events = list(self._values(topic_names.GAIT_EVENTS, event_of))
+        self.events = list(self._values(topic_names.GAIT_EVENTS, messages.event_of))
         # Whether the log times are the stamps, so that instants can be looked up.
         self._stamped = [m.log_time for m in events] == [event.stamp for event in self.events]
         self.onsets: list[int] = []
@@ -202,9 +190,9 @@ class _Record:
             else:
                 self.onsets = [onset for onset in self.onsets if onset < promise]
                 measured.stop(promise)
-        for pulse in self._values(topic_names.PULSES, pulse_of):
+        for pulse in self._values(topic_names.PULSES, messages.pulse_of):
             measured.add_pulse(*pulse)
-        for state in self._values(topic_names.ROBOT_STATE, state_of):
+        for state in self._values(topic_names.ROBOT_STATE, messages.state_of):
             measured.add_state(state)
         measured.finish()
         self.timings = measured.timings
@@ -218,18 +206,18 @@ class _Record:
                 self._messages[message.topic].append(message)
             else:
                 clocks[1:] = [message]
-        for messages in self._messages.values():
-            messages.sort(key=lambda message: message.place)
-        if len(clocks) < 2 or clocks[1].publish_time <= clocks[0].publish_time:
+        for received in self._messages.values():
+            received.sort(key=lambda message: message.place)
+        first, last = (clocks[0], clocks[-1]) if clocks else (None, None)
+        if first is None or last is None or last.publish_time <= first.publish_time:
             return math.nan
-        wall = clocks[1].publish_time - clocks[0].publish_time
-        return (clocks[1].log_time - clocks[0].log_time) / wall
+        return (last.log_time - first.log_time) / (last.publish_time - first.publish_time)
 
     def _values(self, relative: str, value_of: Callable[[Any], _Value]) -> Iterator[_Value]:
         """Give the values of the messages of a topic, which are not kept."""
         if relative in self._names:
             name = self._names[relative]
-            decode = self._bag.decoder(name)
+            decode = decoder_for(self._bag.topics[name])
             with _fields_expected(name):
                 for message in self._messages.pop(name):
                     yield value_of(decode(message.data))
@@ -245,7 +233,7 @@ class _Record:
             return None
         differences = []
         for relative in filter(self._names.get, results):
-            anew = [result_values(result, side) for result in results[relative]]
+            anew = [messages.result_values(result, side) for result in results[relative]]
             with _fields_expected(relative):
                 found = list(self._values(relative, lambda message: message))
                 differences.append(_difference(relative, found, anew))
@@ -255,15 +243,14 @@ class _Record:
         """Read the ankle torque of some strides; of all if the log times are not the stamps."""
         stamps: list[int] = []
         rows: list[tuple[float, float, float]] = []
-        name = self._names.get(topic_names.ANKLE_TORQUE, "")
         spans: list[tuple[int, float]] = [(stride.start, stride.end) for stride in strides]
         if strides and not self._stamped:
             spans = [(0, math.inf)]
-        with _fields_expected(name):
-            for span in spans if name else []:
-                for _, message in self._bag.decoded([name], *span):
+        with _fields_expected(self._torque):
+            for span in spans if self._torque else []:
+                for _, message in self._bag.decoded([self._torque], *span):
                     torques = message.intrinsic, message.delivered, message.effective_perturbation
-                    stamps.append(nanoseconds_of(message.header.stamp))
+                    stamps.append(messages.nanoseconds_of(message.header.stamp))
                     rows.append(tuple(torque[side] for torque in torques))
         return AnkleTorques(np.array(stamps, np.int64), *np.array(rows).reshape(-1, 3).T)
 
@@ -277,8 +264,8 @@ def _find(bag: BagReader, relative: str) -> str | None:
 
 def _promise_of(message: Any) -> TorqueProfile | int:
     """Return what a TorqueProfile message promises, or the instant of the stop it reports."""
-    stop = stop_of(message)
-    return profile_of(message) if stop is None else stop
+    stop = messages.stop_of(message)
+    return messages.profile_of(message) if stop is None else stop
 
 
 @contextmanager
@@ -290,7 +277,7 @@ def _fields_expected(topic: str) -> Iterator[None]:
         raise BagError(
             f"{topic}: its messages have no field {error.name}: recorded by another version"
         ) from None
-    except MessageError as error:
+    except messages.MessageError as error:
         raise BagError(f"{topic}: {error}") from None
 
 
@@ -309,7 +296,7 @@ def _difference(topic: str, published: Sequence[Any], anew: Sequence[dict[str, A
 def _plain(value: Any) -> Any:
     """Return a header or a time as nanoseconds, anything else as it is."""
     value = getattr(value, "stamp", value)
-    return nanoseconds_of(value) if hasattr(value, "nanosec") else value
+    return messages.nanoseconds_of(value) if hasattr(value, "nanosec") else value
 
 
 def _bits(value: Any) -> Any:

@@ -3,6 +3,7 @@
 
 """Rescuing what can be read of a bag that was never closed, or is damaged, into a new bag."""
 
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -44,25 +45,22 @@ def recover(path: Path | str, out: Path | str) -> Recovery:
     path = Path(path)
     losses: list[str] = []
     files = []
-    for file_path in bag_files(path):
-        with noting(losses.append):
-            files.append(McapFile(file_path))
-    if not files:
-        raise UnreadableBagError(losses[0])
-    try:
-        with BagWriter(out, ros_distro="") as writer:
-            rescue = _Rescue(writer)
-            for file in files:
-                losses += rescue.take(file)
-            losses += rescue.refused.values()
-            missing = "; ".join(losses) or "nothing is missing"
-            description = rescue.description or described_beside(path)
-            writer.custom_data |= custom_data_of(description)
-            writer.custom_data[RECOVERY_KEY] = f"made of {path.name}; {missing}"
-            writer.ros_distro = str(description.get("ros_distro", ""))
-    finally:
+    with ExitStack() as opened:
+        for file_path in bag_files(path):
+            with noting(losses.append):
+                files.append(opened.enter_context(closing(McapFile(file_path))))
+        if not files:
+            raise UnreadableBagError(losses[0])
+        writer = opened.enter_context(BagWriter(out, ros_distro=""))
+        rescue = _Rescue(writer)
         for file in files:
-            file.close()
+            losses += rescue.take(file)
+        losses += rescue.refused.values()
+        missing = "; ".join(losses) or "nothing is missing"
+        description = rescue.description or described_beside(path)
+        writer.custom_data |= custom_data_of(description)
+        writer.custom_data[RECOVERY_KEY] = f"made of {path.name}; {missing}"
+        writer.ros_distro = str(description.get("ros_distro", ""))
     return Recovery(Path(out), dict(writer.counts), rescue.last, tuple(losses))
 
 

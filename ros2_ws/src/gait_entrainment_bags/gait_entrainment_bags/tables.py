@@ -6,7 +6,7 @@
 import json
 import shutil
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib import import_module
 from itertools import chain, islice
 from operator import attrgetter, itemgetter
@@ -15,19 +15,8 @@ from typing import Any
 
 from gait_entrainment.conventions import stamp_nanoseconds
 from gait_entrainment_bags.decoding import decoder_for
-from gait_entrainment_bags.definitions import (
-    BUILT_IN_TYPES,
-    Field,
-    fields_of,
-    schema_parts,
-    short_name,
-)
-from gait_entrainment_bags.errors import (
-    BagError,
-    BagWriteError,
-    UnreadableBagError,
-    make_folder,
-)
+from gait_entrainment_bags.definitions import BUILT_IN_TYPES, Field, fields_of, schema_parts
+from gait_entrainment_bags.errors import BagError, BagWriteError, UnreadableBagError, make_folder
 from gait_entrainment_bags.metadata import TopicInfo, first_line
 from gait_entrainment_bags.reader import BagReader
 
@@ -160,16 +149,12 @@ def _import_pyarrow() -> list[Any]:
 
 
 def columns_of(topic: TopicInfo, example: Any) -> list[Column]:
-    """
-    Lay out the columns of a topic; an example of a message may name those of its elements.
-
-    They are filled from rows: log time, publish time, decoded message.
-    """
+    """Lay out a table of rows of log time, publish time, and message, of which one is given."""
     parts = schema_parts(topic.type, topic.schema_text)
     return [
         Column("log_time", "ns", "uint64", itemgetter(0)),
         Column("publish_time", "ns", "uint64", itemgetter(1)),
-        *_columns(parts, short_name(topic.type), "", "", itemgetter(2), example),
+        *_columns(parts, next(iter(parts)), "", "", itemgetter(2), example),
     ]
 
 
@@ -177,33 +162,32 @@ def _columns(
     parts: dict[str, str], type_name: str, prefix: str, outer_unit: str, get: _Getter, example: Any
 ) -> Iterator[Column]:
     """Lay out the columns of the fields of a type, of which `get` takes a value from a row."""
-    fields = [_complete(field, type_name, outer_unit) for field in fields_of(parts[type_name])]
+    fields = list(fields_of(parts[type_name], type_name.partition("/")[0]))
     names = _element_names(fields, example)
     for field in fields:
         path = prefix + field.name
+        unit = STANDARD_UNITS.get((type_name, field.name), field.unit) or outer_unit
         value = _then(get, attrgetter(field.name))
         found = getattr(example, field.name)
-        if field.length is None:
-            yield from _element_columns(parts, field, path, value, found)
-        elif field.length >= 0:
-            for number in range(field.length):
-                element = f"{path}.{number}", _then(value, itemgetter(number)), found[number]
-                yield from _element_columns(parts, field, *element)
-        elif names and field.type == "float64" and len(found) == len(names):
-            for number, name in enumerate(names):
-                item = _named_item(get, value, names, number)
-                yield Column(f"{path}.{name}", field.unit, "float64", item)
-        elif not (names and field.name == "name"):
-            yield _list_column(field, path, value)
-
-
-def _complete(field: Field, type_name: str, outer_unit: str) -> Field:
-    """Give a field the package of its type, and a unit that is known from elsewhere."""
-    type_of_field = field.type
-    if type_of_field not in BUILT_IN_TYPES and "/" not in type_of_field:
-        type_of_field = f"{type_name.partition('/')[0]}/{type_of_field}"
-    unit = STANDARD_UNITS.get((type_name, field.name), field.unit) or outer_unit
-    return replace(field, type=type_of_field, unit=unit)
+        if field.length == -1:
+            if names and field.type == "float64" and len(found) == len(names):
+                for number, name in enumerate(names):
+                    item = _named_item(get, value, names, number)
+                    yield Column(f"{path}.{name}", unit, "float64", item)
+            elif not names or field.name != "name":
+                yield _column(field, path, unit, value)
+            continue
+        elements = [(path, value, found)]
+        if field.length is not None:
+            elements = [
+                (f"{path}.{number}", _then(value, itemgetter(number)), found[number])
+                for number in range(field.length)
+            ]
+        for place, element, inner in elements:
+            if field.type in BUILT_IN_TYPES or field.type in _INSTANTS:
+                yield _column(field, place, unit, element)
+            else:
+                yield from _columns(parts, field.type, f"{place}.", unit, element, inner)
 
 
 def _element_names(fields: list[Field], example: Any) -> list[str]:
@@ -215,27 +199,21 @@ def _element_names(fields: list[Field], example: Any) -> list[str]:
     return list(example.name) if by_name else []
 
 
-def _element_columns(
-    parts: dict[str, str], field: Field, path: str, value: _Getter, example: Any
-) -> Iterator[Column]:
+def _column(field: Field, path: str, unit: str, value: _Getter) -> Column:
+    """Lay out one column: of values, or of lists if the field is an array of any length."""
+    is_list = field.length == -1
     if field.type in _INSTANTS:
-        yield Column(path, "ns", "int64", _then(value, stamp_nanoseconds))
-    elif field.type in BUILT_IN_TYPES:
-        kind = _kind(field.type)
-        yield Column(path, field.unit if kind == "float64" else "", kind, value)
-    else:
-        yield from _columns(parts, field.type, f"{path}.", field.unit, value, example)
-
-
-def _list_column(field: Field, path: str, value: _Getter) -> Column:
-    if field.type in _INSTANTS:
-        instants = _then(value, lambda stamps: list(map(stamp_nanoseconds, stamps)))
-        return Column(path, "ns", "int64", instants, is_list=True)
+        step = _instants if is_list else stamp_nanoseconds
+        return Column(path, "ns", "int64", _then(value, step), is_list)
     kind = _kind(field.type) if field.type in BUILT_IN_TYPES else "string"
-    if kind in ("float64", "int64", "uint64"):
-        unit = field.unit if kind == "float64" else ""
-        return Column(path, unit, kind, _then(value, list), is_list=True)
-    return Column(path, "", "string", _then(value, lambda items: json.dumps(_plain(items))))
+    if is_list and kind in ("string", "bool_"):
+        return Column(path, "", "string", _then(value, lambda items: json.dumps(_plain(items))))
+    unit = unit if kind == "float64" else ""
+    return Column(path, unit, kind, _then(value, list) if is_list else value, is_list)
+
+
+def _instants(stamps: list[Any]) -> list[int]:
+    return [stamp_nanoseconds(stamp) for stamp in stamps]
 
 
 def _then(get: _Getter, step: _Getter) -> _Getter:

@@ -104,11 +104,7 @@ class BagWriter:
         self.close()
 
     def add_topic(self, topic: TopicInfo) -> None:
-        """
-        Announce a topic; it appears in the bag even if no message follows.
-
-        Raises BagError if it was announced before, or its type does not read ``package/msg/Type``.
-        """
+        """Announce a topic, once; it appears in the bag even if no message follows."""
         if topic.name in self._topics:
             raise BagError(f"{topic.name}: already in the bag")
         if not is_type_name(topic.type):
@@ -227,12 +223,7 @@ class BagWriter:
         self._file = _ReservingFile(path, 2 * self._chunk_size + _MEBIBYTE)
         self._files.append(FileInformation(path.name))
         output: Any = self._file
-        self._writer = Writer(
-            output,
-            chunk_size=self._chunk_size,
-            compression=self._compression,
-            enable_data_crcs=True,
-        )
+        self._writer = Writer(output, self._chunk_size, self._compression, enable_data_crcs=True)
         self._schemas: dict[tuple[str, str], int] = {}  # id by type and text
         self._channels: dict[str, int] = {}  # id by topic
         self._flush_at = None
@@ -244,14 +235,12 @@ class BagWriter:
         if schema not in self._schemas:
             text = topic.schema_text.encode()
             self._schemas[schema] = self._writer.register_schema(topic.type, "ros2msg", text)
+        metadata = {
+            "offered_qos_profiles": offered_qos_text(topic.qos_profiles),
+            "topic_type_hash": topic.type_hash,
+        }
         self._channels[topic.name] = self._writer.register_channel(
-            topic.name,
-            "cdr",
-            self._schemas[schema],
-            {
-                "offered_qos_profiles": offered_qos_text(topic.qos_profiles),
-                "topic_type_hash": topic.type_hash,
-            },
+            topic.name, "cdr", self._schemas[schema], metadata
         )
 
     def _close_file(self) -> None:

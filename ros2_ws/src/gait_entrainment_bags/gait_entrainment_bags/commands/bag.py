@@ -22,6 +22,7 @@ EXAMPLES = """examples:
   entrain bag recover bags/broken bags/rescued   after a crash
   entrain bag export bags/paper_example tables --format parquet
 """
+_BAG = "folder or .mcap file"
 # What each action does, with examples.
 _INFO = """Say what is in a bag, from its index.
 
@@ -53,7 +54,6 @@ examples:
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     actions = parser.add_subparsers(required=True, metavar="ACTION")
-    added = {}
     for name, run, purpose, text in (
         ("info", _info, "what is in a bag", _INFO),
         ("check", _check, "rules of rosbag2 that a bag breaks", _CHECK),
@@ -61,7 +61,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         ("export", _export, "a table per topic", _EXPORT),
     ):
         description, _, examples = text.partition("\n\n")
-        action = added[name] = actions.add_parser(
+        action = actions.add_parser(
             name,
             help=purpose,
             description=description,
@@ -69,25 +69,17 @@ def add_options(parser: argparse.ArgumentParser) -> None:
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
         action.set_defaults(run=run, prog=action.prog)
-        several = name == "check"
-        action.add_argument(
-            "bags" if several else "bag",
-            type=Path,
-            nargs="+" if several else None,
-            metavar="BAG",
-            help="folders or .mcap files" if several else "folder or .mcap file",
-        )
+        if name == "check":
+            action.add_argument("bags", type=Path, nargs="+", metavar="BAG", help=_BAG)
+        else:
+            action.add_argument("bag", type=Path, metavar="BAG", help=_BAG)
         if name in ("recover", "export"):
             action.add_argument("out", type=Path, metavar="OUT", help="folder to make")
-        action.add_argument(
-            "--json",
-            action="store_true",
-            help="print one JSON object per bag" if several else "print one JSON object",
-        )
-    added["export"].add_argument("--format", choices=FORMATS, default="csv", help="default: csv")
-    added["export"].add_argument(
-        "--topics", nargs="+", metavar="TOPIC", help="default: all with messages"
-    )
+        if name == "export":
+            action.add_argument("--format", choices=FORMATS, default="csv", help="default: csv")
+            default = "default: all with messages"
+            action.add_argument("--topics", nargs="+", metavar="TOPIC", help=default)
+        action.add_argument("--json", action="store_true", help="print one JSON object per bag")
 
 
 def _info(options: argparse.Namespace) -> int:
