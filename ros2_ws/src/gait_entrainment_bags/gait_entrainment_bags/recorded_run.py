@@ -26,7 +26,7 @@ from gait_entrainment.conventions import Side
 from gait_entrainment.experiment import Conductor
 from gait_entrainment.gait import Analysis, GaitEvent, Stride, VerdictSettings, analyze
 from gait_entrainment.gait.analyzer import Result
-from gait_entrainment.outcome import outcome_of, timing_outcome
+from gait_entrainment.outcome import Run, outcome_of, timing_outcome
 from gait_entrainment.protocol import Protocol, ProtocolError, read_protocol
 from gait_entrainment.robot import MeasuredOnsets, PulseTiming, TorqueProfile
 from gait_entrainment_bags.decoding import decoder_for
@@ -62,7 +62,7 @@ class AnkleTorques:
 
 
 @dataclass(frozen=True)
-class RecordedRun:
+class RecordedRun(Run):
     """What a bag holds of one run; stamps are nanoseconds since 1970, as recorded."""
 
     protocol: Protocol
