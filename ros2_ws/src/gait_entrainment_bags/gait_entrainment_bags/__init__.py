@@ -21,15 +21,3 @@ from gait_entrainment_bags.reader import BagInfo, BagReader, info
 from gait_entrainment_bags.recovery import Recovery, recover
 from gait_entrainment_bags.tables import export
 from gait_entrainment_bags.writer import ENDED_EARLY, BagWriter
-
-__all__ = [
-    "BagWriter", "ENDED_EARLY", "TopicInfo", "QosProfile", "INFINITE",  # write
-    "Definition", "find_definition",
-    "BagReader", "BagMessage", "BagInfo", "info",  # read
-    "check", "Finding", "Severity",
-    "recover", "Recovery",
-    "export",
-    "Playback", "Moment", "FASTEST", "choose_topics",
-    "BagError", "BagExistsError", "UnreadableBagError", "NoBagError", "DefinitionMissingError",
-    "BagWriteError", "DiskFullError",
-]  # fmt: skip

@@ -244,7 +244,7 @@ class _FileCheck:
             self._add("statistics", f"{said} announced, {found} found")
 
     def _check_schemas(self) -> None:
-        for schema in self._stock.schemas.values():
+        for schema in self._stock.schemas:
             text = schema.data.decode(errors="replace")
             if not is_type_name(schema.name):
                 self._add("schema-name", f"{schema.name}: a type reads package/msg/Type")
@@ -256,9 +256,10 @@ class _FileCheck:
     def _check_channels(self) -> None:
         known: dict[str, TopicInfo] = {}
         version = recorded_description(self._stock.metadata).get("version", METADATA_VERSION)
+        schemas = {schema.id for schema in self._stock.schemas}
         for channel, topic in zip(self._stock.channels, self._stock.topics, strict=True):
             name = channel.topic
-            if channel.schema_id not in self._stock.schemas:
+            if channel.schema_id not in schemas:
                 self._add("schema", f"{name}: schema {channel.schema_id} is not in the file")
             elif difference := differing_types(known.setdefault(name, topic), topic):
                 self._add("one-type", f"{name}: has {difference}")
@@ -312,10 +313,9 @@ def _check_metadata_file(folder: Path, stocks: dict[str, Contents], report: _Rep
         where = f"{file}: {topic['name']}: offered_qos_profiles"
         kind = "a sequence" if version >= METADATA_VERSION else "text"
         qos = topic.get("offered_qos_profiles", "")
-        if isinstance(qos, str) is not (kind == "text"):
-            report.add("metadata-qos", f"{where}: version {version} wants {kind}")
-            continue
         with report.adding("metadata-qos"):
+            if isinstance(qos, str) is not (kind == "text"):
+                raise UnreadableBagError(f"{where}: version {version} wants {kind}")
             parse_qos_profiles(qos, where)
     counts: Counter[str] = sum((stock.counts for stock in stocks.values()), Counter())
     topics = {topic.name: topic for stock in stocks.values() for topic in stock.topics}

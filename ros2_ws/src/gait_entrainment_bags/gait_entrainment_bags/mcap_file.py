@@ -254,7 +254,7 @@ class McapFile:
         next chunk that it lists.
         """
         summary = summary or Contents()
-        contents.schemas.update(summary.schemas)
+        contents.schemas += summary.schemas
         contents.channels += summary.channels
         listed = sorted(chunk.offset for chunk in summary.chunks)
         for chunk in self._stretches(contents, listed):
@@ -264,7 +264,10 @@ class McapFile:
             if messages:
                 times = [message.log_time for message in messages]
                 chunk = replace(chunk, start=min(times), end=max(times))
-                contents.add_messages(chunk, messages)
+                first = chunk.start if not contents.counts else min(chunk.start, contents.start)
+                contents.start, contents.end = first, max(chunk.end, contents.end)
+                contents.chunks.append(chunk)
+                contents.counts.update(message.topic for message in messages)
                 yield chunk, messages
 
     def _read_chunk(self, contents: Contents, chunk: Chunk, messages: list[BagMessage]) -> None:

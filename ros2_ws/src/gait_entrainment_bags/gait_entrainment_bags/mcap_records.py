@@ -86,7 +86,7 @@ class Chunk:
 class Contents:
     """What an MCAP file holds, from its summary or from a walk through all of it."""
 
-    schemas: dict[int, Schema] = field(default_factory=dict)
+    schemas: list[Schema] = field(default_factory=list)
     channels: list[Channel] = field(default_factory=list)
     chunks: list[Chunk] = field(default_factory=list)
     counts: Counter[str] = field(default_factory=Counter)  # messages by topic
@@ -104,9 +104,8 @@ class Contents:
     @property
     def topics(self) -> list[TopicInfo]:
         """Topics, one for each channel: a name may be there twice, with two types."""
-        return [
-            topic_of(channel, self.schemas.get(channel.schema_id)) for channel in self.channels
-        ]
+        schemas = {schema.id: schema for schema in self.schemas}
+        return [topic_of(channel, schemas.get(channel.schema_id)) for channel in self.channels]
 
     @property
     def message_count(self) -> int:
@@ -127,23 +126,14 @@ class Contents:
             self.statistics = record
         elif opcode == Opcode.METADATA:
             self.metadata.append(record)
-        elif opcode == Opcode.CHANNEL and record not in self.channels:
-            known = record.id in self.names
-            self.channels.append(record)
-            if known:
-                raise ValueError(f"channel {record.id} is there twice, and differs")
-        elif opcode == Opcode.SCHEMA:
-            other = self.schemas.get(record.id, record)
-            self.schemas[record.id] = record
-            if other != record:
-                raise ValueError(f"schema {record.id} is there twice, and differs")
-
-    def add_messages(self, chunk: Chunk, messages: list[BagMessage]) -> None:
-        """Count the messages of another chunk."""
-        self.start = min(chunk.start, self.start) if self.counts else chunk.start
-        self.end = max(chunk.end, self.end)
-        self.chunks.append(chunk)
-        self.counts.update(message.topic for message in messages)
+        else:
+            known: list[Any] = self.schemas if opcode == Opcode.SCHEMA else self.channels
+            others = [other for other in known if other.id == record.id]
+            if record not in others:
+                known.append(record)
+                if others:
+                    kind = Opcode(opcode).name.lower()
+                    raise ValueError(f"{kind} {record.id} is there twice, and differs")
 
 
 def parse(record_type: Any, content: bytes) -> Any:

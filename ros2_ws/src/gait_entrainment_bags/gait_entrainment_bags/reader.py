@@ -6,6 +6,7 @@
 import math
 from bisect import bisect_left
 from collections.abc import Collection, Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import Any
@@ -23,7 +24,7 @@ from gait_entrainment_bags.metadata import (
 )
 
 
-class BagReader:
+class BagReader(AbstractContextManager["BagReader"]):
     """
     A bag opened for reading: a folder, or a single ``.mcap`` file.
 
@@ -47,9 +48,6 @@ class BagReader:
         except UnreadableBagError:
             self.close()
             raise
-
-    def __enter__(self) -> "BagReader":
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()

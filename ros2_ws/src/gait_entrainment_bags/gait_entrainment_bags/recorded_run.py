@@ -24,11 +24,11 @@ from numpy.typing import NDArray
 from gait_entrainment import messages, topic_names
 from gait_entrainment.conventions import Side
 from gait_entrainment.experiment import Conductor
-from gait_entrainment.gait import Analysis, GaitEvent, Stride, VerdictSettings, analyze
+from gait_entrainment.gait import Analysis, Stride, VerdictSettings, analyze
 from gait_entrainment.gait.analyzer import Result
 from gait_entrainment.outcome import Run, outcome_of, timing_outcome
 from gait_entrainment.protocol import Protocol, ProtocolError, read_protocol
-from gait_entrainment.robot import MeasuredOnsets, PulseTiming, TorqueProfile
+from gait_entrainment.robot import MeasuredOnsets, TorqueProfile
 from gait_entrainment_bags.decoding import decoder_for
 from gait_entrainment_bags.errors import BagError
 from gait_entrainment_bags.mcap_records import BagMessage
@@ -47,7 +47,6 @@ _TYPES = {
     topic_names.PULSE_PHASES: "PulsePhase",
     topic_names.ENTRAINMENT: "Entrainment",
 }
-_NEEDED = (topic_names.GAIT_EVENTS, topic_names.TORQUE_PROFILE)
 _Value = TypeVar("_Value")
 
 
@@ -65,13 +64,6 @@ class AnkleTorques:
 class RecordedRun(Run):
     """What a bag holds of one run; stamps are nanoseconds since 1970, as recorded."""
 
-    protocol: Protocol
-    events: tuple[GaitEvent, ...]
-    onsets: tuple[int, ...]  # of the pulses [ns]
-    measured_period: float  # mean stride period over the baseline [s]; NaN without a plan
-    pulse_period: float  # as planned from it [s]; NaN without a plan
-    analysis: Analysis
-    timings: tuple[PulseTiming, ...]  # commanded, sent and measured onset of each pulse
     torques: AnkleTorques  # of the strides that figures show; empty unless asked for
     messages: int  # in the bag, on all topics
     lost: int | None  # published but not recorded; None if no publisher gave a count
@@ -126,7 +118,7 @@ def read_run(
             events=tuple(record.events),
             onsets=tuple(record.onsets),
             measured_period=conductor.measured_period,
-            pulse_period=conductor.train.period if conductor.train else math.nan,
+            pulse_period=conductor.pulse_period,
             analysis=analysis,
             timings=tuple(record.timings),
             onset=live_onset,
@@ -172,7 +164,8 @@ class _Record:
     def __init__(self, bag: BagReader) -> None:
         self._bag = bag
         self._names = {relative: name for relative in _TYPES if (name := _find(bag, relative))}
-        if missing := [relative for relative in _NEEDED if relative not in self._names]:
+        needed = (topic_names.GAIT_EVENTS, topic_names.TORQUE_PROFILE)
+        if missing := [relative for relative in needed if relative not in self._names]:
             raise BagError(f"{bag.path}: lacks the topics {', '.join(missing)}")
         self._torque = self._names.pop(topic_names.ANKLE_TORQUE, "")
         self._messages: dict[str, list[BagMessage]] = {name: [] for name in self._names.values()}
@@ -186,7 +179,7 @@ class _Record:
         for promise in self._values(topic_names.TORQUE_PROFILE, _promise_of):
             if isinstance(promise, TorqueProfile):
                 self.onsets += promise.onsets
-                measured.add_promise(list(promise.onsets), promise.valid_until)
+                measured.add_promise(promise.onsets, promise.valid_until)
             else:
                 self.onsets = [onset for onset in self.onsets if onset < promise]
                 measured.stop(promise)
@@ -208,10 +201,10 @@ class _Record:
                 clocks[1:] = [message]
         for received in self._messages.values():
             received.sort(key=lambda message: message.place)
-        first, last = (clocks[0], clocks[-1]) if clocks else (None, None)
-        if first is None or last is None or last.publish_time <= first.publish_time:
+        if len(clocks) < 2 or clocks[1].publish_time <= clocks[0].publish_time:
             return math.nan
-        return (last.log_time - first.log_time) / (last.publish_time - first.publish_time)
+        wall = clocks[1].publish_time - clocks[0].publish_time
+        return (clocks[1].log_time - clocks[0].log_time) / wall
 
     def _values(self, relative: str, value_of: Callable[[Any], _Value]) -> Iterator[_Value]:
         """Give the values of the messages of a topic, which are not kept."""

@@ -99,7 +99,7 @@ class _Rescue:
 
     def _announce(self, contents: Contents) -> None:
         """Announce the topics that have come since the last call."""
-        present = dict(contents.schemas), list(contents.channels)
+        present = [*contents.schemas], [*contents.channels]
         if present == self._announced:
             return
         self._announced = present

@@ -203,17 +203,13 @@ def _column(field: Field, path: str, unit: str, value: _Getter) -> Column:
     """Lay out one column: of values, or of lists if the field is an array of any length."""
     is_list = field.length == -1
     if field.type in _INSTANTS:
-        step = _instants if is_list else stamp_nanoseconds
+        step = (lambda stamps: [*map(stamp_nanoseconds, stamps)]) if is_list else stamp_nanoseconds
         return Column(path, "ns", "int64", _then(value, step), is_list)
     kind = _kind(field.type) if field.type in BUILT_IN_TYPES else "string"
     if is_list and kind in ("string", "bool_"):
         return Column(path, "", "string", _then(value, lambda items: json.dumps(_plain(items))))
     unit = unit if kind == "float64" else ""
     return Column(path, unit, kind, _then(value, list) if is_list else value, is_list)
-
-
-def _instants(stamps: list[Any]) -> list[int]:
-    return [stamp_nanoseconds(stamp) for stamp in stamps]
 
 
 def _then(get: _Getter, step: _Getter) -> _Getter:

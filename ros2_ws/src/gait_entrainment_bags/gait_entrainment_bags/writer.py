@@ -15,6 +15,7 @@ import tempfile
 import time
 from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import AbstractContextManager
 from io import FileIO
 from pathlib import Path
 from typing import Any
@@ -41,7 +42,7 @@ _TIME_END = 2**64
 _DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
-class BagWriter:
+class BagWriter(AbstractContextManager["BagWriter"]):
     """
     A bag that is being recorded; not to be shared between threads.
 
@@ -96,9 +97,6 @@ class BagWriter:
         except OSError as error:
             shutil.rmtree(self.folder, ignore_errors=True)
             raise _write_error(error, f"{folder}: cannot be recorded into, removed") from None
-
-    def __enter__(self) -> "BagWriter":
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
