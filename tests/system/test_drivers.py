@@ -30,7 +30,6 @@ from gait_entrainment.experiment import Phase
 from gait_entrainment.protocol import read_protocol
 from gait_entrainment.simulation import simulate
 from gait_entrainment_bags import BagReader
-from gait_entrainment_bags.pulse_timing import recorded_timings
 from gait_entrainment_bags.recorded_run import read_run
 from gait_entrainment_bringup.node_list import STOP_ORDER
 from gait_entrainment_msgs.msg import AnkleRobotState
@@ -106,7 +105,7 @@ def test_emulated_robot_walks_as_in_the_simulation_and_twice_the_same(tmp_path):
     # Commanded, sent and measured onset of each pulse are in the bag.
     late = [
         [(t.sent - t.commanded, t.measured - t.commanded) for t in timings]
-        for timings in (recorded_timings(bags[0]), simulation.timings)
+        for timings in (read_run(bags[0]).timings, simulation.timings)
     ]
     assert late[0] == late[1]
     assert len(late[0]) == 3

@@ -19,6 +19,7 @@ from harness import PATIENCE, Probe, entrain_run, payloads, probe
 from std_srvs.srv import Trigger
 
 from gait_entrainment_bags import BagReader, BagWriter
+from gait_entrainment_bags.decoding import decoder_for
 from gait_entrainment_bags.recorded_run import read_run
 from gait_entrainment_bringup import replay_client
 from gait_entrainment_bringup.commands import replay as replay_command
@@ -105,7 +106,7 @@ def without(bag: Path, out: Path, drop: Callable[[int, str, Any], bool]) -> Path
             for message in sorted(reader.messages(), key=lambda message: message.place):
                 number = numbers[message.topic]
                 numbers[message.topic] += 1
-                content = reader.decoder(message.topic)(message.data)
+                content = decoder_for(reader.topics[message.topic])(message.data)
                 if not drop(number, message.topic, content):
                     writer.write(
                         message.topic, message.data, message.log_time, message.publish_time

@@ -21,7 +21,8 @@ from gait_entrainment_bags import (
     check,
     recover,
 )
-from gait_entrainment_bags.mcap_file import Chunk, McapFile
+from gait_entrainment_bags.mcap_file import McapFile
+from gait_entrainment_bags.mcap_records import Chunk
 
 NOISE = TopicInfo("/noise", "p/msg/Noise", "uint8[] bytes\n", "RIHS01_" + "1" * 64)
 
