@@ -9,7 +9,7 @@ from gait_entrainment.robot.faults import DeviceError, Fault, LimitError
 from gait_entrainment.robot.guard import GuardedRobot
 from gait_entrainment.robot.limits import DeviceLimits
 from gait_entrainment.robot.measured_onsets import MeasuredOnsets
-from gait_entrainment.robot.profile import TorqueProfile
+from gait_entrainment.robot.profile import ProfileError, TorqueProfile
 from gait_entrainment.robot.pulse_train import PulseTrain
 from gait_entrainment.robot.timing import PulseTiming, TimingAudit, measured_onset
 
@@ -23,6 +23,7 @@ __all__ = [
     "GuardedRobot",
     "LimitError",
     "MeasuredOnsets",
+    "ProfileError",
     "PulseTiming",
     "PulseTrain",
     "RobotState",
