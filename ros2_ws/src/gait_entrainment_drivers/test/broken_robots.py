@@ -154,6 +154,11 @@ class TakesTrainsAfterAStop(IdealAnkleRobot):
         self._train = None
 
 
+class GoesOnAfterDeactivating(IdealAnkleRobot):
+    def deactivate(self):
+        pass
+
+
 class RemembersItsTrain(IdealAnkleRobot):
     """Keeps the train across close and begin."""
 
@@ -253,6 +258,7 @@ BROKEN = [
     (StopRaises, "stopping_in_every_state", "raised OSError"),
     (CloseRaises, "stopping_in_every_state", "raised OSError"),
     (TakesTrainsAfterAStop, "stopping_in_every_state", "delivered a train"),
+    (GoesOnAfterDeactivating, "deactivating", "after deactivating"),
     (RemembersItsTrain, "new_run", "run before"),
     (RemembersItsTrain, "reconnecting", "after reconnecting"),
     (DoesNotAdjoin, "idle", "does not adjoin"),

@@ -9,7 +9,8 @@ import pytest
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.robot import DeviceError, find_driver
-from gait_entrainment_drivers.conformance import CHECKS, run_check
+from gait_entrainment_drivers.conformance.bench import DriverBench, run_check
+from gait_entrainment_drivers.conformance.checks import CHECKS
 from gait_entrainment_drivers.odrive import (
     CLEAR_ERRORS,
     CLOSED_LOOP,
@@ -55,7 +56,7 @@ def robot_on(driver):
 def test_the_kit_finds_the_promises_kept(name):
     check = next(check for check in CHECKS if check.__name__ == name)
     with axis("--timeout", "0.9", "--loss", "0.01") as driver:
-        result = run_check(check, find_driver(driver), PATIENT)
+        result = run_check(check, DriverBench(find_driver(driver), PATIENT))
     assert result.kept, result.broken
 
 

@@ -7,16 +7,16 @@ import argparse
 import json
 import math
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, fields
 from importlib.metadata import entry_points
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.robot import DeviceError, Driver, LimitError, driver_names, find_driver
-
-if TYPE_CHECKING:
-    from gait_entrainment_drivers.conformance import Result
+from gait_entrainment.errors import EntrainmentError
+from gait_entrainment.robot import DeviceError, LimitError, driver_names, find_driver
+from gait_entrainment_drivers.conformance.bench import DriverBench, Result, Tolerances, run_check
+from gait_entrainment_drivers.conformance.checks import CHECKS
 
 # Where the check of a running node is found: it needs ROS, which this package does not know.
 NODE_CHECK = "gait_entrainment.node_check"
@@ -96,53 +96,37 @@ def list_drivers(options: argparse.Namespace) -> int:
 
 
 def check_driver(options: argparse.Namespace) -> int:
-    """Run the conformance kit; 1 where a promise is broken or there is no such driver."""
-    from gait_entrainment_drivers.conformance import Tolerances, run_checks
-
+    """Run the conformance kit on a driver or a node; 1 if a promise is broken."""
+    if not 0 < options.torque <= 30:
+        raise LimitError(f"--torque: {options.torque:g} N m; allowed: above 0 and at most 30")
+    tolerances = Tolerances(torque=options.torque)
     if options.node is not None:
-        return check_node(options)
-    try:
-        driver = find_driver(options.driver)
-        refuse_unarmed(driver, options.arm)
-        if not 0 < options.torque <= 30:
-            raise LimitError(f"--torque: {options.torque:g} N m; allowed: above 0 and at most 30")
-        if not driver.simulated:
-            # Without this, a device that is not there would break every promise alike.
-            with driver.make(Side.RIGHT) as robot:
-                robot.configure()
-    except (LimitError, DeviceError) as error:
-        print(f"entrain driver: {error}", file=sys.stderr)
-        return 1
-    results = run_checks(driver, Tolerances(torque=options.torque))
+        return report(options.node, check_node(options, tolerances), options.json)
+    driver = find_driver(options.driver)
+    if not driver.simulated:
+        if not options.arm:
+            raise LimitError(
+                f"{driver.name} applies real torque: see that nobody wears it, then say --arm"
+            )
+        # Without this, a device that is not there would break every promise alike.
+        with driver.make(Side.RIGHT) as robot:
+            robot.configure()
+    bench = DriverBench(driver, tolerances)
+    results = (run_check(check, bench) for check in CHECKS)
     return report(options.driver, results, options.json)
 
 
-def check_node(options: argparse.Namespace) -> int:
+def check_node(options: argparse.Namespace, tolerances: Tolerances) -> Iterator[Result]:
     """Run the kit on a running node; the code that speaks ROS is in another package."""
-    from gait_entrainment_drivers.conformance import Tolerances
-
     found = list(entry_points(group=NODE_CHECK))
     if not found:
-        print(
-            "entrain driver: --node needs the package gait_entrainment_nodes, and ROS",
-            file=sys.stderr,
-        )
-        return 1
-    results = found[0].load()(
-        options.node,
-        Side[options.side.upper()],
-        Tolerances(torque=options.torque),
-        real_time=options.real_time,
-        arm=options.arm,
-    )
-    try:
-        return report(options.node, results, options.json)
-    except DeviceError as error:
-        print(f"entrain driver: {error}", file=sys.stderr)
-        return 1
+        raise DeviceError("--node needs the package gait_entrainment_nodes, and ROS")
+    side = Side[options.side.upper()]
+    check: Callable[..., Iterator[Result]] = found[0].load()
+    return check(options.node, side, tolerances, real_time=options.real_time, arm=options.arm)
 
 
-def report(name: str, results: Iterable["Result"], as_json: bool) -> int:
+def report(name: str, results: Iterable[Result], as_json: bool) -> int:
     """Print the results as they come; 1 where a promise is broken."""
     done = []
     for result in results:
@@ -166,14 +150,6 @@ def report(name: str, results: Iterable["Result"], as_json: bool) -> int:
     return 1 if broken else 0
 
 
-def refuse_unarmed(driver: Driver, armed: bool) -> None:
-    """Raise LimitError where a device outside simulation has not been armed by the user."""
-    if not (driver.simulated or armed):
-        raise LimitError(
-            f"{driver.name} applies real torque: see that nobody wears it, then say --arm"
-        )
-
-
 def _allowed(option: dict[str, Any]) -> str:
     if "choices" in option:
         return f"; one of {', '.join(option['choices'])}"
@@ -186,7 +162,7 @@ def _allowed(option: dict[str, Any]) -> str:
 def _description(name: str) -> dict[str, Any]:
     try:
         robot = find_driver(name).robot
-    except (LimitError, DeviceError) as error:
+    except EntrainmentError as error:
         return {"summary": str(error), "options": []}
     module = sys.modules[robot.__module__]
     text = (robot.__doc__ or "").strip()
