@@ -32,7 +32,7 @@ class Echo(HostTimedRobot):
     """A device that measures what it was asked for; a test can hold it up."""
 
     Options = NoOptions
-    capabilities = Capabilities(50.0, math.inf, False, True, False, 500.0)
+    capabilities = Capabilities(50.0, math.inf, True, False, 500.0)
 
     def __init__(self, lateness=0.5):
         super().__init__(Side.LEFT, rate=500.0, silence=5.0, lateness=lateness)

@@ -11,7 +11,7 @@ from gait_entrainment.robot.limits import DeviceLimits
 from gait_entrainment.robot.measured_onsets import MeasuredOnsets
 from gait_entrainment.robot.profile import ProfileError, TorqueProfile
 from gait_entrainment.robot.pulse_train import PulseTrain
-from gait_entrainment.robot.timing import PulseTiming, TimingAudit, measured_onset
+from gait_entrainment.robot.timing import PulseTiming, measured_onset
 
 __all__ = [
     "AnkleRobot",
@@ -27,7 +27,6 @@ __all__ = [
     "PulseTiming",
     "PulseTrain",
     "RobotState",
-    "TimingAudit",
     "TorqueProfile",
     "driver_names",
     "find_driver",

@@ -16,7 +16,7 @@ from contextlib import suppress
 from dataclasses import fields, is_dataclass
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, nanoseconds
-from gait_entrainment.robot import DeviceError, DeviceLimits, TimingAudit
+from gait_entrainment.robot import DeviceError, DeviceLimits, MeasuredOnsets
 from gait_entrainment.robot.faults import EXPERIMENT_SILENT
 from gait_entrainment.robot.timing import quantile
 from gait_entrainment_drivers.conformance.bench import (
@@ -38,7 +38,7 @@ def construction(bench: DriverBench) -> None:
     options = bench.driver.options
     require(is_dataclass(options), "Options is no dataclass.")
     for option in fields(options):
-        told = {"meaning", "unit"} <= set(option.metadata)
+        told = "setting" in option.metadata
         require(told, f"The option {option.name} does not tell its meaning and unit.")
 
 
@@ -304,11 +304,15 @@ def timing(bench: Bench) -> None:
     train = bench.schedule(count=count, duration=0.12, period=0.3)
     bench.run(bench.lead + count * train.period + 0.3)
     bench.wait_for(lambda: bench.states and bench.states[-1].stamp >= train.end(count - 1))
-    audit = TimingAudit()
-    for number in range(count):
-        audit.add_pulse(train.onset(number), train.torque, train.duration)
-    timings = [*audit.add_states(bench.states), *audit.finish()]
-    late = sorted((t.measured - t.commanded) / 1e9 for t in timings if t.measured is not None)
+    audit, onsets = MeasuredOnsets(), [train.onset(number) for number in range(count)]
+    audit.add_promise(onsets, train.onset(count))
+    for onset in onsets:
+        audit.add_pulse(onset, train.torque, train.duration)
+    for state in bench.states:
+        audit.add_state(state)
+    audit.finish()
+    lags = [(t.measured - t.commanded) / 1e9 for t in audit.timings if t.measured is not None]
+    late = sorted(lags)
     missing = count - len(late)
     require(not missing, f"{missing} of {count} pulses show in no state.")
     bench.figures |= _distribution("", late)
