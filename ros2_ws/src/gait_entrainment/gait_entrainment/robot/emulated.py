@@ -88,6 +88,7 @@ class EmulatedAnkleRobot(SimulatedRobot):
         self._follow = -math.expm1(-2 * math.pi * options.bandwidth * _TICK / 1e9)
         self._largest_step = options.torque_rate * _TICK / 1e9
         self._delay = round(options.delay * 1e9)
+        self._late: list[int] = []  # by how much each pulse of the train comes late [ns]
         self.begin(0)
 
     def begin(self, start: int) -> None:
@@ -109,7 +110,7 @@ class EmulatedAnkleRobot(SimulatedRobot):
     def cancel(self) -> None:
         """Drop the train; the torque is zero at once."""
         super().cancel()
-        self._late: list[int] = []  # by how much each pulse of the train comes late [ns]
+        self._late = []
         self._command = 0.0  # that the device holds [N m]
         self._torque = 0.0  # that it delivers [N m]
 
