@@ -15,6 +15,8 @@ and a test that takes the fixture ``ankle_robot_check`` runs once for each drive
         ankle_robot_check()
 
 A driver that applies real torque is skipped unless ``--arm-ankle-robot`` is given.
+
+The kit is imported where it is used, so that a pytest that checks no driver does not wait for it.
 """
 
 from collections.abc import Callable
@@ -46,7 +48,6 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Make one test of each driver and check."""
     if _FIXTURE not in metafunc.fixturenames:
         return
-    # Loaded here, so that a pytest that checks no driver does not wait for the kit.
     from gait_entrainment_drivers.conformance.checks import CHECKS
 
     config = metafunc.config
@@ -58,7 +59,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 @pytest.fixture
 def ankle_robot_check(request: pytest.FixtureRequest) -> Callable[[], None]:
-    """Return a function that runs one check of one driver and fails where a promise is broken."""
+    """Return a function that runs one check of one driver and fails if a promise is broken."""
     from gait_entrainment.robot.drivers import find_driver
     from gait_entrainment_drivers.conformance.bench import DriverBench, run_check
 

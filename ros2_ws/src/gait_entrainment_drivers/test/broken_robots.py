@@ -115,7 +115,9 @@ class GoesOnAfterCancelling(IdealAnkleRobot):
 
 
 class DeafAfterCancelling(IdealAnkleRobot):
-    cancelled = False
+    def begin(self, start):
+        super().begin(start)
+        self.cancelled = False
 
     def cancel(self):
         super().cancel()

@@ -90,7 +90,8 @@ class Bench(ABC):
         self.tolerances = tolerances
         self.robot: Any  # a GuardedRobot, or something that has its methods
         self.figures: dict[str, float] = {}  # what the present check has measured
-        self.call_times: list[float] = []  # of promise and read in turn [s]
+        self.promise_times: list[float] = []  # how long each promise took [s]
+        self.read_times: list[float] = []  # and each reading of the states [s]
 
     @abstractmethod
     def make(self, *, guarded: bool) -> Any:
@@ -151,7 +152,8 @@ class Bench(ABC):
         profile = self.robot.promise(self.now)
         promised = time.monotonic()
         self.states += self.robot.read()
-        self.call_times += [promised - begun, time.monotonic() - promised]
+        self.promise_times.append(promised - begun)
+        self.read_times.append(time.monotonic() - promised)
         self.pieces += [piece for piece in profile.pieces if piece[0] < piece[1]]
         self.onsets += profile.onsets
         self.promised_until = profile.valid_until
@@ -290,7 +292,7 @@ class DriverBench(Bench):
 def run_check(check: Callable[[Any], None], bench: Bench) -> Result:
     """Run one check on a robot of its own; whatever it raises becomes a broken promise."""
     begun, broken = time.monotonic(), ""
-    bench.figures, bench.call_times = {}, []
+    bench.figures, bench.promise_times, bench.read_times = {}, [], []
     try:
         bench.renew()
         check(bench)
