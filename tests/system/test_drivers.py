@@ -243,7 +243,7 @@ def test_kit_from_outside_finds_every_promise_kept(tmp_path, driver, options):
         domain = nodes.probe.node.context.get_domain_id()
         code, out, err = entrain(domain, "driver", "check", "--node", "perturbator", *options)
         assert (code, err) == (0, ""), out
-        assert "9 promises kept, 0 broken" in out
+        assert "16 promises kept, 0 broken" in out
 
 
 BROKEN_NODE = """
@@ -259,7 +259,7 @@ sys.exit(run_node(Broken))
 FAULTS = {
     "stop without effect": (
         "def on_stop_service(self, _, response):\n        return response",
-        "stopping: .*\n.*No profile with the stop flag",
+        "stopping_in_mid_pulse: .*\n.*No profile with the stop flag",
     ),
     "cancelling without effect": (
         "def on_cancel(self, _):\n        return perturbator.CancelResponse.ACCEPT",
