@@ -22,7 +22,6 @@ from rclpy.action import ActionClient
 from rclpy.context import Context
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
-from std_srvs.srv import Trigger
 
 from gait_entrainment.protocol import Protocol, read_protocol, write_protocol
 from gait_entrainment.simulation import simulate
@@ -30,6 +29,7 @@ from gait_entrainment_bags import BagReader
 from gait_entrainment_bringup.node_list import NODES, STOP_ORDER, parameters
 from gait_entrainment_bringup.supervisor import Supervisor
 from gait_entrainment_msgs.action import RunProtocol
+from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 from gait_entrainment_nodes.messaging.topics import STRIDES, Topic
 
@@ -142,14 +142,14 @@ class Probe:
         Until then its answers may be lost. Discovery goes in the order in which things were made,
         so one answer to a client made now says it.
         """
-        client = self.node.create_client(Trigger, f"{node}/ready")
+        client = self.node.create_client(Ready, f"{node}/ready")
         self.until(client.service_is_ready, node)
         answers: list[Any] = []
 
         def answered() -> bool:
             if not answers or time.monotonic() - asked[-1] > 0.5:
                 asked.append(time.monotonic())
-                answers.append(client.call_async(Trigger.Request()))
+                answers.append(client.call_async(Ready.Request()))
             return any(answer.done() for answer in answers)
 
         asked: list[float] = []
@@ -334,7 +334,7 @@ class Session:
         for node in nodes:
             self.supervisor.start(node, self.arguments)
         for node in nodes:
-            client = self.probe.node.create_client(Trigger, f"{node}/ready")
+            client = self.probe.node.create_client(Ready, f"{node}/ready")
             self.probe.until(
                 lambda client=client: client.service_is_ready() or self.supervisor.ended(), node
             )

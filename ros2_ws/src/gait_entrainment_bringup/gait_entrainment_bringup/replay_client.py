@@ -3,7 +3,6 @@
 
 """The replay's own place in the ROS graph: starts the player, hears the analyzer out."""
 
-import json
 import time
 from typing import Any
 
@@ -16,6 +15,8 @@ from tqdm import tqdm
 
 from gait_entrainment_bringup.supervisor import Supervisor
 from gait_entrainment_msgs.msg import PublishedCounts
+from gait_entrainment_msgs.srv import Ready
+from gait_entrainment_nodes.messaging.player_services import srv
 from gait_entrainment_nodes.messaging.topics import (
     ENTRAINMENT,
     PUBLISHED_COUNTS,
@@ -77,12 +78,12 @@ class ReplayClient:
             PUBLISHED_COUNTS.type, PUBLISHED_COUNTS.name, self._on_counts, PUBLISHED_COUNTS.qos
         )
         self._clients = {
-            service: self._node.create_client(Trigger, service)
-            for service in (
-                "gait_analyzer/ready",
-                "gait_analyzer/finish",
-                "bag_player/ready",
-                "bag_player/resume",
+            service: self._node.create_client(kind, service)
+            for service, kind in (
+                ("gait_analyzer/ready", Ready),
+                ("gait_analyzer/finish", Trigger),
+                ("bag_player/ready", Ready),
+                ("bag_player/resume", srv.Resume),
             )
         }
 
@@ -123,19 +124,19 @@ class ReplayClient:
         """Whether the player has ended."""
         return "bag_player" in self._supervisor.ended()
 
-    def _all_listen(self, answer: Trigger.Response) -> bool:
+    def _all_listen(self, answer: Ready.Response) -> bool:
         """Whether everyone who is to hear the analyzer's results will hear them."""
-        if not answer.success:
+        matched = dict(zip(answer.topics, answer.matched, strict=True))
+        if not answer.ready:
             return False
-        matched = json.loads(answer.message)
         names = (*self._topic_names, self._counts_topic)
         return all(matched.get(name, 0) >= self._listeners for name in names)
 
-    def _all_recorded(self, answer: Trigger.Response) -> bool:
+    def _all_recorded(self, answer: Ready.Response) -> bool:
         """Whether a recorder, if there is one, hears all of its namespace, hidden topics apart."""
-        if not answer.success:
+        if not answer.ready:
             return False
-        heard = json.loads(answer.message)
+        heard = dict(zip(answer.topics, answer.matched, strict=True))
         if self._listeners == 1:
             return True
         beneath = self._node.get_namespace().rstrip("/") + "/"
@@ -157,7 +158,7 @@ class ReplayClient:
     def _ask(
         self,
         service: str,
-        good: Any = lambda answer: answer.success,
+        good: Any = lambda _: True,
         needless: Any = lambda: False,
     ) -> None:
         """Ask a node, again and again, until it gives a good answer, or that is needless."""
@@ -171,7 +172,7 @@ class ReplayClient:
                 return True
             if time.monotonic() - asked_at > ASKING_PERIOD and client.service_is_ready():
                 asked_at = time.monotonic()
-                answers.append(client.call_async(Trigger.Request()))
+                answers.append(client.call_async(client.srv_type.Request()))
             return False
 
         self._wait_until(answered, service, service.partition("/")[0])

@@ -3,7 +3,6 @@
 
 """The client of a run: asks the experiment to conduct a protocol, and shows how it goes."""
 
-import re
 import time
 from functools import partial
 from typing import Any
@@ -14,14 +13,13 @@ from rclpy.action import ActionClient
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-from std_srvs.srv import Trigger
 from tqdm import tqdm
 
 from gait_entrainment.protocol import Protocol
-from gait_entrainment_bringup.node_list import NODES
 from gait_entrainment_bringup.supervisor import Supervisor
 from gait_entrainment_msgs.action import RunProtocol
 from gait_entrainment_msgs.msg import ExperimentState, PulsePhase, Stride
+from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.topics import PULSE_PHASES, STRIDES
 
 # How long the experiment may take to appear [s].
@@ -52,7 +50,7 @@ class RunClient:
         )
         self._stride_period = self._phase_lag = ""
         # Made last: discovery goes in this order, so who answers here knows the action client too.
-        self._asking = {n: self._node.create_client(Trigger, f"{n}/ready") for n in ASKED}
+        self._asking = {n: self._node.create_client(Ready, f"{n}/ready") for n in ASKED}
         self._asked_at = self._looked_at = time.monotonic()
         self._heard_at = dict.fromkeys(ASKED, self._looked_at)
         self._answered: set[str] = set()
@@ -94,12 +92,7 @@ class RunClient:
         result = answer.result
         if answer.status == GoalStatus.STATUS_SUCCEEDED:
             return "", ""
-        message = result.message or "experiment failed"
-        # What the robot itself says is handed on whole: its log would only repeat it.
-        if re.match("perturbator( refused [a-z ]+)?: |the pulses were ended: ", message):
-            return message, ""
-        blamed = [node for node in NODES if node in message]
-        return message, blamed[0] if blamed else "experiment"
+        return result.message or "experiment failed", result.blamed
 
     def close(self) -> None:
         """Leave the ROS graph."""
@@ -130,7 +123,7 @@ class RunClient:
             self._asked_at = now
             for node, client in self._asking.items():
                 if client.service_is_ready():
-                    answer = client.call_async(Trigger.Request())
+                    answer = client.call_async(Ready.Request())
                     answer.add_done_callback(partial(self._on_answer, node))
         for node in set(ASKED) - self._answered:  # still starting
             self._heard_at[node] = now

@@ -42,8 +42,6 @@ EXAMPLES = """examples:
 # Nodes that may run on another host. Not those that hold the torque and the record: Ctrl-C must
 # reach them without a network.
 DETACHABLE = ("walker_sim", "gait_analyzer")
-# What the walker counts of the promises that reached it, under these names in its diagnostics.
-PROMISE_KEYS = ("late_stretches", "late_ms", "starved_stretches", "starved_ms")
 # After the experiment has ended, the recorder has this long to close the bag [s].
 CLOSING_TIMEOUT = 15.0
 
@@ -262,18 +260,14 @@ def conduct(protocol: Protocol, bag: Path, domain: int, options: argparse.Namesp
     (bag / "protocol.yaml").write_text(text)
 
 
-def walker_timing(bag: Path) -> dict[str, float]:
-    """Return what the walker's last diagnostics say of its timing, by key; may be empty."""
-    from gait_entrainment_nodes.messaging.topics import DIAGNOSTICS
+def walker_timing(bag: Path) -> Any:
+    """Return the walker's last word on its timing, a WalkerTiming message; None without one."""
+    from gait_entrainment_nodes.messaging.topics import WALKER_TIMING
 
-    timing: dict[str, float] = {}
     with BagReader(bag) as reader:
-        topics = [name for name in reader.topics if name.endswith(DIAGNOSTICS.name)]
-        for _, message in reader.decoded(topics):
-            for status in message.status:
-                if status.name == "walker_sim: run":
-                    timing = {value.key: float(value.value) for value in status.values}
-    return timing
+        names = [name for name in reader.topics if name.endswith(f"/{WALKER_TIMING.name}")]
+        timings = [message for _, message in reader.decoded(names)]
+    return timings[-1] if timings else None
 
 
 def report(bag: Path, options: argparse.Namespace) -> int:
@@ -284,15 +278,18 @@ def report(bag: Path, options: argparse.Namespace) -> int:
     recorded = read_run(bag)
     outcome = recorded_outcome(recorded, bag)
     timing = walker_timing(bag)
-    lateness = {
-        name: timing[f"publish_late_{name}_ms"]
-        for name in ("p50", "p99", "worst")
-        if f"publish_late_{name}_ms" in timing
-    }
-    if lateness:
-        outcome["publish_lateness_ms"] = lateness
-    if "late_stretches" in timing:
-        outcome["promises"] = {key: timing[key] for key in PROMISE_KEYS}
+    lateness = {}
+    if timing is not None:
+        if timing.samples:
+            names = ("p50", "p99", "worst")
+            lateness = {n: 1e3 * getattr(timing, f"publish_late_{n}") for n in names}
+            outcome["publish_lateness_ms"] = lateness
+        outcome["promises"] = {
+            "late_stretches": timing.late_stretches,
+            "late_ms": 1e3 * timing.late,
+            "starved_stretches": timing.starved_stretches,
+            "starved_ms": 1e3 * timing.starved,
+        }
     figures = []
     if not options.no_figures:
         from gait_entrainment_bags.figures import draw_figures
@@ -310,11 +307,11 @@ def report(bag: Path, options: argparse.Namespace) -> int:
             f"real time        samples published {lateness['p50']:.2f} ms after they were due"
             f" (median), {lateness['p99']:.2f} ms (99 %), {lateness['worst']:.2f} ms (worst)"
         )
-    if timing.get("late_stretches") or timing.get("starved_stretches"):
+    if timing is not None and (timing.late_stretches or timing.starved_stretches):
         print(
-            f"promises         of perturbator: {timing['late_stretches']:.0f} late by"
-            f" {timing['late_ms']:.1f} ms in all, {timing['starved_stretches']:.0f} stretches of"
-            f" {timing['starved_ms']:.1f} ms walked without torque: not reproducible"
+            f"promises         of perturbator: {timing.late_stretches} late by"
+            f" {1e3 * timing.late:.1f} ms in all, {timing.starved_stretches} stretches of"
+            f" {1e3 * timing.starved:.1f} ms walked without torque: not reproducible"
         )
     print(messages_line(recorded))
     print(f"bag              {bag}")

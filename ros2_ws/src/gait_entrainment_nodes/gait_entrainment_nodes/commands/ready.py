@@ -34,8 +34,8 @@ def run(options: argparse.Namespace) -> int:
     from rclpy.experimental import EventsExecutor
     from rclpy.node import Node
     from rclpy.signals import SignalHandlerOptions
-    from std_srvs.srv import Trigger
 
+    from gait_entrainment_msgs.srv import Ready
     from gait_entrainment_nodes.messaging.environment import set_environment
 
     try:
@@ -50,19 +50,19 @@ def run(options: argparse.Namespace) -> int:
     waiting = dict.fromkeys(options.nodes, "does not answer")
     give_up = time.monotonic() + options.timeout
     try:
-        clients = {name: asker.create_client(Trigger, f"{name}/ready") for name in options.nodes}
+        clients = {name: asker.create_client(Ready, f"{name}/ready") for name in options.nodes}
         while waiting and time.monotonic() < give_up:
-            asked = {n: clients[n].call_async(Trigger.Request()) for n in waiting}
+            asked = {n: clients[n].call_async(Ready.Request()) for n in waiting}
             again = time.monotonic() + ASK_AGAIN
             while time.monotonic() < min(again, give_up) and not all(
                 call.done() for call in asked.values()
             ):
                 executor.spin_once(timeout_sec=0.05)
             for name, call in asked.items():
-                if call.done() and call.result().success:
+                if call.done() and call.result().ready:
                     del waiting[name]
                 elif call.done():
-                    waiting[name] = f"waits for {call.result().message}"
+                    waiting[name] = f"waits for {call.result().waiting_for}"
     except InvalidServiceNameException as error:
         print(f"entrain ready: {' '.join(str(error).split())}", file=sys.stderr)
         return 2

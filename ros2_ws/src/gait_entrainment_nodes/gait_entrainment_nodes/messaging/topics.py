@@ -69,11 +69,13 @@ GAIT_EVENTS = Topic(topic_names.GAIT_EVENTS, msg.GaitEvent)
 ANKLE_TORQUE = Topic(topic_names.ANKLE_TORQUE, msg.AnkleTorque)
 GROUND_REACTION = tuple(Topic(name, WrenchStamped) for name in topic_names.GROUND_REACTION)
 WALKER_PROGRESS = Topic(topic_names.WALKER_PROGRESS, msg.Progress)
+WALKER_TIMING = Topic(topic_names.WALKER_TIMING, msg.WalkerTiming)
 CLOCK = Topic(topic_names.CLOCK, ClockMessage)
 
 TORQUE_PROFILE = Topic(topic_names.TORQUE_PROFILE, msg.TorqueProfile)
 PULSES = Topic(topic_names.PULSES, msg.TorquePulse)
 ROBOT_STATE = Topic(topic_names.ROBOT_STATE, msg.AnkleRobotState)
+TROUBLE = Topic(topic_names.TROUBLE, msg.Trouble)
 
 HORIZON = Topic(topic_names.HORIZON, msg.Horizon)
 EXPERIMENT_STATE = Topic(topic_names.EXPERIMENT_STATE, msg.ExperimentState, LATEST_STATE)
