@@ -9,8 +9,9 @@ from itertools import count
 import pytest
 from std_srvs.srv import Trigger
 
-from gait_entrainment_nodes.messaging.client import Client, SilenceError
+from gait_entrainment_nodes.messaging.client import Client
 from gait_entrainment_nodes.messaging.domain import claimed_domain
+from gait_entrainment_nodes.messaging.errors import SilenceError
 
 
 @pytest.fixture
@@ -49,7 +50,7 @@ def test_is_asked_until_the_answer_is_acceptable(client, asked):
 
 
 def test_a_question_keeps_the_latest_answer(client, asked):
-    question = client.ask(Trigger, "answers/ready", accept=lambda a: False, period=0.05)
+    question = client.ask(Trigger, "answers/ready", accept=lambda _: False, period=0.05)
     assert client.wait(lambda: question.answer() or len(asked) > 1, 10)
     assert question.answer() is None
     assert question.latest.message.startswith("answer")
@@ -84,4 +85,4 @@ def test_each_round_can_end_the_waiting(client):
 
 def test_waiting_returns_the_value_or_what_is_false(client):
     assert client.wait(lambda: "there") == "there"
-    assert client.wait(lambda: [], 0.01) == []
+    assert client.wait(list, 0.01) == []
