@@ -22,19 +22,3 @@ from gait_entrainment.walker.run import Stretch, WalkerRun
 from gait_entrainment.walker.sampling import Samples
 from gait_entrainment.walker.segment import Phase
 from gait_entrainment.walker.walker import Ending, EndingKind, Transition, Walker
-
-__all__ = [
-    "Ending",
-    "EndingKind",
-    "Phase",
-    "Pulses",
-    "Samples",
-    "Step",
-    "Stretch",
-    "Transition",
-    "Walk",
-    "Walker",
-    "WalkerRun",
-    "step_to_step",
-    "walk",
-]
