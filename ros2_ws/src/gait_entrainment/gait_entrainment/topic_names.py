@@ -15,12 +15,14 @@ GAIT_EVENTS = "gait_events"
 ANKLE_TORQUE = "ankle_torque"
 GROUND_REACTION = ("ground_reaction/left", "ground_reaction/right")
 WALKER_PROGRESS = "walker_sim/progress"
+WALKER_TIMING = "walker_sim/timing"
 CLOCK = "/clock"
 
 # Of the robot.
 TORQUE_PROFILE = "perturbation/torque_profile"
 PULSES = "perturbation/pulses"
 ROBOT_STATE = "perturbator/state"
+TROUBLE = "perturbator/trouble"
 
 # Of the experiment.
 HORIZON = "experiment/horizon"

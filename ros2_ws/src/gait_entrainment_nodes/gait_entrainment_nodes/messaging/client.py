@@ -18,11 +18,13 @@ from typing import Any
 import rclpy
 from rclpy.action import ActionClient
 from rclpy.context import Context
+from rclpy.exceptions import InvalidServiceNameException
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
-from std_srvs.srv import Trigger
 
-from gait_entrainment.errors import EntrainmentError
+from gait_entrainment.errors import UsageError
+from gait_entrainment_msgs.srv import Ready
+from gait_entrainment_nodes.messaging.errors import SilenceError
 from gait_entrainment_nodes.messaging.topics import Topic
 
 # How long to wait for a node before it counts as silent [s].
@@ -33,25 +35,14 @@ ASKING_PERIOD = 0.25
 ROUND = 0.02
 
 
-class SilenceError(EntrainmentError):
-    """Nobody answered in time; ``name`` is the service or action that was asked."""
-
-    def __init__(self, name: str, patience: float) -> None:
-        super().__init__(f"no answer from {name} within {patience:g} s")
-        self.name = name
-
-    @property
-    def node(self) -> str:
-        """Name of the node that should have answered."""
-        return self.name.rpartition("/")[0]
-
-
 class Question:
     """
     A request that is repeated until its answer is acceptable.
 
     Attributes
     ----------
+    accepted
+        The first acceptable answer, None before it.
     latest
         The latest answer, acceptable or not; None before the first one.
     answered_at
@@ -62,10 +53,10 @@ class Question:
     def __init__(
         self, service: Any, request: Any, accept: Callable[[Any], object], period: float
     ) -> None:
+        self.accepted: Any = None
         self.latest: Any = None
         self.answered_at = -math.inf
         self._service, self._request, self._accept, self._period = service, request, accept, period
-        self._answer: Any = None
         self._asked_at = -math.inf
         self._pending: list[Any] = []
 
@@ -74,13 +65,14 @@ class Question:
         for call in [call for call in self._pending if call.done()]:
             self._pending.remove(call)
             self.latest, self.answered_at = call.result(), time.monotonic()
-            if self._answer is None and self._accept(self.latest):
-                self._answer = self.latest
-        if self._answer is None and time.monotonic() - self._asked_at >= self._period:
-            if self._service.service_is_ready():
-                self._asked_at = time.monotonic()
-                self._pending.append(self._service.call_async(self._request))
-        return self._answer
+            if self.accepted is None and self._accept(self.latest):
+                self.accepted = self.latest
+        now = time.monotonic()
+        due = self.accepted is None and now - self._asked_at >= self._period
+        if due and self._service.service_is_ready():
+            self._asked_at = now
+            self._pending.append(self._service.call_async(self._request))
+        return self.accepted
 
 
 class Client:
@@ -144,7 +136,7 @@ class Client:
         self.node.create_subscription(topic.type, topic.name, callback, topic.qos, raw=raw)
 
     def wait(self, condition: Callable[[], Any], patience: float = math.inf) -> Any:
-        """Serve ROS until a condition holds [s]; return its value, which is false if it never did."""
+        """Serve ROS until a condition holds, at most ``patience`` [s]; return its last value."""
         give_up = time.monotonic() + patience
         while not (value := condition()) and time.monotonic() < give_up:
             self._executor.spin_once(timeout_sec=ROUND)
@@ -152,9 +144,12 @@ class Client:
         return value
 
     def service(self, service_type: Any, name: str) -> Any:
-        """Return the client of a service; it is made once."""
+        """Return the client of a service, made once; UsageError if it cannot have that name."""
         if name not in self._services:
-            self._services[name] = self.node.create_client(service_type, name)
+            try:
+                self._services[name] = self.node.create_client(service_type, name)
+            except InvalidServiceNameException as error:
+                raise UsageError(" ".join(str(error).split())) from None
         return self._services[name]
 
     def action(self, action_type: Any, name: str) -> Any:
@@ -214,7 +209,7 @@ class Client:
         """
         name = f"{node}/ready"
         self._services.pop(name, None)  # to be made anew, behind everything else
-        self.call(Trigger, name, patience=patience)
+        self._expect(self.ask(Ready, name).answer, name, patience)
 
     def send_goal(
         self,
