@@ -6,7 +6,6 @@
 import time
 from collections.abc import Collection
 
-
 from gait_entrainment_bringup.supervisor import Supervisor
 from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.client import Client
@@ -48,9 +47,7 @@ class Watch:
     ) -> None:
         self._supervisor, self._may_end, self._silence = supervisor, may_end, silence
         self._signs = {
-            node: client.ask(
-                Ready, f"{node}/ready", accept=lambda _: False, period=ASKING_PERIOD
-            )
+            node: client.ask(Ready, f"{node}/ready", accept=lambda _: False, period=ASKING_PERIOD)
             for node in asked
         }
         self._looked_at = self._since = time.monotonic()

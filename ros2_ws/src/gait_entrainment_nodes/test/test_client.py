@@ -9,7 +9,6 @@ from itertools import count
 import pytest
 
 from gait_entrainment_msgs.srv import Ready
-
 from gait_entrainment_nodes.messaging.client import Client
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 from gait_entrainment_nodes.messaging.errors import SilenceError

@@ -106,4 +106,3 @@ def refuse_unknown_parameters(node: Node) -> None:
         if not node.has_parameter(name) and not name.startswith("qos_overrides."):
             known = ", ".join(sorted(node.list_parameters([], 0).names))
             raise SettingError(f"{name}: unknown parameter; allowed: {known}")
-
