@@ -237,7 +237,7 @@ class _FileCheck:
 
     def _check_statistics(self, summary: Contents) -> None:
         said, found = (
-            f"{it.message_count} messages from {it.start} to {it.end} ns"
+            f"{it.counts.total()} messages from {it.start} to {it.end} ns"
             for it in (summary, self._stock)
         )
         if said != found or +summary.counts != self._stock.counts:
@@ -320,7 +320,7 @@ def _check_metadata_file(folder: Path, stocks: dict[str, Contents], report: _Rep
     counts: Counter[str] = sum((stock.counts for stock in stocks.values()), Counter())
     topics = {topic.name: topic for stock in stocks.values() for topic in stock.topics}
     files = [
-        FileInformation(name, stock.start, stock.end, stock.message_count)
+        FileInformation(name, stock.start, stock.end, stock.counts.total())
         for name, stock in stocks.items()
     ]
     true = BagDescription([(topic, counts[name]) for name, topic in topics.items()], files)

@@ -182,8 +182,7 @@ def schema_parts(type_name: str, schema_text: str) -> dict[str, str]:
 
 def definition_lines(schema_text: str) -> list[list[str]]:
     """Return the words of a definition: what is left without comments and empty lines."""
-    lines = (line.partition("#")[0].split() for line in schema_text.splitlines())
-    return list(filter(None, lines))
+    return [w for line in schema_text.splitlines() if (w := line.partition("#")[0].split())]
 
 
 def missing_definitions(type_name: str, schema_text: str) -> list[str]:

@@ -89,7 +89,7 @@ class McapFile:
 
     @contextmanager
     def _broken(self, what: str, offset: int) -> Iterator[None]:
-        """Say what at which offset the bytes that make no sense were to be."""
+        """Turn what a parser raises for broken bytes into an error that says what lies where."""
         try:
             yield
         except BROKEN as error:
@@ -119,7 +119,7 @@ class McapFile:
         return opcode, length
 
     def record(self, offset: int, expected: Opcode) -> bytes:
-        """Read the content of the record that is to be at an offset."""
+        """Read the content of the record at an offset, which must be of a kind."""
         opcode, length = self.record_at(offset)
         if opcode != expected:
             what = expected.name.lower().replace("_", " ")
@@ -169,11 +169,11 @@ class McapFile:
             return None
         for channel, topic in contents.names.items():
             contents.counts[topic] += statistics.channel_message_counts.get(channel, 0)
-        if contents.message_count != statistics.message_count:
+        if contents.counts.total() != statistics.message_count:
             raise self.damage(
                 begin,
                 f"the statistics count {statistics.message_count} messages, but "
-                f"{contents.message_count} by channel",
+                f"{contents.counts.total()} by channel",
             )
         contents.start, contents.end = statistics.message_start_time, statistics.message_end_time
         return contents
@@ -187,7 +187,7 @@ class McapFile:
             return decompress(content)
 
     def messages(self, chunk: Chunk, rank: int, names: Mapping[int, str]) -> list[BagMessage]:
-        """Read messages of the chunk of this rank in the bag, of these topics by channel."""
+        """Read messages of these topics (by channel) from a chunk; rank: its place in the bag."""
         place = rank * LARGEST_CHUNK
         with self._broken("chunk", chunk.offset):
             if chunk.index_offsets.keys() <= names.keys():  # all of it, or no index
@@ -264,8 +264,8 @@ class McapFile:
             if messages:
                 times = [message.log_time for message in messages]
                 chunk = replace(chunk, start=min(times), end=max(times))
-                first = chunk.start if not contents.counts else min(chunk.start, contents.start)
-                contents.start, contents.end = first, max(chunk.end, contents.end)
+                start = min(chunk.start, contents.start) if contents.counts else chunk.start
+                contents.start, contents.end = start, max(chunk.end, contents.end)
                 contents.chunks.append(chunk)
                 contents.counts.update(message.topic for message in messages)
                 yield chunk, messages

@@ -4,9 +4,9 @@
 """
 The records of an MCAP file, from bytes: what it announces, its messages, its chunks.
 
-The ``mcap`` library parses the records of which there are few. What there is much of, messages
-and their indexes, is taken apart here, ten times as fast. Bytes that make no sense raise one of
-`BROKEN`; `mcap_file` says where in the file they lie.
+The ``mcap`` library parses the kinds of records of which there are few. Those of which there are
+many, messages and their indexes, are parsed here, ten times as fast. Bytes that make no sense
+raise one of `BROKEN`; `mcap_file` adds where in the file they lie.
 """
 
 import re
@@ -36,7 +36,7 @@ _CHUNK_INDEX = struct.Struct("<QQQQI")  # start, end, offset, length, length of 
 _INDEX_OFFSET = struct.Struct("<HQ")  # channel, offset of its message index
 _MESSAGE_INDEX = struct.Struct("<HI")  # channel, length of the entries
 _INDEX_ENTRY = struct.Struct("<QQ")  # log time, offset in the chunk
-_FEW: dict[int, Any] = {
+_RECORD_TYPES: dict[int, Any] = {
     Opcode.SCHEMA: Schema,
     Opcode.CHANNEL: Channel,
     Opcode.STATISTICS: Statistics,
@@ -107,11 +107,6 @@ class Contents:
         schemas = {schema.id: schema for schema in self.schemas}
         return [topic_of(channel, schemas.get(channel.schema_id)) for channel in self.channels]
 
-    @property
-    def message_count(self) -> int:
-        """Messages in the file."""
-        return self.counts.total()
-
     def take(self, opcode: int, content: bytes) -> None:
         """Enter a record of the summary or of the data section, other than messages."""
         if opcode == Opcode.CHUNK_INDEX:
@@ -119,9 +114,9 @@ class Contents:
             pairs = content[_CHUNK_INDEX.size : _CHUNK_INDEX.size + size]
             index_offsets = dict(_INDEX_OFFSET.iter_unpack(pairs))
             self.chunks.append(Chunk(offset, length, start, end, index_offsets=index_offsets))
-        if opcode not in _FEW:
+        if opcode not in _RECORD_TYPES:
             return
-        record = parse(_FEW[opcode], content)
+        record = parse(_RECORD_TYPES[opcode], content)
         if opcode == Opcode.STATISTICS:
             self.statistics = record
         elif opcode == Opcode.METADATA:

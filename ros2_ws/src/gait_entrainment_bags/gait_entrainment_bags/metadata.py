@@ -182,7 +182,7 @@ _EXAMPLE = BagDescription([(TopicInfo("", "", ""), 0)], [FileInformation("")]).a
 
 
 def read_metadata_file(folder: Path) -> dict[str, Any]:
-    """Read ``metadata.yaml``, without its root key; UnreadableBagError if rosbag2 could not."""
+    """Read ``metadata.yaml`` without its root key; raises UnreadableBagError if it has none."""
     path = folder / METADATA_FILE
     try:
         text = path.read_text(encoding="utf-8")
@@ -300,7 +300,7 @@ def _dump_yaml(value: object) -> str:
 
 
 def load_yaml(text: str, where: str) -> Any:
-    """Read YAML of others; raises UnreadableBagError if it is none, or nested too deeply."""
+    """Read somebody's YAML; raises UnreadableBagError if it is invalid or nested too deeply."""
     try:
         depth = 0
         for event in yaml.parse(text, Loader=_LOADER):

@@ -93,9 +93,7 @@ class Playback:
     def take(self, now: int) -> Moment | None:
         """Give the next moment if it is due by now (steady time [ns]); None if none is."""
         due = self.due()
-        if due is None or now < due:
-            return None
-        return self._advance(due)
+        return None if due is None or now < due else self._advance(due)
 
     def take_next(self) -> Moment | None:
         """Give the next moment while paused, whenever it is due; None once all were given."""
@@ -132,7 +130,7 @@ class Playback:
         self._go_to(instant)
 
     def play(self, start_offset: int, duration: int, now: int) -> None:
-        """Play from an offset [ns], which must lie in the bag, for a duration [ns]; 0: all."""
+        """Play a duration [ns; 0: all] from an offset [ns]; raises BagError outside of the bag."""
         if not 0 <= start_offset <= self._bag.duration:
             raise BagError(
                 f"start_offset: {start_offset / NANOSECONDS_PER_SECOND:g} s; allowed: 0 to "

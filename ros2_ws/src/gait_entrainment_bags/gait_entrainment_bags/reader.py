@@ -28,19 +28,19 @@ class BagReader(AbstractContextManager["BagReader"]):
     """
     A bag opened for reading: a folder, or a single ``.mcap`` file.
 
-    Raises UnreadableBagError if it is not a bag, or damaged, or was never closed; NoBagError if
-    there is nothing.
+    ``counts`` are its messages by topic, ``start`` and ``end`` the first and the last log time
+    [ns since the epoch; 0 without messages], ``size`` the bytes of all its files. Raises
+    UnreadableBagError if it is not a bag, or damaged, or was never closed; NoBagError if there is
+    nothing.
     """
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
         self.topics: dict[str, TopicInfo] = {}
-        self.counts: dict[str, int] = {}  # messages in the bag, by topic
-        self.start = 0  # first log time [ns since the epoch]; 0 without messages
-        self.end = 0  # last log time
+        self.counts: dict[str, int] = {}
+        self.start = self.end = self.size = 0
         self.custom_data: dict[str, str] = {}
         self.ros_distro = ""
-        self.size = 0  # bytes of all files
         self._files: list[tuple[McapFile, Contents]] = []
         try:
             for file_path in bag_files(self.path):
@@ -75,7 +75,7 @@ class BagReader(AbstractContextManager["BagReader"]):
             if contents.damages:
                 raise UnreadableBagError(contents.damages[0])
         self._files[-1] = (file, contents)
-        if contents.message_count:
+        if contents.counts.total():
             self.start = min(self.start, contents.start) if self.message_count else contents.start
             self.end = max(self.end, contents.end)
         self.size += file.size
@@ -150,7 +150,7 @@ class BagReader(AbstractContextManager["BagReader"]):
     def decoded(
         self, topics: Collection[str] | None = None, start: int = 0, end: float = math.inf
     ) -> Iterator[tuple[BagMessage, Any]]:
-        """Give messages as `messages` does, decoded; BagError also if a definition is unusable."""
+        """Give messages as `messages` does, decoded; BagError also if a definition is broken."""
         names = self.topics if topics is None else self.require_topics(topics)
         decoders = {name: decoder_for(self.topics[name]) for name in names}
         for message in self.messages(topics, start, end):

@@ -93,8 +93,9 @@ class _Rescue:
         self._announce(contents)
         self.description = recorded_description(contents.metadata) or self.description
         losses += contents.damages
-        if summary is not None and (missing := summary.message_count - contents.message_count) > 0:
-            losses.append(f"{file.path}: {missing} of {summary.message_count} messages are lost")
+        expected = 0 if summary is None else summary.counts.total()
+        if (missing := expected - contents.counts.total()) > 0:
+            losses.append(f"{file.path}: {missing} of {expected} messages are lost")
         return losses
 
     def _announce(self, contents: Contents) -> None:
@@ -112,4 +113,6 @@ class _Rescue:
             if is_type_name(topic.type):
                 self.writer.add_topic(topic)
             else:
-                self.refused[topic.name] = f"{topic.name}: lost, its type {topic.type!r} is none"
+                self.refused[topic.name] = (
+                    f"{topic.name}: lost: its type {topic.type!r} does not read package/msg/Type"
+                )

@@ -76,18 +76,18 @@ def export(
             raise BagError(f"{path}: no messages on {', '.join(silent)}: leave it out of --topics")
         _import_pyarrow()
         make_folder(out)
-        written = {}
+        files = {
+            name: out / f"{name.strip('/').replace('/', '.')}.{format_name}" for name in topics
+        }
         try:
-            for name in topics:
-                file = out / f"{name.strip('/').replace('/', '.')}.{format_name}"
+            for name, file in files.items():
                 _write_table(reader, reader.topics[name], file)
-                written[name] = file
         except BaseException as error:
             shutil.rmtree(out, ignore_errors=True)  # tables that break off are worse than none
             if isinstance(error, (OSError, ValueError)):
                 raise BagWriteError(f"{file}: cannot be written: {first_line(error)}") from None
             raise
-        return written
+        return files
 
 
 def _write_table(reader: BagReader, topic: TopicInfo, file: Path) -> None:
@@ -149,7 +149,7 @@ def _import_pyarrow() -> list[Any]:
 
 
 def columns_of(topic: TopicInfo, example: Any) -> list[Column]:
-    """Lay out a table of rows of log time, publish time, and message, of which one is given."""
+    """Lay out the table of a topic: rows of log time, publish time, message (as the example)."""
     parts = schema_parts(topic.type, topic.schema_text)
     return [
         Column("log_time", "ns", "uint64", itemgetter(0)),

@@ -38,7 +38,6 @@ ENDED_EARLY = "ended_early"
 """Entry of the custom data of a bag whose recording ended before its time; says why."""
 _COMPRESSIONS = {kind.name.lower(): kind for kind in CompressionType}  # none, lz4, zstd
 _MEBIBYTE = 2**20
-_TIME_END = 2**64
 _DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
@@ -102,7 +101,7 @@ class BagWriter(AbstractContextManager["BagWriter"]):
         self.close()
 
     def add_topic(self, topic: TopicInfo) -> None:
-        """Announce a topic, once; it appears in the bag even if no message follows."""
+        """Announce a topic: it is in the bag even without messages; BagError if it already is."""
         if topic.name in self._topics:
             raise BagError(f"{topic.name}: already in the bag")
         if not is_type_name(topic.type):
@@ -130,7 +129,7 @@ class BagWriter(AbstractContextManager["BagWriter"]):
         channel = self._channels.get(topic)
         if channel is None:
             raise BagError(f"{topic}: not announced by add_topic")
-        if not (0 <= log_time < _TIME_END and 0 <= publish_time < _TIME_END):
+        if not (0 <= log_time < 2**64 and 0 <= publish_time < 2**64):
             raise BagError(
                 f"{topic}: a time lies outside of 0 to 2**64 - 1 ns: "
                 f"log time {log_time}, publish time {publish_time}"

@@ -12,6 +12,8 @@ import pytest
 
 from gait_entrainment_bags import BagError, BagExistsError, BagWriter, TopicInfo, export
 
+pytest.importorskip("pyarrow", reason="tables are made with pyarrow: pip install pyarrow")
+
 TEXT = (
     "# Torque at both ankles [N m].\n"
     "uint8 LEFT=0\n"
