@@ -11,7 +11,7 @@ those of the wall clock: its torque is then promised piece by piece, once it has
 
 import math
 from collections.abc import Callable, Iterator
-from contextlib import closing, suppress
+from contextlib import suppress
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -49,9 +49,8 @@ class _NodeRobot:
 
     def __init__(self, name: str, *, simulated: bool, arm: bool) -> None:
         # What topics do not tell is not promised.
-        self.capabilities = SimpleNamespace(
-            simulated=simulated, measures_torque=False, state_rate=0.0
-        )
+        unknown = {"measures_torque": False, "state_rate": 0.0}
+        self.capabilities = SimpleNamespace(simulated=simulated, **unknown)
         self.faults: tuple[Fault, ...] = ()
         self.run = 0
         self.goal: Any = None  # the latest that was accepted, unless it was ended early
@@ -68,23 +67,16 @@ class _NodeRobot:
         self.client.subscribe(ROBOT_STATE, self._hear_state)
         self.client.subscribe(PULSES, self._hear_pulse)
         self._horizons = self.client.node.create_publisher(HORIZON.type, HORIZON.name, HORIZON.qos)
-        services = {"change_state": ChangeState, "stop": Trigger} | (
-            {"arm": Trigger} if arm else {}
-        )
-        ready = [
-            *(
-                self.client.service(kind, f"{name}/{n}").service_is_ready
-                for n, kind in services.items()
-            ),
-            self.client.action(DeliverPulseTrain, f"{name}/deliver_pulse_train").server_is_ready,
-            self._horizons.get_subscription_count,
-        ]
+        kinds = {"change_state": ChangeState, "stop": Trigger} | ({"arm": Trigger} if arm else {})
+        ready = [self.client.service(kinds[n], f"{name}/{n}").service_is_ready for n in kinds]
+        self._train = f"{name}/deliver_pulse_train"
+        ready.append(self.client.action(DeliverPulseTrain, self._train).server_is_ready)
+        ready.append(self._horizons.get_subscription_count)
         if not self.client.wait(lambda: all(known() for known in ready), PATIENCE):
             self.client.close()
             raise DeviceError(
-                f"no node {name} with {', '.join(services)}, deliver_pulse_train and a "
-                f"subscription of {HORIZON.name} was found: start it in this ROS domain, "
-                "unconfigured"
+                f"no node {name} with {', '.join(kinds)}, deliver_pulse_train and a subscription "
+                f"of {HORIZON.name} was found: start it in this ROS domain, unconfigured"
             )
 
     def configure(self) -> None:
@@ -115,8 +107,7 @@ class _NodeRobot:
             torque=train.torque,
             duration=train.duration,
         )
-        name = f"{self._name}/deliver_pulse_train"
-        handle = self.client.send_goal(DeliverPulseTrain, name, goal, patience=PATIENCE)
+        handle = self.client.send_goal(DeliverPulseTrain, self._train, goal, patience=PATIENCE)
         if not handle.accepted:
             unarmed = not (self.capabilities.simulated or self._arm)
             raise LimitError(f"rejected{'; a real robot must be armed: --arm' if unarmed else ''}")
@@ -199,7 +190,7 @@ class _NodeRobot:
             self._revisions.append(message.revision)
         if message.stop:
             self._stops += 1
-        else:
+        elif message.run != self.run - 1:  # those may have been under way when the run began
             self._profiles.append(message)
 
     def _hear_state(self, message: Any) -> None:
@@ -282,7 +273,7 @@ def check_node(
     no such node.
     """
     robot = _NodeRobot(name, simulated=not real_time, arm=arm)
-    with closing(robot.client):
+    with robot.client:
         bench = NodeBench(robot, side, tolerances)
         for check in (*COMMON, other_run):
             yield run_check(check, bench)
