@@ -295,6 +295,10 @@ class Perturbator(Participant, TolerantLifecycleNode):
         self._goal = goal
         self._train_ended.add_done_callback(lambda _: goal.execute())
 
+    def _on_train_ended(self, result: Result) -> None:
+        assert self._train_ended is not None
+        self._train_ended.set_result(result)
+
     def _execute(self, goal: Any) -> Result:
         """Say how a train ended."""
         assert self._train_ended is not None
@@ -312,11 +316,6 @@ class Perturbator(Participant, TolerantLifecycleNode):
         """Bring the torque to zero now: the next horizon may be long in coming."""
         self._end_torque("cancelled by the client", Result.CANCELLED)
         return CancelResponse.ACCEPT
-
-    def _end_train(self, result: Result) -> None:
-        """Let the goal that is under way, if any, end."""
-        if self._train_ended is not None and not self._train_ended.done():
-            self._train_ended.set_result(result)
 
     # Promises
 
@@ -339,7 +338,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
             self._end_torque("another run began")
         self._now = nanoseconds_of(message.header.stamp)
         if new:
-            self.run = Run(message.run, self._now, robot, self.publish, self._end_train)
+            self.run = Run(message.run, self._now, robot, self.publish, self._on_train_ended)
             self._latest_run = message.run
         assert self.run is not None
         until = nanoseconds_of(message.until)
