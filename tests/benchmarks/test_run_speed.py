@@ -71,16 +71,6 @@ def entrain(tmp_path, name, *options):
     return seconds, json.loads(text)
 
 
-def test_whole_command_entrain_simulate():
-    run("entrain", "simulate", "--json")  # loads what the operating system has not cached
-    simulate, _ = run("entrain", "simulate", "--json")
-    start, _ = run(sys.executable, "-c", "import numpy")
-    print(
-        f"\nentrain simulate, default protocol, whole command: {simulate:.2f} s"
-        f" (target: under 1 s; a Python that imports numpy alone: {start:.2f} s)"
-    )
-
-
 def test_lock_step_with_everything_recorded(tmp_path):
     seconds, outcome = entrain(tmp_path, "everything")
     walked = sum(outcome["stride_period"])
