@@ -8,40 +8,28 @@ Conductor, ankle robot and walker are the objects that the nodes hold, driven in
 which a lock-step run drives them. So both give the same events to the nanosecond.
 """
 
-import math
 from dataclasses import dataclass
 
 from gait_entrainment.experiment import Conductor
-from gait_entrainment.gait import Analysis, GaitEvent, VerdictSettings, analyze
+from gait_entrainment.gait import GaitEvent, VerdictSettings, analyze
+from gait_entrainment.outcome import Run
 from gait_entrainment.protocol import Protocol
 from gait_entrainment.robot import (
     DeviceLimits,
     LimitError,
-    PulseTiming,
+    MeasuredOnsets,
     PulseTrain,
-    TimingAudit,
     find_driver,
 )
 from gait_entrainment.walker import Ending, WalkerRun
 
 
 @dataclass(frozen=True)
-class Simulation:
-    """What came of a simulated experiment; stamps are nanoseconds since its start."""
+class Simulation(Run):
+    """What came of a simulated experiment; stamps count from its start."""
 
-    protocol: Protocol
-    events: tuple[GaitEvent, ...]
-    onsets: tuple[int, ...]  # of the pulses that were delivered, as the analysis takes them
-    timings: tuple[PulseTiming, ...]  # commanded, sent and measured onset of each pulse
-    train: PulseTrain | None  # as planned; None where the walker did not come so far
-    measured_period: float  # mean stride period over the baseline [s]; NaN without a plan
-    ending: Ending | None  # fall or fly-off; None where every stride was walked
-    analysis: Analysis
-
-    @property
-    def pulse_period(self) -> float:
-        """Period of the pulses as planned [s]; NaN without a plan."""
-        return self.train.period if self.train is not None else math.nan
+    train: PulseTrain | None  # as planned; None if the walker did not come so far
+    ending: Ending | None  # fall or fly-off; None if every stride was walked
 
 
 def simulate(
@@ -55,15 +43,10 @@ def simulate(
     Conduct a protocol on the simulated walker.
 
     With ``measured_onsets`` the analysis takes the onset of each pulse from the torque that the
-    robot measured, where it shows one, instead of from the command.
+    robot measured, if that shows one, instead of from the command.
 
-    Raises
-    ------
-    LimitError
-        where the driver is unknown, or the pulses are outside the limits of the device.
-    ProtocolError
-        where the pulses would overlap at the measured period.
-
+    Raises LimitError if the driver is unknown or the pulses are outside the limits of the device,
+    ProtocolError if the pulses would overlap at the measured period.
     """
     driver = find_driver(protocol.driver)
     if not driver.simulated:
@@ -79,14 +62,16 @@ def simulate(
     run = WalkerRun(protocol.walker, first_heel_strike=protocol.side, sample_rate=None)
     events: list[GaitEvent] = []
     onsets: list[int] = []
-    audit, timings = TimingAudit(), []
+    measured = MeasuredOnsets()
     while not run.ended:
         horizon = conductor.horizon(run.reached)
         profile = robot.promise(horizon.until)
         onsets += profile.onsets
+        measured.add_promise(profile.onsets, profile.valid_until)
         for onset in profile.onsets:
-            audit.add_pulse(onset, protocol.pulse_torque, protocol.pulses.width)
-        timings += audit.add_states(robot.read())
+            measured.add_pulse(onset, protocol.pulse_torque, protocol.pulses.width)
+        for state in robot.read():
+            measured.add_state(state)
         run.accept(profile)
         for transition in run.advance(horizon.until, last=horizon.last).transitions:
             event = GaitEvent(transition.stamp, transition.kind, transition.side, transition.step)
@@ -94,16 +79,17 @@ def simulate(
             train = conductor.add_event(event)
             if train is not None:
                 robot.schedule(train)
-    timings += audit.finish()
+    measured.finish()
     if measured_onsets:
-        onsets = [timing.onset for timing in timings]
+        onsets = [timing.onset for timing in measured.timings]
     return Simulation(
         protocol=protocol,
         events=tuple(events),
         onsets=tuple(onsets),
-        timings=tuple(timings),
+        timings=tuple(measured.timings),
         train=conductor.train,
         measured_period=conductor.measured_period,
+        pulse_period=conductor.pulse_period,
         ending=run.ending,
         analysis=analyze(events, onsets, protocol.side, settings),
     )

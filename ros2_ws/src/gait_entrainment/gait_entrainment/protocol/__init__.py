@@ -3,14 +3,5 @@
 
 """What an experiment shall do: the protocol file, validated."""
 
-from gait_entrainment.protocol.protocol import Protocol, ProtocolError, PulsePlan
+from gait_entrainment.protocol.protocol import FIELDS, Protocol, ProtocolError, PulsePlan
 from gait_entrainment.protocol.reader import DEFAULT_PROTOCOL, read_protocol, write_protocol
-
-__all__ = [
-    "DEFAULT_PROTOCOL",
-    "Protocol",
-    "ProtocolError",
-    "PulsePlan",
-    "read_protocol",
-    "write_protocol",
-]

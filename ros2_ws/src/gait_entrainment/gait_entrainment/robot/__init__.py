@@ -9,26 +9,6 @@ from gait_entrainment.robot.faults import DeviceError, Fault, LimitError
 from gait_entrainment.robot.guard import GuardedRobot
 from gait_entrainment.robot.limits import DeviceLimits
 from gait_entrainment.robot.measured_onsets import MeasuredOnsets
-from gait_entrainment.robot.profile import TorqueProfile
+from gait_entrainment.robot.profile import ProfileError, TorqueProfile
 from gait_entrainment.robot.pulse_train import PulseTrain
-from gait_entrainment.robot.timing import PulseTiming, TimingAudit, measured_onset
-
-__all__ = [
-    "AnkleRobot",
-    "Capabilities",
-    "DeviceError",
-    "DeviceLimits",
-    "Driver",
-    "Fault",
-    "GuardedRobot",
-    "LimitError",
-    "MeasuredOnsets",
-    "PulseTiming",
-    "PulseTrain",
-    "RobotState",
-    "TimingAudit",
-    "TorqueProfile",
-    "driver_names",
-    "find_driver",
-    "measured_onset",
-]
+from gait_entrainment.robot.timing import PulseTiming, measured_onset
