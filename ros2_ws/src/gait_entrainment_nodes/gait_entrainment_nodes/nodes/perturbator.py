@@ -37,7 +37,7 @@ from gait_entrainment_msgs.msg import Horizon, Trouble
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.stamps import header
 from gait_entrainment_nodes.nodes.loop import run_node
-from gait_entrainment_nodes.nodes.parameters import declare_settings, side_of, side_setting
+from gait_entrainment_nodes.nodes.parameters import declare_settings
 from gait_entrainment_nodes.nodes.participant import Participant, ReadSettings
 from gait_entrainment_nodes.nodes.perturbator_run import Result, Run
 from gait_entrainment_nodes.nodes.rclpy_internals import TolerantLifecycleNode
@@ -50,7 +50,7 @@ MEASURED_PERIOD = 0.01
 class Settings:
     """Parameters of the node, beside the limits of the robot."""
 
-    side: str = side_setting("ankle on which the robot sits: left or right")
+    side: Side = setting(Side.RIGHT, "ankle on which the robot sits: left or right")
     driver: str = setting("ideal", "name of the ankle robot driver: NAME or NAME:OPTION=VALUE,...")
     seed: int = setting(0, "seed of a driver that draws random numbers", "1", (0, 2**32 - 1))
     armed: bool = setting(
@@ -126,7 +126,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
                 raise DeviceError(
                     f"driver: {driver.name} runs in real time only: use_sim_time must be off"
                 )
-            robot = driver.make(side_of(settings.side), self.limits, settings.seed)
+            robot = driver.make(settings.side, self.limits, settings.seed)
             robot.configure()
         except (LimitError, DeviceError) as error:
             return self._refuse(error)
@@ -302,7 +302,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
     def _execute(self, goal: Any) -> Result:
         """Say how a train ended."""
         assert self._train_ended is not None
-        result = self._train_ended.result()
+        result: Result = self._train_ended.result()
         if result.outcome == Result.CANCELLED:
             goal.canceled()
         elif result.outcome == Result.DELIVERED:
