@@ -25,14 +25,13 @@ MESSAGES = 100_000
 _PUBLISHER = """
 import sys
 import rclpy
-from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from gait_entrainment_nodes.nodes.participant import Participant
 from gait_entrainment_nodes.messaging.raw_messages import serialize
 from gait_entrainment_nodes.messaging.topics import JOINT_STATES
 
 
-class Source(Participant, Node):
+class Source(Participant):
     def __init__(self):
         super().__init__("source")
         self.begin_participation()

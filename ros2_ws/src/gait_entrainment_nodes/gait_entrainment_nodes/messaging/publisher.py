@@ -51,7 +51,7 @@ class CountedPublisher:
     @property
     def unmatched(self) -> int:
         """Number of known subscriptions that are not matched yet."""
-        return max(self._node.count_subscribers(self.topic_name) - self.matched, 0)
+        return max(int(self._node.count_subscribers(self.topic_name)) - self.matched, 0)
 
     def publish(self, message: Any) -> None:
         """

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
@@ -78,8 +77,10 @@ class Settings:
     stay: bool = setting(False, "stay at the end, for ~/seek")
 
 
-class BagPlayer(Participant, Node):
+class BagPlayer(Participant):
     """ROS side of a playback. See the module's docstring."""
+
+    _begun = False  # all subscriptions that are waited for have been matched
 
     def __init__(self) -> None:
         super().__init__("bag_player")
@@ -93,7 +94,6 @@ class BagPlayer(Participant, Node):
             "topics that must have a subscription before the first message; one that must have "
             "two is named twice",
         )
-        self._playback: Playback | None = None
         self.begin_participation()
         settings = self.settings
         if not settings.bag:
@@ -106,7 +106,7 @@ class BagPlayer(Participant, Node):
                 self._types,
                 start_offset=settings.start_offset,
                 duration=settings.duration or math.inf,
-                rate=settings.rate or FASTEST,
+                rate=self._rate,
                 loop=settings.loop,
                 paused=settings.start_paused,
                 clock_period=1 / settings.clock if settings.clock else 0.0,
@@ -115,7 +115,6 @@ class BagPlayer(Participant, Node):
             raise ValueError(str(error)) from None
         self._offer_topics(remaps)
         self.note_state(DiagnosticStatus.OK, "plays")
-        self._begun = False
         self._look_at = time.monotonic()  # when matching is looked after next
         self._give_up_at = time.monotonic() + (settings.expect_timeout or math.inf)
         self._lateness = Lateness()  # of messages, from due to published
@@ -139,8 +138,12 @@ class BagPlayer(Participant, Node):
     def take_parameters(self, read: ReadSettings) -> None:
         """Play at another rate from now on."""
         self.settings = read(Settings)
-        if self._playback is not None:
-            self._playback.set_rate(self.settings.rate or FASTEST, time.monotonic_ns())
+        if self._begun:
+            self._playback.set_rate(self._rate, time.monotonic_ns())
+
+    @property
+    def _rate(self) -> float:
+        return self.settings.rate or FASTEST
 
     # The start
 
@@ -196,8 +199,9 @@ class BagPlayer(Participant, Node):
         self._look_at = time.monotonic() + MATCHING_PERIOD
         waiting = self.not_ready()
         if not waiting:
-            self._begun = True
-            self._playback.begin(time.monotonic_ns())
+            self._begun, now = True, time.monotonic_ns()
+            self._playback.begin(now)
+            self._playback.set_rate(self._rate, now)
         elif time.monotonic() > self._give_up_at:
             patience = f"{self.settings.expect_timeout:g} s"
             self.failure = f"no {waiting} within {patience}; nothing was played"
@@ -284,7 +288,7 @@ class BagPlayer(Participant, Node):
         return response
 
     def _on_get_rate(self, _: Any, response: Any) -> Any:
-        response.rate = self._playback.rate
+        response.rate = self._rate
         return response
 
     def _on_set_rate(self, request: Any, response: Any) -> Any:

@@ -20,7 +20,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 
@@ -72,7 +71,7 @@ class Settings:
     required: bool = setting(False, "end, and with it the run, if nothing more can be written")
 
 
-class BagRecorder(Participant, Node):
+class BagRecorder(Participant):
     """ROS side of the bag writer. See the module's docstring."""
 
     def __init__(self) -> None:

@@ -18,7 +18,6 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
-from rclpy.node import Node
 from rclpy.task import Future
 
 from gait_entrainment.experiment import Conductor, Phase
@@ -79,7 +78,7 @@ class Settings:
     )
 
 
-class Experiment(Participant, Node):
+class Experiment(Participant):
     """ROS side of the conductor: brings participants together, carries what a run says."""
 
     run: Run | None

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from rclpy.node import Node
 from std_srvs.srv import Trigger
 
+from gait_entrainment.conventions import Side
 from gait_entrainment.gait import VerdictSettings
 from gait_entrainment.gait.analyzer import Result
 from gait_entrainment.messages import (
@@ -30,7 +30,7 @@ from gait_entrainment_msgs import msg
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.nodes.gait_analyzer_run import RESULTS, Run
 from gait_entrainment_nodes.nodes.loop import run_node
-from gait_entrainment_nodes.nodes.parameters import declare_settings, side_of, side_setting
+from gait_entrainment_nodes.nodes.parameters import declare_settings
 from gait_entrainment_nodes.nodes.participant import Participant, ReadSettings
 
 
@@ -38,7 +38,7 @@ from gait_entrainment_nodes.nodes.participant import Participant, ReadSettings
 class Settings:
     """Parameters of the node, beside those of the verdict."""
 
-    side: str = side_setting("the perturbed leg: left or right")
+    side: Side = setting(Side.RIGHT, "the perturbed leg: left or right")
     onset: str = setting(
         "commanded",
         "where a pulse begins: commanded, or measured where the robot's torque rises",
@@ -46,7 +46,7 @@ class Settings:
     )
 
 
-class GaitAnalyzerNode(Participant, Node):
+class GaitAnalyzerNode(Participant):
     """ROS side of the analyzer."""
 
     run: Run | None
@@ -75,7 +75,7 @@ class GaitAnalyzerNode(Participant, Node):
         """Return the run of a message if it is analyzed; a newer run begins anew."""
         if message.run > self._latest_run:
             self._latest_run = message.run
-            side, measured = side_of(self.settings.side), self.settings.onset == "measured"
+            side, measured = self.settings.side, self.settings.onset == "measured"
             self.run = Run(message.run, side, self.verdict, measured=measured)
             self.note_state(DiagnosticStatus.OK, f"run {message.run} goes on")
         return self.run if message.run == self._latest_run else None

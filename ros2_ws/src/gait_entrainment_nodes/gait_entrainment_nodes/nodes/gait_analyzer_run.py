@@ -87,7 +87,7 @@ class Run:
     def add_profile(self, profile: TorqueProfile) -> list[Result]:
         """Take the onsets that are promised."""
         self.promised_until = profile.valid_until
-        self._closed = profile.times == (profile.valid_until,)
+        self._closed = not profile.has_length
         if self._measured is None:
             return self._analyzer.add_promise(list(profile.onsets), profile.valid_until)
         known = self._measured.add_promise(list(profile.onsets), profile.valid_until)

@@ -87,7 +87,7 @@ def _join_ros() -> None:
         )
 
 
-def _serve_once(executor: EventsExecutor, node: Any) -> None:
+def _serve_once(executor: Any, node: Any) -> None:
     """Serve ROS until the node's deadline, but not for long, and do what is due then."""
     deadline = node.next_deadline()
     sleep = LONGEST_SLEEP

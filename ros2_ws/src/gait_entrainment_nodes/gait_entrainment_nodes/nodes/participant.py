@@ -12,6 +12,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.impl.rcutils_logger import RcutilsLogger
+from rclpy.node import Node
 
 from gait_entrainment_msgs.msg import PublishedCounts
 from gait_entrainment_msgs.srv import Ready
@@ -29,15 +30,15 @@ LAST_WORDS = 0.5
 ReadSettings = Callable[..., Any]
 
 
-class Participant:
+class Participant(Node):
     """
-    Mixin for a node that takes part in a run.
+    A node that takes part in a run.
 
     A node declares its parameters, calls ``begin_participation``, then makes its publishers,
     subscriptions and services.
     """
 
-    get_logger: Callable[[], RcutilsLogger]
+    get_logger: Callable[[], RcutilsLogger]  # which rclpy does not type
     hardware_id = "none"  # of the hardware that its diagnostics are about
     stopping = False  # set from outside: the node is to end
     failure: str | None = None  # why the node must end with exit code 1
@@ -50,7 +51,7 @@ class Participant:
 
         Raises ValueError if a parameter is unknown, or the values do not fit each other.
         """
-        refuse_unknown_parameters(self)  # type: ignore[arg-type]
+        refuse_unknown_parameters(self)
         self._read_parameters({})
         self.add_on_set_parameters_callback(self._on_set_parameters)
         self._offered: list[CountedPublisher] = []

@@ -37,7 +37,7 @@ from gait_entrainment_msgs.msg import Horizon, Trouble
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.stamps import header
 from gait_entrainment_nodes.nodes.loop import run_node
-from gait_entrainment_nodes.nodes.parameters import declare_settings, side_of, side_setting
+from gait_entrainment_nodes.nodes.parameters import declare_settings
 from gait_entrainment_nodes.nodes.participant import Participant, ReadSettings
 from gait_entrainment_nodes.nodes.perturbator_run import Result, Run
 from gait_entrainment_nodes.nodes.rclpy_internals import TolerantLifecycleNode
@@ -50,7 +50,7 @@ MEASURED_PERIOD = 0.01
 class Settings:
     """Parameters of the node, beside the limits of the robot."""
 
-    side: str = side_setting("ankle on which the robot sits: left or right")
+    side: Side = setting(Side.RIGHT, "ankle on which the robot sits: left or right")
     driver: str = setting("ideal", "name of the ankle robot driver: NAME or NAME:OPTION=VALUE,...")
     seed: int = setting(0, "seed of a driver that draws random numbers", "1", (0, 2**32 - 1))
     armed: bool = setting(
@@ -126,7 +126,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
                 raise DeviceError(
                     f"driver: {driver.name} runs in real time only: use_sim_time must be off"
                 )
-            robot = driver.make(side_of(settings.side), self.limits, settings.seed)
+            robot = driver.make(settings.side, self.limits, settings.seed)
             robot.configure()
         except (LimitError, DeviceError) as error:
             return self._refuse(error)
@@ -295,10 +295,14 @@ class Perturbator(Participant, TolerantLifecycleNode):
         self._goal = goal
         self._train_ended.add_done_callback(lambda _: goal.execute())
 
+    def _on_train_ended(self, result: Result) -> None:
+        assert self._train_ended is not None
+        self._train_ended.set_result(result)
+
     def _execute(self, goal: Any) -> Result:
         """Say how a train ended."""
         assert self._train_ended is not None
-        result = self._train_ended.result()
+        result: Result = self._train_ended.result()
         if result.outcome == Result.CANCELLED:
             goal.canceled()
         elif result.outcome == Result.DELIVERED:
@@ -312,11 +316,6 @@ class Perturbator(Participant, TolerantLifecycleNode):
         """Bring the torque to zero now: the next horizon may be long in coming."""
         self._end_torque("cancelled by the client", Result.CANCELLED)
         return CancelResponse.ACCEPT
-
-    def _end_train(self, result: Result) -> None:
-        """Let the goal that is under way, if any, end."""
-        if self._train_ended is not None and not self._train_ended.done():
-            self._train_ended.set_result(result)
 
     # Promises
 
@@ -339,7 +338,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
             self._end_torque("another run began")
         self._now = nanoseconds_of(message.header.stamp)
         if new:
-            self.run = Run(message.run, self._now, robot, self.publish, self._end_train)
+            self.run = Run(message.run, self._now, robot, self.publish, self._on_train_ended)
             self._latest_run = message.run
         assert self.run is not None
         until = nanoseconds_of(message.until)

@@ -37,7 +37,7 @@ class Run:
     publish
         Publishes a message on a topic.
     end_train
-        Takes the result of the train that is under way, if there is one.
+        Takes the result of a train that was scheduled.
 
     Raises
     ------
@@ -61,12 +61,13 @@ class Run:
         self._now = self._horizon = start
         self._last = False  # the run ends at the horizon
         self._revision = 0
-        self._committed = False  # torque may still come, of a train that was accepted
+        self._committed = False  # torque may still come, of a train that was scheduled
+        self._under_way = False  # a train, whose result is still to be told
 
     def schedule(self, train: PulseTrain) -> None:
         """Schedule pulses; raises LimitError or DeviceError if the robot does not take them."""
         self._robot.schedule(train)
-        self._committed = True
+        self._committed = self._under_way = True
 
     def take_horizon(self, now: int, until: int, *, last: bool) -> None:
         """
@@ -133,8 +134,10 @@ class Run:
             self._end_train(Result.DELIVERED, "every pulse was delivered")
 
     def _end_train(self, outcome: int, message: str) -> None:
-        delivered = self._robot.delivered
-        self._train_ended(Result(outcome=outcome, message=message, delivered=delivered))
+        if self._under_way:
+            self._under_way = False
+            delivered = self._robot.delivered
+            self._train_ended(Result(outcome=outcome, message=message, delivered=delivered))
 
     def _publish_profile(self, profile: TorqueProfile, last: bool) -> None:
         self._publish_revision(

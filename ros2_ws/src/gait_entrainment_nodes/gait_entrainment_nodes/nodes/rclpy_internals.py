@@ -38,8 +38,9 @@ class TolerantLifecycleNode(LifecycleNode):
 
     def _LifecycleNodeMixin__on_change_state(self, request: Any, response: Any) -> Any:  # noqa: N802
         try:
-            return super()._LifecycleNodeMixin__on_change_state(request, response)
+            return getattr(super(), _CHANGE_STATE)(request, response)
         except RuntimeError as error:  # rclpy's RCLError
-            self.get_logger().error(f"transition {request.transition.id} refused: {error}")
+            logger: Any = self.get_logger()  # type: ignore[no-untyped-call]
+            logger.error(f"transition {request.transition.id} refused: {error}")
             response.success = False
             return response

@@ -21,7 +21,6 @@ from typing import Any
 
 import xacro
 from geometry_msgs.msg import Point, Quaternion, TransformStamped, Vector3
-from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import ColorRGBA, String
@@ -66,7 +65,7 @@ class Settings:
     )
 
 
-class WalkerDisplay(Participant, Node):
+class WalkerDisplay(Participant):
     """ROS side of the display."""
 
     def __init__(self) -> None:

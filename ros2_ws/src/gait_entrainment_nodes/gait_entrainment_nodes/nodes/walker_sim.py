@@ -16,12 +16,11 @@ from typing import Any
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import WrenchStamped
-from rclpy.node import Node
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
-from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
 from gait_entrainment.messages import nanoseconds_of, profile_of, stop_of
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.settings import setting
@@ -32,7 +31,7 @@ from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.raw_messages import MessageTemplate, mark
 from gait_entrainment_nodes.messaging.stamps import header, to_time
 from gait_entrainment_nodes.nodes.loop import run_node
-from gait_entrainment_nodes.nodes.parameters import declare_settings, side_of, side_setting
+from gait_entrainment_nodes.nodes.parameters import declare_settings
 from gait_entrainment_nodes.nodes.participant import Participant, ReadSettings
 from gait_entrainment_nodes.nodes.walker_sim_run import LockStepRun, RealTimeRun, Run, Starved
 
@@ -47,7 +46,7 @@ START_DELAY = 200_000_000
 class Settings:
     """Parameters of the node, beside those of the walker."""
 
-    first_heel_strike: str = side_setting("leg of heel strike 0: left or right")
+    first_heel_strike: Side = setting(Side.RIGHT, "leg of heel strike 0: left or right")
     sample_rate: float = setting(
         200.0, "rate of the sampled topics; 0 samples at gait events only", "Hz", (0.0, 1000.0)
     )
@@ -59,7 +58,7 @@ class Settings:
     ground_reaction: bool = setting(True, "publish the ground reaction forces")
 
 
-class WalkerSim(Participant, Node):
+class WalkerSim(Participant):
     """ROS side of the walker: parameters, topics, services."""
 
     run: Run | None
@@ -81,9 +80,8 @@ class WalkerSim(Participant, Node):
         if not self.settings.real_time:
             self.offer(topics.CLOCK)
         self._templates = _templates()
-        # A step ahead of time loads the compiled kernels, which the first stretch must not wait
-        # for.
-        WalkerRun(self.parameters, self.first_side, 100.0).advance(NANOSECONDS_PER_SECOND)
+        # A step ahead of time loads the compiled kernels, which a run must not wait for.
+        WalkerRun(self.parameters, Side.RIGHT, 100.0).advance(NANOSECONDS_PER_SECOND)
         self.subscribe_to_run(topics.TORQUE_PROFILE, self._on_profile)
         if self.settings.acknowledged and not self.settings.real_time:
             self.subscribe_to_run(topics.RECORDER_PROGRESS, LockStepRun.acknowledge)
@@ -93,7 +91,6 @@ class WalkerSim(Participant, Node):
     def take_parameters(self, read: ReadSettings) -> None:
         """Take the walker and how it is sampled: the next run begins with them."""
         self.parameters, self.settings = read(WalkerParameters), read(Settings)
-        self.first_side = side_of(self.settings.first_heel_strike)
 
     def _on_start(self, request: StartRun.Request, response: StartRun.Response) -> Any:
         used = self._walked if self.run is None else self.run.number
@@ -110,7 +107,7 @@ class WalkerSim(Participant, Node):
 
     def _new_run(self, number: int) -> Run:
         settings = self.settings
-        walker = WalkerRun(self.parameters, self.first_side, settings.sample_rate)
+        walker = WalkerRun(self.parameters, self.settings.first_heel_strike, settings.sample_rate)
         if not settings.real_time:
             kept_to = settings.acknowledged
             return LockStepRun(number, walker, LOCK_STEP_START, acknowledged=kept_to)

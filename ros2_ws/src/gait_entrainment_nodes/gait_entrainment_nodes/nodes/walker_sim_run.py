@@ -69,9 +69,7 @@ class Run:
 
         Raises ValueError if the promise before it is missing.
         """
-        # A profile without length only says where the run ends.
-        has_length = profile.times != (profile.valid_until,)
-        late = self.walker.accept(profile) if has_length else 0
+        late = self.walker.accept(profile)
         if late:
             self.late_stretches += 1
             self.reproducible = False
