@@ -64,6 +64,9 @@ def replay(options: argparse.Namespace, domain: int) -> dict[str, list[bytes]]:
     """Start the nodes, play the bag, stop the nodes; return the results by topic."""
     environment = set_environment(domain)
     prepare()
+    # Not before: it loads ROS, while what the nodes need is loaded, too.
+    from gait_entrainment_bringup.replay_client import ReplayClient
+
     namespace, given = replay_parameters(options.bag, out=options.out)
     given["bag_player"] |= {"rate": options.rate or 0.0, "start_paused": True}
     remaps = [f"__ns:={namespace}", *(f"{name}:={name[1:]}" for name in MOVED)]
@@ -73,9 +76,6 @@ def replay(options: argparse.Namespace, domain: int) -> dict[str, list[bytes]]:
         for node in STOP_ORDER:
             if node in given:
                 supervisor.start(node, arguments)
-        # Imported while the nodes start.
-        from gait_entrainment_bringup.replay_client import ReplayClient
-
         recorded = options.out is not None
         with ReplayClient(supervisor, namespace, recorded=recorded) as client:
             client.play(quiet=options.json)

@@ -78,15 +78,15 @@ def run_experiment(protocol: Protocol, bag: Path, domain: int, options: argparse
     """Start the nodes, conduct the protocol, stop the nodes, report."""
     environment = set_environment(domain)
     prepare()
+    # Not before: it loads ROS, while what the nodes need is loaded, too.
+    from gait_entrainment_bringup.run_client import conduct
+
     with supervised(environment, STOP_ORDER, partial(kept, bag)) as supervisor:
         given = chosen_parameters(protocol, bag, options)
         arguments = parameter_arguments(given, supervisor.folder)
         for node in NODES:
             if node not in options.elsewhere:
                 supervisor.start(node, arguments)
-        # Imported while the nodes start: it takes as long as the rest of this command.
-        from gait_entrainment_bringup.run_client import conduct
-
         later = [REPORT] if options.no_figures else [REPORT, *DRAWING]
         conduct(supervisor, protocol, partial(load, later), quiet=options.json)
         supervisor.wait_for_record()
