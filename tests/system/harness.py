@@ -142,18 +142,27 @@ def probe(domain: int) -> Iterator[Probe]:
         yield made
 
 
+def stat(pid: int) -> list[str]:
+    """Return what the system says of a process, from its state on."""
+    return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+
+
 def alive(pid: int) -> bool:
     """Whether a process runs; one that is only waiting to be reaped does not."""
     try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+        return stat(pid)[0] != "Z"
     except FileNotFoundError:
         return False
 
 
+def parent_of(pid: int) -> int:
+    """Return the id of the process that started a process."""
+    return int(stat(pid)[1]) if pid else 0
+
+
 def cpu_seconds(pid: int) -> float:
     """Return the processor time that a process has used."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    return (int(stat(pid)[11]) + int(stat(pid)[12])) / os.sysconf("SC_CLK_TCK")
 
 
 class Started:
@@ -200,11 +209,12 @@ class Started:
             assert time.monotonic() < deadline
             for folder in Path("/proc").glob("[0-9]*"):
                 try:
-                    parent = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
                     words = (folder / "cmdline").read_bytes().split(b"\0")
+                    parent = parent_of(int(folder.name))
+                    # `entrain run` starts its nodes by way of a process that has loaded ROS.
+                    if self.process.pid not in (parent, parent_of(parent)):
+                        continue
                 except (FileNotFoundError, ProcessLookupError):
-                    continue
-                if parent != self.process.pid:
                     continue
                 for word in words[:2]:
                     name = word.decode().rpartition("/")[2]

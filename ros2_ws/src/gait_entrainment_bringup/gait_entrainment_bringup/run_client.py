@@ -3,6 +3,7 @@
 
 """The client of a run: asks the experiment to conduct a protocol, and shows how it goes."""
 
+from collections.abc import Callable
 from typing import Any
 
 from action_msgs.msg import GoalStatus
@@ -25,9 +26,13 @@ ASKED = ("experiment", "gait_analyzer")
 SILENCE_TIMEOUT = 3.0
 
 
-def conduct(supervisor: Supervisor, protocol: Protocol, *, quiet: bool) -> None:
+def conduct(
+    supervisor: Supervisor, protocol: Protocol, on_start: Callable[[], None], *, quiet: bool
+) -> None:
     """
     Conduct a protocol through the experiment node to its end, and watch the processes meanwhile.
+
+    ``on_start`` is called once the experiment has accepted it.
 
     Raises
     ------
@@ -58,6 +63,7 @@ def conduct(supervisor: Supervisor, protocol: Protocol, *, quiet: bool) -> None:
         handle = client.send_goal(RunProtocol, ACTION, goal, on_feedback=on_feedback)
         if not handle.accepted:
             raise NodeError("experiment rejected the protocol: it conducts another", "experiment")
+        on_start()
         answer = client.result(handle)
     if answer.status != GoalStatus.STATUS_SUCCEEDED:
         raise NodeError(answer.result.message or "experiment failed", answer.result.blamed)

@@ -8,18 +8,16 @@ Each process writes a log of its own. If one ends before its time or falls silen
 it and quotes the end of its log; the others are stopped within five seconds.
 """
 
-import ctypes
 import os
 import signal
-import subprocess
 import tempfile
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 
-from ament_index_python.packages import get_package_prefix
-
+from gait_entrainment_bringup.node_process import start_node
 from gait_entrainment_nodes.messaging.environment import PACKAGE
 from gait_entrainment_nodes.messaging.errors import NodeError
 
@@ -28,7 +26,6 @@ PATIENCE = 1.5
 # How long the recorder may take to close the bag after the experiment or replay has ended [s].
 CLOSING_TIMEOUT = 15.0
 LOG_LINES = 8
-_PR_SET_PDEATHSIG = 1
 
 
 class Supervisor:
@@ -37,27 +34,17 @@ class Supervisor:
     def __init__(self, folder: Path, environment: Mapping[str, str]) -> None:
         self.folder = folder
         self._environment = dict(environment)
-        self._processes: dict[str, subprocess.Popen[bytes]] = {}
-        self._library = ctypes.CDLL(None)
+        self._processes: dict[str, BaseProcess] = {}
 
     def start(self, node: str, arguments: Sequence[str]) -> None:
         """Start a node of the package; it gets SIGTERM if this process dies."""
-        program = Path(get_package_prefix(PACKAGE)) / "lib" / PACKAGE / node
-        with self._log(node).open("wb") as log:
-            self._processes[node] = subprocess.Popen(
-                [str(program), *arguments],
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=subprocess.STDOUT,
-                env=self._environment,
-                # Ctrl-C reaches this process alone, which then stops the others in order.
-                start_new_session=True,
-                preexec_fn=self._die_with_parent,
-            )
+        module = f"{PACKAGE}.nodes.{node}"
+        process = start_node(module, arguments, self._log(node), self._environment)
+        self._processes[node] = process
 
     def ended(self) -> dict[str, int]:
         """Return the exit codes of the processes that have ended."""
-        codes = {node: process.poll() for node, process in self._processes.items()}
+        codes = {node: process.exitcode for node, process in self._processes.items()}
         return {node: code for node, code in codes.items() if code is not None}
 
     def check(self, may_end: Collection[str]) -> dict[str, int]:
@@ -78,10 +65,8 @@ class Supervisor:
 
     def wait(self, node: str, timeout: float) -> int | None:
         """Wait for a process to end by itself; return its exit code, or None after the timeout."""
-        try:
-            return self._processes[node].wait(timeout)
-        except subprocess.TimeoutExpired:
-            return None
+        self._processes[node].join(timeout)
+        return self._processes[node].exitcode
 
     def wait_for_record(self) -> None:
         """Wait until the recorder has closed the bag and ended; raises NodeError if it has not."""
@@ -90,10 +75,12 @@ class Supervisor:
 
     def request_stop(self, nodes: Iterable[str]) -> None:
         """Ask processes to stop, by SIGTERM, without waiting for them."""
-        for node in self._processes.keys() & set(nodes):
-            self._processes[node].terminate()
-            # A suspended process can only obey once it goes on.
-            self._processes[node].send_signal(signal.SIGCONT)
+        for node in nodes:
+            process = self._processes.get(node)
+            if process is not None and process.is_alive():
+                process.terminate()
+                # A suspended process can only obey once it goes on.
+                os.kill(process.pid or 0, signal.SIGCONT)
 
     def stop(self, order: Sequence[str]) -> list[str]:
         """
@@ -113,7 +100,7 @@ class Supervisor:
                 for node in group:
                     if self.wait(node, max(deadline - time.monotonic(), 0)) is None:
                         self._processes[node].kill()
-                        self._processes[node].wait()
+                        self._processes[node].join()
                         killed.append(node)
         return killed
 
@@ -127,11 +114,6 @@ class Supervisor:
 
     def _log(self, node: str) -> Path:
         return self.folder / f"{node}.log"
-
-    def _die_with_parent(self) -> None:
-        self._library.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
-        if os.getppid() == 1:  # the parent died before the line above
-            os.kill(os.getpid(), signal.SIGTERM)
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from gait_entrainment.settings import Setting
 from gait_entrainment_bags import BagReader
 from gait_entrainment_bags.recorded_run import RecordedRun, read_run
 from gait_entrainment_bringup.node_list import MOVED, parameter_arguments, replay_parameters
+from gait_entrainment_bringup.node_process import prepare
 from gait_entrainment_bringup.run_options import check_output, is_utf8
 from gait_entrainment_bringup.supervisor import supervised
 from gait_entrainment_nodes.messaging.domain import claimed_domain
@@ -61,18 +62,20 @@ def run(options: argparse.Namespace) -> int:
 
 def replay(options: argparse.Namespace, domain: int) -> dict[str, list[bytes]]:
     """Start the nodes, play the bag, stop the nodes; return the results by topic."""
+    environment = set_environment(domain)
+    prepare()
+    # Not before: it loads ROS, while what the nodes need is loaded, too.
+    from gait_entrainment_bringup.replay_client import ReplayClient
+
     namespace, given = replay_parameters(options.bag, out=options.out)
     given["bag_player"] |= {"rate": options.rate or 0.0, "start_paused": True}
     remaps = [f"__ns:={namespace}", *(f"{name}:={name[1:]}" for name in MOVED)]
     moved = [word for remap in remaps for word in ("-r", remap)] if namespace else []
-    with supervised(set_environment(domain), STOP_ORDER) as supervisor:
+    with supervised(environment, STOP_ORDER) as supervisor:
         arguments = [*parameter_arguments(given, supervisor.folder), *moved]
         for node in STOP_ORDER:
             if node in given:
                 supervisor.start(node, arguments)
-        # Imported while the nodes start.
-        from gait_entrainment_bringup.replay_client import ReplayClient
-
         recorded = options.out is not None
         with ReplayClient(supervisor, namespace, recorded=recorded) as client:
             client.play(quiet=options.json)

@@ -4,9 +4,12 @@
 """entrain run: the nodes as processes, one protocol conducted, the run recorded."""
 
 import argparse
+import importlib
 import os
 import shutil
 import signal
+import threading
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
@@ -14,6 +17,7 @@ from gait_entrainment.errors import UsageError
 from gait_entrainment.protocol import Protocol, write_protocol
 from gait_entrainment_bags import BagError, BagReader, UnreadableBagError, recover
 from gait_entrainment_bringup.node_list import NODES, STOP_ORDER, bag_folder, parameter_arguments
+from gait_entrainment_bringup.node_process import prepare
 from gait_entrainment_bringup.run_options import (
     add_run_options,
     check_driver,
@@ -36,6 +40,9 @@ EXAMPLES = """examples:
 # Nodes that may run on another host. Not those that hold the torque and the record: Ctrl-C must
 # reach them without a network.
 DETACHABLE = ("walker_sim", "gait_analyzer")
+# What the end of a run needs, loaded while the walker walks.
+REPORT = "gait_entrainment_bringup.run_report"
+DRAWING = ("matplotlib.figure", "matplotlib.backends.backend_agg")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -63,29 +70,41 @@ def run(options: argparse.Namespace) -> int:
     # Stopping from outside takes the same path as Ctrl-C: torque first, then the rest.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with claimed_domain() as domain:
-        conduct(protocol, bag, domain, options)
+        run_experiment(protocol, bag, domain, options)
     return 0
 
 
-def conduct(protocol: Protocol, bag: Path, domain: int, options: argparse.Namespace) -> None:
+def run_experiment(protocol: Protocol, bag: Path, domain: int, options: argparse.Namespace) -> None:
     """Start the nodes, conduct the protocol, stop the nodes, report."""
-    given = chosen_parameters(protocol, bag, options)
-    with supervised(set_environment(domain), STOP_ORDER, partial(kept, bag)) as supervisor:
+    environment = set_environment(domain)
+    prepare()
+    # Not before: it loads ROS, while what the nodes need is loaded, too.
+    from gait_entrainment_bringup.run_client import conduct
+
+    with supervised(environment, STOP_ORDER, partial(kept, bag)) as supervisor:
+        given = chosen_parameters(protocol, bag, options)
         arguments = parameter_arguments(given, supervisor.folder)
         for node in NODES:
             if node not in options.elsewhere:
                 supervisor.start(node, arguments)
-        # Imported while the nodes start: rclpy takes as long as the rest of this command.
-        from gait_entrainment_bringup.run_client import conduct
-
-        conduct(supervisor, protocol, quiet=options.json)
+        later = [REPORT] if options.no_figures else [REPORT, *DRAWING]
+        conduct(supervisor, protocol, partial(load, later), quiet=options.json)
         supervisor.wait_for_record()
         # No torque is left and the record is closed: in which order the rest ends does not matter.
         supervisor.request_stop(NODES)
         (bag / "protocol.yaml").write_text(write_protocol(protocol))
-        from gait_entrainment_bringup.run_report import report
-
+        report = importlib.import_module(REPORT).report
         report(bag, figures=not options.no_figures, as_json=options.json)
+
+
+def load(modules: Sequence[str]) -> None:
+    """Load modules in a thread, for later."""
+
+    def load_each() -> None:
+        for module in modules:
+            importlib.import_module(module)
+
+    threading.Thread(target=load_each, daemon=True).start()
 
 
 def kept(bag: Path) -> str:

@@ -30,7 +30,7 @@ from gait_entrainment_nodes.messaging.topics import Topic
 # How long to wait for a node before it counts as silent [s].
 PATIENCE = 60.0
 # When to ask again [s].
-ASKING_PERIOD = 0.25
+ASKING_PERIOD = 0.1
 # How long to listen before a condition is looked at again, even if nothing arrives [s].
 ROUND = 0.02
 

@@ -29,5 +29,7 @@ def set_environment(domain: int) -> dict[str, str]:
     """
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     os.environ.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(fastdds_profiles()))
+    # No node has large matrices: threads for them take longer to start than they save.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ["ROS_DOMAIN_ID"] = str(domain)
     return dict(os.environ)
