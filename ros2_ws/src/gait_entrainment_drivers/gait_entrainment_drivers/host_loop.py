@@ -144,7 +144,7 @@ class HostTimedRobot(AnkleRobot):
         begin = self._promised
         with self._lock:
             known = [sample for sample in self._samples if sample[0] < until]
-            # The last sample holds until a later one is known: it is told with that.
+            # The last sample holds until a later one is known: it is promised with that one.
             end = until if len(known) < len(self._samples) else known[-1][0] if known else begin
             end = max(end, begin)
             self._samples = [sample for sample in self._samples if sample[0] >= end]

@@ -62,14 +62,14 @@ class EmulatedOdrive(EmulatedMotor):
         return self._tell(odrive.HEARTBEAT)
 
     def _tell(self, what: int) -> Frames:
-        told = {
+        answers = {
             odrive.HEARTBEAT: odrive.pack_heartbeat(
                 odrive.Heartbeat(self.error, odrive.CLOSED_LOOP if self.enabled else odrive.IDLE)
             ),
             odrive.ENCODER: odrive.PAIR.pack(0.0, 0.0),
             odrive.TORQUES: odrive.PAIR.pack(self.command, self.torque),
         }
-        return [(odrive.frame_id(self._node, what), told[what])] if what in told else []
+        return [(odrive.frame_id(self._node, what), answers[what])] if what in answers else []
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -45,10 +45,10 @@ LEAD = 200_000_000
 
 
 class _NodeRobot:
-    """A node, used as a GuardedRobot is; what it sends is held against the contract on the way."""
+    """A node, used as a GuardedRobot is; what it sends is checked against the contract."""
 
     def __init__(self, name: str, *, simulated: bool, arm: bool) -> None:
-        # What topics do not tell is not promised.
+        # What topics do not show is not promised.
         unknown = {"measures_torque": False, "state_rate": 0.0}
         self.capabilities = SimpleNamespace(simulated=simulated, **unknown)
         self.faults: tuple[Fault, ...] = ()
@@ -170,10 +170,10 @@ class _NodeRobot:
             _require(self._change(Transition.TRANSITION_CLEANUP), "cleaned up")
 
     def _end(self, call: Callable[[], Any]) -> Any:
-        """Call what ends the torque; if there may be any, a stop must tell the walker of it."""
+        """Call what ends the torque; if there may be any, the walker must get a stop."""
         stops, answer = self._stops, call()
-        told = not self.goal or self.client.wait(lambda: self._stops > stops, PATIENCE)
-        require(told, "No profile with the stop flag was published.")
+        stopped = not self.goal or self.client.wait(lambda: self._stops > stops, PATIENCE)
+        require(stopped, "No profile with the stop flag was published.")
         self.goal = None
         return answer
 
@@ -238,7 +238,7 @@ class NodeBench(Bench):
         return bool(client.wait(lambda: self.states.extend(read()) or condition(), PATIENCE))
 
     def require_delivered(self, train: PulseTrain) -> None:
-        """See that every pulse is told and announced once, and the goal ends as delivered."""
+        """See that every pulse is reported and announced once, and the goal ends as delivered."""
         super().require_delivered(train)
         announced, onsets = self.robot.announced, self.onsets
         self.wait_for(lambda: len(announced) >= len(onsets))

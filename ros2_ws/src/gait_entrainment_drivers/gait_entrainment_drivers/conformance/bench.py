@@ -159,7 +159,7 @@ class Bench(ABC):
         self.promised_until = profile.valid_until
 
     def wait_for(self, condition: Callable[[], object]) -> bool:
-        """Whether something is so, at the latest once the robot has told everything."""
+        """Whether something is so, now or once the robot has reported everything."""
         return bool(condition())
 
     def stop(self) -> None:
@@ -229,10 +229,10 @@ class Bench(ABC):
         )
 
     def require_delivered(self, train: PulseTrain) -> None:
-        """See that every pulse of a train is told once, at its onset."""
+        """See that every pulse of a train is reported once, at its onset."""
         expected = [train.onset(number) for number in range(train.count)]
-        told = self.onsets
-        require(told == expected, f"Onsets {told} were told for pulses at {expected} ns.")
+        got = self.onsets
+        require(got == expected, f"Onsets {got} were reported for pulses at {expected} ns.")
 
     def require_torque(self, after: str) -> None:
         """See that a harmless train is delivered now."""

@@ -38,8 +38,8 @@ def construction(bench: DriverBench) -> None:
     options = bench.driver.options
     require(is_dataclass(options), "Options is no dataclass.")
     for option in fields(options):
-        told = "setting" in option.metadata
-        require(told, f"The option {option.name} does not tell its meaning and unit.")
+        explained = "setting" in option.metadata
+        require(explained, f"The option {option.name} does not tell its meaning and unit.")
 
 
 def lifecycle(bench: Bench) -> None:
@@ -99,7 +99,7 @@ def cuts(bench: Bench) -> None:
     """What is delivered does not depend on how it is asked for."""
     if not bench.simulated:  # the torque of a real device is never the same twice
         return
-    told = []
+    delivered = []
     for instants in ((1_500_000_000,), (100_000_000, 100_000_000, 250_000_001, 1_500_000_000)):
         bench.renew()
         bench.start()
@@ -107,11 +107,13 @@ def cuts(bench: Bench) -> None:
         bench.schedule(count=3)
         for instant in instants:
             bench.advance(begin + instant)
-        torques = [(start - begin, torque) for start, _, torque in bench.pieces]
-        told.append([b for a, b in itertools.pairwise([(0, 0.0), *torques]) if a[1] != b[1]])
+        pieces = [(start - begin, torque) for start, _, torque in bench.pieces]
+        changes = itertools.pairwise([(0, 0.0), *pieces])
+        delivered.append([new for old, new in changes if new[1] != old[1]])
         bench.robot.close()
     require(
-        told[0] == told[1], "The same seed and train gave another torque when asked in pieces."
+        delivered[0] == delivered[1],
+        "The same seed and train gave another torque when asked in pieces.",
     )
 
 
@@ -282,10 +284,10 @@ def states(bench: Bench) -> None:
     ascending = all(a < b for a, b in itertools.pairwise(stamps))
     require(ascending, "The stamps of the states are not ascending.")
     for state in bench.states:
-        told = {"commanded": state.commanded}
+        torques = {"commanded": state.commanded}
         if able.measures_torque:
-            told["measured"] = state.measured
-        for name, torque in told.items():
+            torques["measured"] = state.measured
+        for name, torque in torques.items():
             require(math.isfinite(torque), f"A state has a {name} torque of {torque} N m.")
         names = ", ".join(fault.name for fault in state.faults)
         require(not names, f"A state reports {names} while all is well.")
@@ -379,5 +381,5 @@ COMMON = (
     states,
     timing,
 )
-# And what only a driver can be: topics do not tell capabilities, limits and durations of calls.
+# And what only a driver can be: topics show no capabilities, limits and durations of calls.
 CHECKS = (construction, *COMMON, at_limits, stale_commands, prompt_calls)
