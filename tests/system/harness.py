@@ -16,8 +16,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from std_srvs.srv import Trigger
-
 from gait_entrainment.protocol import Protocol, read_protocol, write_protocol
 from gait_entrainment.simulation import simulate
 from gait_entrainment_bags import BagReader
@@ -29,6 +27,7 @@ from gait_entrainment_bringup.node_list import (
 )
 from gait_entrainment_bringup.supervisor import Supervisor
 from gait_entrainment_msgs.action import RunProtocol
+from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.client import Client
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 from gait_entrainment_nodes.messaging.topics import STRIDES, Topic
@@ -302,7 +301,7 @@ class Session:
         for node in nodes:
             self.supervisor.start(node, self.arguments)
         for node in nodes:
-            service = self.probe.client.service(Trigger, f"{node}/ready")
+            service = self.probe.client.service(Ready, f"{node}/ready")
             self.probe.until(
                 lambda service=service: service.service_is_ready() or self.supervisor.ended(), node
             )

@@ -250,7 +250,8 @@ def test_kit_from_outside_finds_every_promise_kept(tmp_path, driver, options):
 BROKEN_NODE = """
 import sys
 from gait_entrainment_nodes.nodes import perturbator
-from gait_entrainment_nodes.nodes.node import run_node
+from gait_entrainment_nodes.messaging import topics
+from gait_entrainment_nodes.nodes.loop import run_node
 
 class Broken(perturbator.Perturbator):
     {fault}
@@ -267,11 +268,13 @@ FAULTS = {
         "cancelling: .*\n.*No profile with the stop flag",
     ),
     "pulses not announced": (
-        "def announce_pulse(self, *_):\n        pass",
+        "def publish(self, topic, message):\n"
+        "        if topic is not topics.PULSES: super().publish(topic, message)",
         r"pulses: .*\n.*Pulses at \[\] were announced",
     ),
     "states missing": (
-        "def publish_state(self, _):\n        pass",
+        "def publish(self, topic, message):\n"
+        "        if topic is not topics.ROBOT_STATE: super().publish(topic, message)",
         "states: .*\n.*No state shows",
     ),
 }

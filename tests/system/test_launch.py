@@ -4,7 +4,6 @@
 
 """The launch files with the real launch: exit codes, namespaces, remapping, replay, a device."""
 
-import json
 import os
 import signal
 import sys
@@ -18,13 +17,14 @@ from ament_index_python.packages import get_package_share_directory
 from harness import Started, alive, probe, stamp_of
 from lifecycle_msgs.msg import State
 from lifecycle_msgs.srv import GetState
-from std_srvs.srv import Trigger
 
 from gait_entrainment.protocol import read_protocol
 from gait_entrainment.simulation import simulate
 from gait_entrainment_bags import BagReader
 from gait_entrainment_bags.recorded_run import read_run
+from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.domain import claimed_domain
+from gait_entrainment_nodes.messaging.player_services import srv
 from gait_entrainment_nodes.messaging.topics import GAIT_EVENTS, STRIDES, Topic
 
 pytestmark = pytest.mark.skipif(
@@ -244,11 +244,12 @@ def test_replay_ends_once_everything_is_played_and_analyzed(tmp_path):
         heard = listener.listen(Topic("again/gait/strides", STRIDES.type, STRIDES.qos))
 
         def matched():
-            answer = listener.call(Trigger, "again/gait_analyzer/ready").message
-            return answer.startswith("{") and json.loads(answer)["/again/gait/strides"] == 1
+            answer = listener.call(Ready, "again/gait_analyzer/ready")
+            matched = dict(zip(answer.topics, answer.matched, strict=True))
+            return answer.ready and matched["/again/gait/strides"] == 1
 
         listener.until(matched, "a match with the analyzer")
-        assert listener.call(Trigger, "again/bag_player/resume").success
+        listener.call(srv.Resume, "again/bag_player/resume")
         listener.until(lambda: not alive(launch.process.pid), "the end")
         assert launch.wait() == 0, launch.text
     with BagReader(BAG) as reader:

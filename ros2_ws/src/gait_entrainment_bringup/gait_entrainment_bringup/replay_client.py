@@ -3,7 +3,6 @@
 
 """The client of a replay: starts the player, hears the analyzer out."""
 
-import json
 from collections.abc import Callable
 
 from std_srvs.srv import Trigger
@@ -12,8 +11,10 @@ from tqdm import tqdm
 from gait_entrainment_bringup.supervisor import Supervisor
 from gait_entrainment_bringup.watch import Watch
 from gait_entrainment_msgs.msg import PublishedCounts
+from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.client import Client
 from gait_entrainment_nodes.messaging.errors import SilenceError
+from gait_entrainment_nodes.messaging.player_services import srv
 from gait_entrainment_nodes.messaging.topics import (
     ENTRAINMENT,
     PUBLISHED_COUNTS,
@@ -74,9 +75,9 @@ class ReplayClient(Client):
             if a node fails or falls silent.
 
         """
-        self._ask("gait_analyzer/ready", self._all_listen)
-        self._ask("bag_player/ready", self._all_recorded)
-        self._ask("bag_player/resume")
+        self._wait_for("gait_analyzer", self._all_listen)
+        self._wait_for("bag_player", self._all_recorded)
+        self.call(srv.Resume, "bag_player/resume", patience=PATIENCE)
         bar = tqdm(desc="replay", unit="stride", disable=True if quiet else None, leave=False)
 
         def played() -> bool:
@@ -85,18 +86,17 @@ class ReplayClient(Client):
 
         with bar:
             self.wait(played)
-        self._ask("gait_analyzer/finish")
+        self.call(Trigger, "gait_analyzer/finish", patience=PATIENCE)
         if not self.wait(self._complete, PATIENCE):
             raise SilenceError("gait_analyzer/finish", PATIENCE)
 
-    def _ask(self, name: str, enough: Callable[[dict[str, int]], bool] | None = None) -> None:
-        """Call a service until it succeeds and has matched enough subscriptions, by topic."""
-        self.call(
-            Trigger,
-            name,
-            accept=lambda a: a.success and (enough is None or enough(json.loads(a.message))),
-            patience=PATIENCE,
-        )
+    def _wait_for(self, node: str, enough: Callable[[dict[str, int]], bool]) -> None:
+        """Wait until a node is ready and what it has matched, by topic, is enough."""
+
+        def accept(answer: Ready.Response) -> bool:
+            return answer.ready and enough(dict(zip(answer.topics, answer.matched, strict=True)))
+
+        self.call(Ready, f"{node}/ready", accept=accept, patience=PATIENCE)
 
     def _all_listen(self, matched: dict[str, int]) -> bool:
         """Whether everyone who is to hear the analyzer's results will hear them."""

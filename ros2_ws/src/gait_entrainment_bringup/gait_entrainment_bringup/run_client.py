@@ -3,7 +3,6 @@
 
 """The client of a run: asks the experiment to conduct a protocol, and shows how it goes."""
 
-import re
 from collections.abc import Callable
 from typing import Any
 
@@ -11,7 +10,6 @@ from action_msgs.msg import GoalStatus
 from tqdm import tqdm
 
 from gait_entrainment.protocol import Protocol, write_protocol
-from gait_entrainment_bringup.node_list import NODES
 from gait_entrainment_bringup.supervisor import Supervisor
 from gait_entrainment_bringup.watch import Watch
 from gait_entrainment_msgs.action import RunProtocol
@@ -68,13 +66,5 @@ def conduct(
         on_start()
         answer = client.result(handle)
     if answer.status != GoalStatus.STATUS_SUCCEEDED:
-        message = answer.result.message or "experiment failed"
-        raise NodeError(message, blamed_for(message))
-
-
-def blamed_for(message: str) -> str:
-    """Return the node whose log may say more than a message; empty if the message says it all."""
-    # What the robot itself says is handed on whole: its log would only repeat it.
-    if re.match("perturbator( refused [a-z ]+)?: |the pulses were ended: ", message):
-        return ""
-    return next((node for node in NODES if node in message), "experiment")
+        result = answer.result
+        raise NodeError(result.message or "experiment failed", result.blamed)

@@ -10,10 +10,7 @@ from gait_entrainment.outcome import summary, timing_summary
 from gait_entrainment_bags import BagReader
 from gait_entrainment_bags.figures import draw_figures
 from gait_entrainment_bags.recorded_run import messages_line, read_run, recorded_outcome
-from gait_entrainment_nodes.messaging.topics import DIAGNOSTICS
-
-# What the walker counts of the promises that reached it, under these names in its diagnostics.
-PROMISE_KEYS = ("late_stretches", "late_ms", "starved_stretches", "starved_ms")
+from gait_entrainment_nodes.messaging.topics import WALKER_TIMING
 
 
 def report(bag: Path, *, figures: bool, as_json: bool) -> None:
@@ -36,8 +33,8 @@ def report(bag: Path, *, figures: bool, as_json: bool) -> None:
     promises = outcome.get("promises", {})
     if promises.get("late_stretches") or promises.get("starved_stretches"):
         print(
-            f"promises         of perturbator: {promises['late_stretches']:.0f} late by"
-            f" {promises['late_ms']:.1f} ms in all, {promises['starved_stretches']:.0f} stretches"
+            f"promises         of perturbator: {promises['late_stretches']} late by"
+            f" {promises['late_ms']:.1f} ms in all, {promises['starved_stretches']} stretches"
             f" of {promises['starved_ms']:.1f} ms walked without torque: not reproducible"
         )
     print(messages_line(recorded))
@@ -47,19 +44,21 @@ def report(bag: Path, *, figures: bool, as_json: bool) -> None:
 
 
 def walker_timing(bag: Path) -> dict[str, dict[str, float]]:
-    """Return what the outcome says of how well the walker kept time, from its diagnostics."""
-    told: dict[str, float] = {}
+    """Return what the outcome says of how well the walker kept time, as it told at its end."""
     with BagReader(bag) as reader:
-        topics = [name for name in reader.topics if name.endswith(DIAGNOSTICS.name)]
-        for _, message in reader.decoded(topics):
-            for status in message.status:
-                if status.name == "walker_sim: run":
-                    told = {value.key: float(value.value) for value in status.values}
-    timing = {}
-    if "publish_late_p50_ms" in told:
-        timing["publish_lateness_ms"] = {
-            name: told[f"publish_late_{name}_ms"] for name in ("p50", "p99", "worst")
+        names = [name for name in reader.topics if name.endswith(f"/{WALKER_TIMING.name}")]
+        told = [message for _, message in reader.decoded(names)][-1:]
+    timing: dict[str, dict[str, float]] = {}
+    for last in told:
+        timing["promises"] = {
+            "late_stretches": last.late_stretches,
+            "late_ms": 1e3 * last.late,
+            "starved_stretches": last.starved_stretches,
+            "starved_ms": 1e3 * last.starved,
         }
-    if "late_stretches" in told:
-        timing["promises"] = {key: told[key] for key in PROMISE_KEYS}
+        if last.samples:
+            late = ("p50", "p99", "worst")
+            timing["publish_lateness_ms"] = {
+                name: 1e3 * getattr(last, f"publish_late_{name}") for name in late
+            }
     return timing

@@ -6,9 +6,8 @@
 import time
 from collections.abc import Collection
 
-from std_srvs.srv import Trigger
-
 from gait_entrainment_bringup.supervisor import Supervisor
+from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.client import Client
 from gait_entrainment_nodes.messaging.errors import NodeError
 
@@ -48,9 +47,7 @@ class Watch:
     ) -> None:
         self._supervisor, self._may_end, self._silence = supervisor, may_end, silence
         self._signs = {
-            node: client.ask(
-                Trigger, f"{node}/ready", accept=lambda _: False, period=ASKING_PERIOD
-            )
+            node: client.ask(Ready, f"{node}/ready", accept=lambda _: False, period=ASKING_PERIOD)
             for node in asked
         }
         self._looked_at = self._since = time.monotonic()

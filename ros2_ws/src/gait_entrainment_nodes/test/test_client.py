@@ -7,8 +7,8 @@ import threading
 from itertools import count
 
 import pytest
-from std_srvs.srv import Trigger
 
+from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.client import Client
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 from gait_entrainment_nodes.messaging.errors import SilenceError
@@ -28,12 +28,12 @@ def asked(client):
 
     def answer(request, response):
         requests.append(request)
-        response.success, response.message = len(requests) > 2, f"answer {len(requests)}"
+        response.ready, response.waiting_for = len(requests) > 2, f"answer {len(requests)}"
         return response
 
     def serve(domain):
         with Client("answers", domain=domain) as server:
-            server.node.create_service(Trigger, "~/ready", answer)
+            server.node.create_service(Ready, "~/ready", answer)
             server.wait(over.is_set)
 
     thread = threading.Thread(target=serve, args=[client.node.context.get_domain_id()])
@@ -44,29 +44,29 @@ def asked(client):
 
 
 def test_is_asked_until_the_answer_is_acceptable(client, asked):
-    answer = client.call(Trigger, "answers/ready", accept=lambda a: a.success, period=0.05)
-    assert answer.success
-    assert answer.message == f"answer {len(asked)}"
+    answer = client.call(Ready, "answers/ready", accept=lambda a: a.ready, period=0.05)
+    assert answer.ready
+    assert answer.waiting_for == f"answer {len(asked)}"
 
 
 def test_a_question_keeps_the_latest_answer(client, asked):
-    question = client.ask(Trigger, "answers/ready", accept=lambda _: False, period=0.05)
+    question = client.ask(Ready, "answers/ready", accept=lambda _: False, period=0.05)
     assert client.wait(lambda: question.answer() or len(asked) > 1, 10)
     assert question.answer() is None
-    assert question.latest.message.startswith("answer")
+    assert question.latest.waiting_for.startswith("answer")
     assert question.answered_at > 0
 
 
 def test_waits_to_be_known_without_asking_for_more(client, asked):
     client.wait_to_be_known("answers", patience=10)
     before = len(asked)
-    assert client.call(Trigger, "answers/ready", period=float("inf")).message
+    assert client.call(Ready, "answers/ready", period=float("inf")).waiting_for
     assert len(asked) == before + 1
 
 
 def test_silence_is_told_by_name(client):
     with pytest.raises(SilenceError, match=r"nobody/ready within 0\.1 s") as error:
-        client.call(Trigger, "nobody/ready", patience=0.1)
+        client.call(Ready, "nobody/ready", patience=0.1)
     assert error.value.node == "nobody"
     assert error.value.exit_code == 1
 

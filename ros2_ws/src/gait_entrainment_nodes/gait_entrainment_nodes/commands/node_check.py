@@ -25,12 +25,13 @@ from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
+from gait_entrainment.messages import nanoseconds_of
 from gait_entrainment.robot import DeviceError
 from gait_entrainment.robot.timing import quantile
 from gait_entrainment_drivers.conformance import BrokenPromiseError, Result, Tolerances
 from gait_entrainment_msgs import msg
 from gait_entrainment_msgs.action import DeliverPulseTrain
-from gait_entrainment_nodes.messaging.stamps import header, to_nanoseconds, to_time
+from gait_entrainment_nodes.messaging.stamps import header, to_time
 from gait_entrainment_nodes.messaging.topics import HORIZON, PULSES, ROBOT_STATE, TORQUE_PROFILE
 
 # How long an answer may take, and how long to wait for one that must not come [s].
@@ -170,8 +171,8 @@ class NodeBench:
 
     def end_of(self, profile: msg.TorqueProfile, until: int) -> int:
         """Hold a profile against the contract; return the instant up to which it promises."""
-        times = [to_nanoseconds(t) for t in profile.times]
-        ends = [*times[1:], to_nanoseconds(profile.valid_until)]
+        times = [nanoseconds_of(t) for t in profile.times]
+        ends = [*times[1:], nanoseconds_of(profile.valid_until)]
         if profile.run != self.run:
             raise BrokenPromiseError(f"A profile has run {profile.run} instead of {self.run}.")
         if not times or times[0] != self.now or ends[-1] > until:
@@ -213,8 +214,8 @@ class NodeBench:
         """Return begin, end [ns] and torque of what was promised from an instant on."""
         found = []
         for profile in self.profiles:
-            times = [to_nanoseconds(t) for t in profile.times]
-            ends = [*times[1:], to_nanoseconds(profile.valid_until)]
+            times = [nanoseconds_of(t) for t in profile.times]
+            ends = [*times[1:], nanoseconds_of(profile.valid_until)]
             found += [
                 piece
                 for piece in zip(times, ends, profile.torques, strict=False)
@@ -267,7 +268,7 @@ def pulses(bench: NodeBench) -> None:
         begin = len(bench.profiles)
         bench.promise_until(first + 2 * round(PERIOD * SECOND))
         expected = [first, first + round(PERIOD * SECOND)]
-        told = [to_nanoseconds(o) for p in bench.profiles[begin:] for o in p.onsets]
+        told = [nanoseconds_of(o) for p in bench.profiles[begin:] for o in p.onsets]
         if told != expected:
             raise BrokenPromiseError(f"Onsets {told} were told for pulses at {expected} ns.")
         asked = sign * bench.height * WIDTH
@@ -280,7 +281,7 @@ def pulses(bench: NodeBench) -> None:
             if abs(got - asked) > bench.tolerances.impulse * abs(asked):
                 raise BrokenPromiseError(f"A pulse of {asked:.3g} N m s had {got:.3g} N m s.")
         bench.wait(lambda heard=heard: len(bench.pulses) >= heard + 2)
-        announced = [to_nanoseconds(pulse.header.stamp) for pulse in bench.pulses[heard:]]
+        announced = [nanoseconds_of(pulse.header.stamp) for pulse in bench.pulses[heard:]]
         if announced != expected:
             raise BrokenPromiseError(f"Pulses at {announced} were announced for {expected} ns.")
         outcome = bench.answer(result, "the result of a train").result
@@ -375,7 +376,7 @@ def states(bench: NodeBench) -> None:
         return any(state.commanded_torque for state in found)
 
     shown = bench.wait(asked)
-    stamps = [to_nanoseconds(state.header.stamp) for state in found]
+    stamps = [nanoseconds_of(state.header.stamp) for state in found]
     if not shown:
         raise BrokenPromiseError("No state shows that the robot was asked for the pulses.")
     if stamps != sorted(stamps):

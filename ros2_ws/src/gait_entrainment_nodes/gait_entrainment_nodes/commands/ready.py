@@ -7,8 +7,7 @@ import argparse
 import sys
 from contextlib import suppress
 
-from std_srvs.srv import Trigger
-
+from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.client import Client
 from gait_entrainment_nodes.messaging.domain import wanted_domain
 from gait_entrainment_nodes.messaging.environment import set_environment
@@ -32,7 +31,7 @@ def run(options: argparse.Namespace) -> int:
     set_environment(wanted_domain() or 0)
     with Client("entrain_ready") as client:
         questions = {
-            name: client.ask(Trigger, f"{name}/ready", accept=lambda answer: answer.success)
+            name: client.ask(Ready, f"{name}/ready", accept=lambda answer: answer.ready)
             for name in options.nodes
         }
 
@@ -44,6 +43,6 @@ def run(options: argparse.Namespace) -> int:
             client.wait(all_ready, options.timeout)
     waiting = {name: q.latest for name, q in questions.items() if not q.accepted}
     for name, answer in waiting.items():
-        reason = f"waits for {answer.message}" if answer else "does not answer"
+        reason = f"waits for {answer.waiting_for}" if answer else "does not answer"
         print(f"entrain ready: {name} {reason}", file=sys.stderr)
     return 1 if waiting else 0

@@ -21,9 +21,9 @@ from rclpy.context import Context
 from rclpy.exceptions import InvalidServiceNameException
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
-from std_srvs.srv import Trigger
 
 from gait_entrainment.errors import UsageError
+from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.errors import SilenceError
 from gait_entrainment_nodes.messaging.topics import Topic
 
@@ -130,7 +130,7 @@ class Client:
         rclpy.try_shutdown(context=self._context)
 
     def subscribe(
-        self, topic: Topic, callback: Callable[[Any], object], *, raw: bool = False
+        self, topic: Topic, callback: Callable[[Any], None], *, raw: bool = False
     ) -> None:
         """Hear a topic; ``raw`` gives the callback serialized messages."""
         self.node.create_subscription(topic.type, topic.name, callback, topic.qos, raw=raw)
@@ -209,7 +209,7 @@ class Client:
         """
         name = f"{node}/ready"
         self._services.pop(name, None)  # to be made anew, behind everything else
-        self._expect(self.ask(Trigger, name).answer, name, patience)
+        self._expect(self.ask(Ready, name).answer, name, patience)
 
     def send_goal(
         self,

@@ -71,11 +71,13 @@ GROUND_REACTION = (
     Topic("ground_reaction/right", WrenchStamped),
 )
 WALKER_PROGRESS = Topic("walker_sim/progress", msg.Progress)
+WALKER_TIMING = Topic("walker_sim/timing", msg.WalkerTiming)
 CLOCK = Topic("/clock", ClockMessage)
 
 TORQUE_PROFILE = Topic("perturbation/torque_profile", msg.TorqueProfile)
 PULSES = Topic("perturbation/pulses", msg.TorquePulse)
 ROBOT_STATE = Topic("perturbator/state", msg.AnkleRobotState)
+TROUBLE = Topic("perturbator/trouble", msg.Trouble)
 
 HORIZON = Topic("experiment/horizon", msg.Horizon)
 EXPERIMENT_STATE = Topic("experiment/state", msg.ExperimentState, LATEST_STATE)
