@@ -19,6 +19,7 @@ from harness import PATIENCE, Probe, entrain_run, payloads, probe
 
 from gait_entrainment.gait import VerdictSettings
 from gait_entrainment_bags import BagReader, BagWriter
+from gait_entrainment_bags.decoding import decoder_for
 from gait_entrainment_bags.recorded_run import read_run
 from gait_entrainment_bringup import replay_client
 from gait_entrainment_bringup.commands import replay as replay_command
@@ -105,7 +106,7 @@ def without(bag: Path, out: Path, drop: Callable[[int, str, Any], bool]) -> Path
             for message in sorted(reader.messages(), key=lambda message: message.place):
                 number = numbers[message.topic]
                 numbers[message.topic] += 1
-                content = reader.decoder(message.topic)(message.data)
+                content = decoder_for(reader.topics[message.topic])(message.data)
                 if not drop(number, message.topic, content):
                     writer.write(
                         message.topic, message.data, message.log_time, message.publish_time
@@ -158,10 +159,11 @@ def test_an_analyzer_that_hangs_is_named(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(replay_client, "PATIENCE", 3.0)
     call = replay_client.ReplayClient.call
 
-    def call_and_stall(client: Any, kind: Any, service: str, *more: Any, **options: Any) -> None:
-        call(client, kind, service, *more, **options)
-        if service == "bag_player/resume":
+    def call_and_stall(client: Any, kind: Any, name: str, *arguments: Any, **options: Any) -> Any:
+        answer = call(client, kind, name, *arguments, **options)
+        if name == "bag_player/resume":
             os.kill(client._supervisor._processes["gait_analyzer"].pid, signal.SIGSTOP)
+        return answer
 
     monkeypatch.setattr(replay_client.ReplayClient, "call", call_and_stall)
     options = SimpleNamespace(bag=BAG, rate=1.0, out=None, json=True)

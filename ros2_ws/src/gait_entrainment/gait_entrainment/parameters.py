@@ -102,9 +102,7 @@ class WalkerParameters:
             most,
             "2 L sin(alpha) > l, and the collision must not reverse the motion",
         )
-        cosine = geometry.ankle_cosine(
-            -math.sin(self.leg_angle), self.leg_length, self.foot_length, self.toe_separation
-        )
+        cosine = geometry.ankle_cosine(self, -math.sin(self.leg_angle))
         _check_angle(
             "max_plantarflexion",
             self.max_plantarflexion,
@@ -162,9 +160,7 @@ class WalkerParameters:
         return math.asin(self._leg_sine(self.max_plantarflexion))
 
     def _leg_sine(self, ankle: float) -> float:
-        return geometry.leg_sine(
-            math.cos(ankle), self.leg_length, self.foot_length, self.toe_separation
-        )
+        return float(geometry.leg_sine(self, math.cos(ankle)))
 
     # Energy of the period-one gait
 
@@ -186,9 +182,7 @@ class WalkerParameters:
     @property
     def peak_torque(self) -> float:
         """Torque [N m] of the ankle spring at heel strike, its greatest."""
-        return geometry.spring_torque(
-            self.double_stance_start, self.ankle_stiffness, self.max_plantarflexion
-        )
+        return float(geometry.spring_torque(self, self.double_stance_start))
 
     @property
     def collision_speed(self) -> float:
@@ -233,19 +227,11 @@ class WalkerParameters:
         """Force [N] on the leading leg at psi of a walker that rises and falls without a push."""
         sine = self._leg_sine(ankle)
         lost = 2 * self.gravity * self._height(ankle) / self.leg_length**2
-        return geometry.pendulum_force(
-            math.sqrt(1 - sine * sine), -lost, self.mass, self.gravity, self.leg_length
-        )
+        return float(geometry.pendulum_force(self, math.sqrt(1 - sine * sine), -lost))
 
     def _lift_per_stiffness(self, ankle: float) -> float:
         """Force on the leading leg that push and speed take off at psi, per unit of stiffness."""
-        arm = geometry.unloading_arm(
-            math.sin(ankle),
-            self._leg_sine(ankle),
-            self.leg_length,
-            self.foot_length,
-            self.toe_separation,
-        )
+        arm = float(geometry.unloading_arm(self, math.sin(ankle), self._leg_sine(ankle)))
         push = arm * (self.max_plantarflexion - ankle)
         return push + 2 * self._energy_per_stiffness(ankle) / self.leg_length
 

@@ -91,12 +91,13 @@ class ReplayClient(Client):
             raise SilenceError("gait_analyzer/finish", PATIENCE)
 
     def _wait_for(self, node: str, enough: Callable[[dict[str, int]], bool]) -> None:
-        """Wait until a node is ready and what it has matched, by topic, is enough."""
-
-        def accept(answer: Ready.Response) -> bool:
-            return answer.ready and enough(dict(zip(answer.topics, answer.matched, strict=True)))
-
-        self.call(Ready, f"{node}/ready", accept=accept, patience=PATIENCE)
+        """Wait until a node is ready and has matched enough subscriptions, by topic."""
+        self.call(
+            Ready,
+            f"{node}/ready",
+            accept=lambda a: a.ready and enough(dict(zip(a.topics, a.matched, strict=True))),
+            patience=PATIENCE,
+        )
 
     def _all_listen(self, matched: dict[str, int]) -> bool:
         """Whether everyone who is to hear the analyzer's results will hear them."""

@@ -66,5 +66,4 @@ def conduct(
         on_start()
         answer = client.result(handle)
     if answer.status != GoalStatus.STATUS_SUCCEEDED:
-        result = answer.result
-        raise NodeError(result.message or "experiment failed", result.blamed)
+        raise NodeError(answer.result.message or "experiment failed", answer.result.blamed)

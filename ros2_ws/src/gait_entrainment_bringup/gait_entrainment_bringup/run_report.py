@@ -7,10 +7,10 @@ import json
 from pathlib import Path
 
 from gait_entrainment.outcome import summary, timing_summary
+from gait_entrainment.topic_names import WALKER_TIMING
 from gait_entrainment_bags import BagReader
 from gait_entrainment_bags.figures import draw_figures
 from gait_entrainment_bags.recorded_run import messages_line, read_run, recorded_outcome
-from gait_entrainment_nodes.messaging.topics import WALKER_TIMING
 
 
 def report(bag: Path, *, figures: bool, as_json: bool) -> None:
@@ -33,8 +33,8 @@ def report(bag: Path, *, figures: bool, as_json: bool) -> None:
     promises = outcome.get("promises", {})
     if promises.get("late_stretches") or promises.get("starved_stretches"):
         print(
-            f"promises         of perturbator: {promises['late_stretches']} late by"
-            f" {promises['late_ms']:.1f} ms in all, {promises['starved_stretches']} stretches"
+            f"promises         of perturbator: {promises['late_stretches']:.0f} late by"
+            f" {promises['late_ms']:.1f} ms in all, {promises['starved_stretches']:.0f} stretches"
             f" of {promises['starved_ms']:.1f} ms walked without torque: not reproducible"
         )
     print(messages_line(recorded))
@@ -44,21 +44,21 @@ def report(bag: Path, *, figures: bool, as_json: bool) -> None:
 
 
 def walker_timing(bag: Path) -> dict[str, dict[str, float]]:
-    """Return what the outcome says of how well the walker kept time, as it told at its end."""
+    """Return what the outcome says of how well the walker kept time, from its last word on it."""
     with BagReader(bag) as reader:
-        names = [name for name in reader.topics if name.endswith(f"/{WALKER_TIMING.name}")]
+        names = [name for name in reader.topics if name.endswith(f"/{WALKER_TIMING}")]
         told = [message for _, message in reader.decoded(names)][-1:]
-    timing: dict[str, dict[str, float]] = {}
-    for last in told:
-        timing["promises"] = {
-            "late_stretches": last.late_stretches,
-            "late_ms": 1e3 * last.late,
-            "starved_stretches": last.starved_stretches,
-            "starved_ms": 1e3 * last.starved,
-        }
-        if last.samples:
-            late = ("p50", "p99", "worst")
+    timing = {}
+    for walker in told:
+        if walker.samples:
             timing["publish_lateness_ms"] = {
-                name: 1e3 * getattr(last, f"publish_late_{name}") for name in late
+                name: 1e3 * getattr(walker, f"publish_late_{name}")
+                for name in ("p50", "p99", "worst")
             }
+        timing["promises"] = {
+            "late_stretches": walker.late_stretches,
+            "late_ms": 1e3 * walker.late,
+            "starved_stretches": walker.starved_stretches,
+            "starved_ms": 1e3 * walker.starved,
+        }
     return timing

@@ -9,22 +9,10 @@ import numpy as np
 
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.walker.compiled import compiled
-from gait_entrainment.walker.model import Floats, Model, make_model, start_apex
+from gait_entrainment.walker.model import Floats, Model, Stamps, make_model, start_apex
 from gait_entrainment.walker.promise import EVER
-from gait_entrainment.walker.segment import (
-    HEEL_STRIKE,
-    SEGMENT,
-    TOE_OFF,
-    WORK_SHAPE,
-    Log,
-)
-from gait_entrainment.walker.trajectory import (
-    SWITCHED,
-    Stamps,
-    first_cursors,
-    proceed,
-    start_walking,
-)
+from gait_entrainment.walker.segment import HEEL_STRIKE, SEGMENT, TOE_OFF, WORK_SIZE, Log
+from gait_entrainment.walker.trajectory import SWITCHED, Torques, proceed, start_walking
 from gait_entrainment.walker.transitions import seconds
 
 FOREVER = 2**62
@@ -99,13 +87,12 @@ def walk_steps(
     toe_offs: Floats,
 ) -> tuple[int, int]:
     """Fill in the events [s] after heel strike 0, until one array is full; returns how many."""
-    segment = log[0]
-    work, cursors = np.empty(WORK_SHAPE), first_cursors(1)
+    segment, robot = log[0], Torques(changes, torques, 1)
+    work, cursors = np.empty(WORK_SIZE), np.array([0, 1])
     start_walking(model, segment, 1, apex)
     strikes, offs = 0, 0
     while strikes < heel_strikes.size:
-        outcome = proceed(model, work, segment, changes, torques, 1, cursors, FOREVER)
-        if outcome != SWITCHED:
+        if proceed(model, work, segment, robot, cursors, FOREVER) != SWITCHED:
             break
         if segment.began == HEEL_STRIKE:
             heel_strikes[strikes] = seconds(segment.stamp, segment.rest)

@@ -63,42 +63,26 @@ FLY_OFF: Final = 5
 class Segment(Protocol):
     """A record of SEGMENT, which the compiled functions change in place."""
 
-    stamp: int
-    """Start: whole nanoseconds since the start of the run,"""
-    rest: float
-    """and what is left of it [s], at most half a nanosecond."""
-    after: int
-    """Torque changes later than this stamp are still to come."""
-    began: int
-    """The switch that began it."""
-    ends: int
-    """The switch that ends it if the perturbation stays as it is."""
+    stamp: int  # start, whole nanoseconds since the start of the run
+    rest: float  # and what is left of it [s], at most half a nanosecond
+    after: int  # torque changes later than this stamp are still to come
+    began: int  # the switch that began it
+    ends: int  # the switch that ends it if the perturbation stays as it is
     stance: int
-    leading: int
-    """Side of the leading leg, in single stance the stance leg."""
-    step: int
-    """Number of the step in progress."""
+    leading: int  # side of the leading leg, in single stance the stance leg
+    step: int  # number of the step in progress
     position: float
-    apex: float
-    """Squared rate at the apex without further torque [1/s^2] (see `model`)."""
-    perturbation: float
-    """Torque of the ankle robot on the trailing ankle [N m]."""
-    torque: float
-    """Effective ankle torque at the start [N m],"""
-    stiffness: float
-    """and by how much it falls off [N m/rad]."""
-    end: float
-    """Position of the end."""
-    duration: float
-    """Time to the end [s]."""
-    shortfall: float
-    """What lacks at a fall [J] or fly-off [N]."""
+    apex: float  # squared rate at the apex without further torque [1/s^2] (see `model`)
+    perturbation: float  # torque of the ankle robot on the trailing ankle [N m]
+    torque: float  # effective ankle torque at the start [N m]
+    stiffness: float  # and by how much it falls off [N m/rad]
+    end: float  # position of the end
+    duration: float  # time to the end [s]
+    shortfall: float  # what is missing at a fall [J] or fly-off [N]
 
 
 SEGMENT = np.dtype([(name, kind) for name, kind in Segment.__annotations__.items()])
-
-Log = Any
-"""An array of SEGMENT, the segments of a stretch in order."""
+Log = Any  # an array of SEGMENT, the segments of a stretch in order
 
 # Widest panel [rad]: keeps the Taylor series of `panel` to rounding.
 PANEL_WIDTH: Final = 1.6
@@ -114,9 +98,8 @@ SMOOTH_CHANGE: Final = 0.1
 # Longest a segment may take [s]: where a stall is approached along a tangent, it takes forever.
 LONGEST: Final = 1e6
 
-# Rows of the work space, one column for each node: from TIME on, what quadratures fill.
-TIME: Final = 0
-WORK_SHAPE: Final = (3, max(PANEL_NODES, SINGLE_STANCE_NODES))
+# Of the work space in which quadratures put the integrand at the nodes.
+WORK_SIZE: Final = max(PANEL_NODES, SINGLE_STANCE_NODES)
 
 
 @compiled
@@ -138,7 +121,7 @@ def leg_sine_at(model: Model, stance: int, position: float) -> float:
     """sin(theta) of the leading leg."""
     if stance == SINGLE_STANCE:
         return -math.sin(position)
-    return leg_sine(math.cos(position), model.leg_length, model.foot_length, model.separation)
+    return leg_sine(model, math.cos(position))
 
 
 @compiled
@@ -151,19 +134,12 @@ def squared_rate(model: Model, segment: Segment, position: float) -> float:
 
 @compiled
 def leading_force(model: Model, segment: Segment, position: float) -> float:
-    """Ground reaction F_B [N] of the leading leg, along the leg; negative where it would pull."""
+    """Ground reaction F_B [N] of the leading leg, along the leg; negative if it would pull."""
     sine = leg_sine_at(model, segment.stance, position)
-    force = pendulum_force(
-        math.sqrt(1.0 - sine * sine),
-        squared_rate(model, segment, position),
-        model.mass,
-        model.gravity,
-        model.leg_length,
-    )
+    square = squared_rate(model, segment, position)
+    force = pendulum_force(model, math.sqrt(1.0 - sine * sine), square)
     if segment.stance == DOUBLE_STANCE:
-        arm = unloading_arm(
-            math.sin(position), sine, model.leg_length, model.foot_length, model.separation
-        )
+        arm = unloading_arm(model, math.sin(position), sine)
         force -= arm * effective_torque(segment, position)
     return force
 
@@ -180,10 +156,10 @@ def motion(model: Model, segment: Segment, position: float) -> tuple[float, floa
         rate = math.sqrt(max(0.0, squared_rate(model, segment, position)))
         return position, rate, 0.5 * model.per_drop * math.sin(position)
     cos_ankle = math.cos(position)
-    sine = leg_sine(cos_ankle, model.leg_length, model.foot_length, model.separation)
+    sine = leg_sine(model, cos_ankle)
     cosine = math.sqrt(1.0 - sine * sine)
     sin_ankle = math.sqrt(1.0 - cos_ankle * cos_ankle)
-    slope = leg_per_ankle(sin_ankle, cosine, model.foot_length, model.separation)
+    slope = leg_per_ankle(model, sin_ankle, cosine)
     square = gained_apex(model, segment, position) + model.per_drop * drop(sine, cosine)
     square = max(0.0, square)
     push = model.per_energy * effective_torque(segment, position) / slope
@@ -196,7 +172,7 @@ def position_of(model: Model, stance: int, coordinate: float) -> float:
     """Position where the coordinate of `motion` has this value."""
     if stance == SINGLE_STANCE:
         return coordinate
-    cosine = ankle_cosine(coordinate, model.leg_length, model.foot_length, model.separation)
+    cosine = ankle_cosine(model, coordinate)
     return math.acos(max(-1.0, min(1.0, cosine)))
 
 
@@ -210,7 +186,7 @@ def panel(
     The integrand is (d theta / d psi) / theta_dot. Its sines and cosines come from those of the
     middle and a short Taylor series, in a loop that runs in vector registers.
     """
-    nodes, time = model.rule[NODES], work[TIME]
+    nodes = model.rule[NODES]
     middle, half = 0.5 * (start + end), 0.5 * (end - start)
     sin_middle, cos_middle = math.sin(middle), math.cos(middle)
     rotation = middle - segment.position
@@ -219,12 +195,12 @@ def panel(
         s, c = short_sine(x), short_cosine(x)
         sin_ankle = sin_middle * c + cos_middle * s
         cos_ankle = cos_middle * c - sin_middle * s
-        sine = leg_sine(cos_ankle, model.leg_length, model.foot_length, model.separation)
+        sine = leg_sine(model, cos_ankle)
         cosine = math.sqrt(1.0 - sine * sine)
         gain = torque_work(rotation + x, segment.torque, segment.stiffness)
         square = segment.apex + model.per_energy * gain + model.per_drop * drop(sine, cosine)
-        slope = leg_per_ankle(sin_ankle, cosine, model.foot_length, model.separation)
-        time[i] = slope / math.sqrt(square)
+        slope = leg_per_ankle(model, sin_ankle, cosine)
+        work[i] = slope / math.sqrt(square)
     return weighed(model, work, half)
 
 
@@ -238,7 +214,6 @@ def stall_panel(
     In u the integrand is smooth. The squared rate is what it gains from the stall, where it is
     zero, back to psi; from the energy its last digits would be lost.
     """
-    time = work[TIME]
     middle, half = 0.5 * (start + end), 0.5 * (end - start)
     stall_torque = effective_torque(segment, segment.end)
     stall_sine = leg_sine_at(model, DOUBLE_STANCE, segment.end)
@@ -250,20 +225,20 @@ def stall_panel(
         sine = leg_sine_at(model, DOUBLE_STANCE, position)
         cosine = math.sqrt(1.0 - sine * sine)
         rise = 2.0 * math.sin(segment.end - 0.5 * back) * math.sin(0.5 * back)
-        rise *= model.foot_length / model.separation * (sine + stall_sine)
+        rise *= model.foot_length / model.toe_separation * (sine + stall_sine)
         gain = torque_work(-back, stall_torque, segment.stiffness)
         square = model.per_energy * gain + model.per_drop * rise / (cosine + stall_cosine)
-        slope = leg_per_ankle(math.sin(position), cosine, model.foot_length, model.separation)
-        time[i] = -2.0 * u * slope / math.sqrt(square)
+        slope = leg_per_ankle(model, math.sin(position), cosine)
+        work[i] = -2.0 * u * slope / math.sqrt(square)
     return weighed(model, work, half)
 
 
 @compiled
 def weighed(model: Model, work: Floats, half: float) -> tuple[float, bool]:
     """Integral from the integrand at the nodes, and whether its last coefficients are small."""
-    rule, time = model.rule, work[TIME]
-    total = dot(rule[WEIGHTS], time)
-    tail = abs(dot(rule[TAILS], time)) + abs(dot(rule[TAILS + 1], time))
+    rule = model.rule
+    total = dot(rule[WEIGHTS], work)
+    tail = abs(dot(rule[TAILS], work)) + abs(dot(rule[TAILS + 1], work))
     return half * total, tail < 0.5 * TAIL_TOLERANCE * abs(total)
 
 

@@ -22,7 +22,7 @@ from typing import Final
 import numpy as np
 
 from gait_entrainment.walker.compiled import compiled
-from gait_entrainment.walker.linkage import torque_work
+from gait_entrainment.walker.linkage import spring_torque, torque_work
 from gait_entrainment.walker.model import Floats, Model
 from gait_entrainment.walker.segment import (
     DOUBLE_STANCE,
@@ -30,7 +30,6 @@ from gait_entrainment.walker.segment import (
     FLY_OFF,
     HEEL_STRIKE,
     SINGLE_STANCE,
-    TIME,
     TOE_OFF,
     TORQUE_CHANGE,
     UNLOADING,
@@ -118,9 +117,9 @@ def unload(model: Model, segment: Segment, work: Floats) -> None:
 @compiled
 def load(model: Model, segment: Segment) -> None:
     """Effective torque max(0, k (mu - psi) + T_p) at the start, and how it falls off."""
-    spring = model.stiffness * (model.max_plantarflexion - segment.position)
+    spring = spring_torque(model, segment.position)
     segment.torque = max(0.0, spring + segment.perturbation)
-    segment.stiffness = model.stiffness if segment.torque > 0.0 else 0.0
+    segment.stiffness = model.ankle_stiffness if segment.torque > 0.0 else 0.0
 
 
 # Guards
@@ -178,10 +177,10 @@ def look_ahead_double_stance(model: Model, segment: Segment, work: Floats) -> No
 @compiled
 def whole_time(whole: Floats, work: Floats, apex: float) -> float:
     """Duration [s] of a whole stance: one quadrature whose geometry was made once."""
-    gain, weights, time = whole[0], whole[1], work[TIME]
+    gain, weights = whole[0], whole[1]
     for i in range(gain.size):
-        time[i] = weights[i] / math.sqrt(apex + gain[i])
-    return ordered_sum(time, gain.size)
+        work[i] = weights[i] / math.sqrt(apex + gain[i])
+    return ordered_sum(work, gain.size)
 
 
 @compiled
@@ -195,8 +194,8 @@ def cleared(model: Model, segment: Segment) -> bool:
     """
     pulse = segment.perturbation
     turned = segment.position - model.double_stance_start
-    peak = model.stiffness * (model.max_plantarflexion - model.double_stance_start)
-    apex = segment.apex - model.per_energy * torque_work(turned, peak, model.stiffness)
+    peak = spring_torque(model, model.double_stance_start)
+    apex = segment.apex - model.per_energy * torque_work(turned, peak, model.ankle_stiffness)
     slowest = apex + model.least_gain
     hold = model.least_hold
     if pulse < 0.0:

@@ -18,7 +18,7 @@ from gait_entrainment.walker.segment import (
     SEGMENT,
     TOE_OFF,
     UNLOADING,
-    WORK_SHAPE,
+    WORK_SIZE,
     Log,
     Segment,
 )
@@ -66,7 +66,7 @@ def step_to_step(
 @compiled
 def map_steps(model: Model, log: Log, rows: Floats, result: Floats) -> None:
     """Map each column (speed, onset, width, torque) of `rows` to one (speed, duration)."""
-    work = np.empty(WORK_SHAPE)
+    work = np.empty(WORK_SIZE)
     segment = log[0]
     for i in range(rows.shape[1]):
         rate = rows[0, i] / model.leg_length

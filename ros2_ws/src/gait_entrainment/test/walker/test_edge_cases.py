@@ -335,7 +335,7 @@ def test_a_start_at_almost_no_speed_takes_few_panels(monkeypatch, torque):
 
     for name in ("panel", "stall_panel", "smooth"):
         monkeypatch.setattr(segment, name, counted(name))
-    work = np.empty(segment.WORK_SHAPE)
+    work = np.empty(segment.WORK_SIZE)
     time = segment.double_stance_time.py_func(
         walker._model, work, fields, last["position"], last["end"]
     )

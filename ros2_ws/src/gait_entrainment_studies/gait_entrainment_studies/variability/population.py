@@ -19,6 +19,7 @@ Times are good to about 1e-9 s, and to 1e-5 s where a negative pulse unloads the
 
 import math
 from collections.abc import Sequence
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -72,8 +73,10 @@ class Population:
             return np.array([[getattr(walker, name)] for walker in walkers])
 
         self.size = len(walkers)
-        self._length, self._foot = column("leg_length"), column("foot_length")
-        self._separation, self._mass = column("toe_separation"), column("mass")
+        lengths = ("leg_length", "foot_length", "toe_separation")
+        self._body = SimpleNamespace(**{name: column(name) for name in lengths})
+        self._length = self._body.leg_length
+        self._mass = column("mass")
         self._gravity, self._angle = column("gravity"), column("leg_angle")
         self._start, self._off = column("double_stance_start"), column("max_plantarflexion")
         self._toe_off_angle = column("toe_off_angle")
@@ -168,10 +171,9 @@ class Population:
         return work
 
     def _posture(self, psi: Floats) -> tuple[Floats, Floats, Floats]:
-        lengths = (self._length, self._foot, self._separation)
-        sine = _leg_sine(np.cos(psi), *lengths)
+        sine = _leg_sine(self._body, np.cos(psi))
         cosine = np.sqrt(1 - sine**2)
-        return sine, cosine, _leg_per_ankle(np.sin(psi), cosine, *lengths[1:])
+        return sine, cosine, _leg_per_ankle(self._body, np.sin(psi), cosine)
 
     def _square(
         self, low: Floats, psi: Floats, energy: Floats, k: Floats, torque: Floats
@@ -191,9 +193,8 @@ class Population:
         time = half * ((slope / np.sqrt(square))[:, 1:-1] @ _WEIGHTS)[:, None]
         theta = np.arcsin(sine)
         push = np.maximum(k * (self._off - psi) + torque, 0.0)
-        lengths = (self._length, self._foot, self._separation)
         held = self._gravity * np.cos(theta + self.slope) - self._length * square
-        force = self._mass * held - _unloading_arm(np.sin(psi), sine, *lengths) * push
+        force = self._mass * held - _unloading_arm(self._body, np.sin(psi), sine) * push
         return _Stretch(time, square.min(axis=1, keepdims=True), force.min(axis=1, keepdims=True))
 
     def _place(

@@ -69,7 +69,10 @@ def test_existence_gives_the_range_and_the_map(capsys, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["lock", "--leg-angle", "0.9"], "leg_angle 0.9 rad is out of range"),
+        (
+            ["lock", "--leg-angle", "0.9"],
+            "leg_angle: 0.9; allowed: above 0 and at most 0.785398 rad",
+        ),
         (["lock", "--width", "1.2"], "width 1.2 s is out of range"),
         (["lock", "--period-offset", "-1.9"], "period_offset -1.9 s"),
         (["lock", "--period-offset", "nan"], "period_offset nan s"),
@@ -80,7 +83,7 @@ def test_existence_gives_the_range_and_the_map(capsys, tmp_path):
         (["phase-response", "--points", "1"], "points 1 is out of range; allowed: at least 2"),
         (["existence", "--points", "1"], "points 1 is out of range; allowed: at least 2"),
         (["phase-response", "--ankle-stiffness", "10"], "the walker falls"),
-        (["existence", "--foot-length", "-1"], "foot_length -1.0 is not a positive"),
+        (["existence", "--foot-length", "-1"], "foot_length: -1.0; allowed: above 0"),
     ],
 )
 def test_a_users_mistake_is_one_line_and_exit_code_2(arguments, message, capsys):
