@@ -27,9 +27,8 @@ from gait_entrainment.robot.drivers import Driver
 from gait_entrainment.robot.faults import DeviceError, LimitError
 from gait_entrainment.robot.guard import GuardedRobot
 from gait_entrainment.robot.limits import DeviceLimits
-from gait_entrainment.robot.measured_onsets import MeasuredOnsets
 from gait_entrainment.robot.pulse_train import PulseTrain
-from gait_entrainment.robot.timing import quantile
+from gait_entrainment.robot.timing import MeasuredOnsets, quantile
 
 _SIDE = Side.RIGHT
 # A robot in simulated time is promised in stretches of this length [ns]: not a multiple of any

@@ -19,16 +19,8 @@ from typing import Any, Final, Protocol
 
 import numpy as np
 
+from gait_entrainment.walker import linkage
 from gait_entrainment.walker.compiled import compiled
-from gait_entrainment.walker.linkage import (
-    ankle_cosine,
-    drop,
-    leg_per_ankle,
-    leg_sine,
-    pendulum_force,
-    torque_work,
-    unloading_arm,
-)
 from gait_entrainment.walker.model import (
     NODES,
     PANEL_NODES,
@@ -112,7 +104,7 @@ def effective_torque(segment: Segment, position: float) -> float:
 def gained_apex(model: Model, segment: Segment, position: float) -> float:
     """`apex` at a position of the segment: the start's, and the torque's work."""
     rotation = position - segment.position
-    work = torque_work(rotation, segment.torque, segment.stiffness)
+    work = linkage.torque_work(rotation, segment.torque, segment.stiffness)
     return segment.apex + model.per_energy * work
 
 
@@ -121,14 +113,14 @@ def leg_sine_at(model: Model, stance: int, position: float) -> float:
     """sin(theta) of the leading leg."""
     if stance == SINGLE_STANCE:
         return -math.sin(position)
-    return leg_sine(model, math.cos(position))
+    return linkage.leg_sine(model, math.cos(position))
 
 
 @compiled
 def squared_rate(model: Model, segment: Segment, position: float) -> float:
     """theta_dot^2 at a position of the segment, from energy; negative beyond a stall."""
     sine = leg_sine_at(model, segment.stance, position)
-    fall = drop(sine, math.sqrt(1.0 - sine * sine))
+    fall = linkage.drop(sine, math.sqrt(1.0 - sine * sine))
     return gained_apex(model, segment, position) + model.per_drop * fall
 
 
@@ -137,9 +129,9 @@ def leading_force(model: Model, segment: Segment, position: float) -> float:
     """Ground reaction F_B [N] of the leading leg, along the leg; negative if it would pull."""
     sine = leg_sine_at(model, segment.stance, position)
     square = squared_rate(model, segment, position)
-    force = pendulum_force(model, math.sqrt(1.0 - sine * sine), square)
+    force = linkage.pendulum_force(model, math.sqrt(1.0 - sine * sine), square)
     if segment.stance == DOUBLE_STANCE:
-        arm = unloading_arm(model, math.sin(position), sine)
+        arm = linkage.unloading_arm(model, math.sin(position), sine)
         force -= arm * effective_torque(segment, position)
     return force
 
@@ -156,11 +148,11 @@ def motion(model: Model, segment: Segment, position: float) -> tuple[float, floa
         rate = math.sqrt(max(0.0, squared_rate(model, segment, position)))
         return position, rate, 0.5 * model.per_drop * math.sin(position)
     cos_ankle = math.cos(position)
-    sine = leg_sine(model, cos_ankle)
+    sine = linkage.leg_sine(model, cos_ankle)
     cosine = math.sqrt(1.0 - sine * sine)
     sin_ankle = math.sqrt(1.0 - cos_ankle * cos_ankle)
-    slope = leg_per_ankle(model, sin_ankle, cosine)
-    square = gained_apex(model, segment, position) + model.per_drop * drop(sine, cosine)
+    slope = linkage.leg_per_ankle(model, sin_ankle, cosine)
+    square = gained_apex(model, segment, position) + model.per_drop * linkage.drop(sine, cosine)
     square = max(0.0, square)
     push = model.per_energy * effective_torque(segment, position) / slope
     acceleration = 0.5 * (model.per_drop * sine - push)
@@ -172,7 +164,7 @@ def position_of(model: Model, stance: int, coordinate: float) -> float:
     """Position where the coordinate of `motion` has this value."""
     if stance == SINGLE_STANCE:
         return coordinate
-    cosine = ankle_cosine(model, coordinate)
+    cosine = linkage.ankle_cosine(model, coordinate)
     return math.acos(max(-1.0, min(1.0, cosine)))
 
 
@@ -195,11 +187,13 @@ def panel(
         s, c = short_sine(x), short_cosine(x)
         sin_ankle = sin_middle * c + cos_middle * s
         cos_ankle = cos_middle * c - sin_middle * s
-        sine = leg_sine(model, cos_ankle)
+        sine = linkage.leg_sine(model, cos_ankle)
         cosine = math.sqrt(1.0 - sine * sine)
-        gain = torque_work(rotation + x, segment.torque, segment.stiffness)
-        square = segment.apex + model.per_energy * gain + model.per_drop * drop(sine, cosine)
-        slope = leg_per_ankle(model, sin_ankle, cosine)
+        gain = linkage.torque_work(rotation + x, segment.torque, segment.stiffness)
+        square = (
+            segment.apex + model.per_energy * gain + model.per_drop * linkage.drop(sine, cosine)
+        )
+        slope = linkage.leg_per_ankle(model, sin_ankle, cosine)
         work[i] = slope / math.sqrt(square)
     return weighed(model, work, half)
 
@@ -226,9 +220,9 @@ def stall_panel(
         cosine = math.sqrt(1.0 - sine * sine)
         rise = 2.0 * math.sin(segment.end - 0.5 * back) * math.sin(0.5 * back)
         rise *= model.foot_length / model.toe_separation * (sine + stall_sine)
-        gain = torque_work(-back, stall_torque, segment.stiffness)
+        gain = linkage.torque_work(-back, stall_torque, segment.stiffness)
         square = model.per_energy * gain + model.per_drop * rise / (cosine + stall_cosine)
-        slope = leg_per_ankle(model, math.sin(position), cosine)
+        slope = linkage.leg_per_ankle(model, math.sin(position), cosine)
         work[i] = -2.0 * u * slope / math.sqrt(square)
     return weighed(model, work, half)
 

@@ -21,8 +21,8 @@ from typing import Final
 
 import numpy as np
 
+from gait_entrainment.walker import linkage
 from gait_entrainment.walker.compiled import compiled
-from gait_entrainment.walker.linkage import spring_torque, torque_work
 from gait_entrainment.walker.model import Floats, Model
 from gait_entrainment.walker.segment import (
     DOUBLE_STANCE,
@@ -117,7 +117,7 @@ def unload(model: Model, segment: Segment, work: Floats) -> None:
 @compiled
 def load(model: Model, segment: Segment) -> None:
     """Effective torque max(0, k (mu - psi) + T_p) at the start, and how it falls off."""
-    spring = spring_torque(model, segment.position)
+    spring = linkage.spring_torque(model, segment.position)
     segment.torque = max(0.0, spring + segment.perturbation)
     segment.stiffness = model.ankle_stiffness if segment.torque > 0.0 else 0.0
 
@@ -194,8 +194,10 @@ def cleared(model: Model, segment: Segment) -> bool:
     """
     pulse = segment.perturbation
     turned = segment.position - model.double_stance_start
-    peak = spring_torque(model, model.double_stance_start)
-    apex = segment.apex - model.per_energy * torque_work(turned, peak, model.ankle_stiffness)
+    peak = linkage.spring_torque(model, model.double_stance_start)
+    apex = segment.apex - model.per_energy * linkage.torque_work(
+        turned, peak, model.ankle_stiffness
+    )
     slowest = apex + model.least_gain
     hold = model.least_hold
     if pulse < 0.0:
