@@ -11,7 +11,7 @@ from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.walker.compiled import compiled
 from gait_entrainment.walker.model import Floats, Model, Stamps, make_model, start_apex
 from gait_entrainment.walker.promise import EVER
-from gait_entrainment.walker.segment import HEEL_STRIKE, SEGMENT, TOE_OFF, WORK_SIZE, Log
+from gait_entrainment.walker.segment import SEGMENT, WORK_SIZE, Log, Switch
 from gait_entrainment.walker.trajectory import SWITCHED, Torques, proceed, start_walking
 from gait_entrainment.walker.transitions import seconds
 
@@ -94,10 +94,10 @@ def walk_steps(
     while strikes < heel_strikes.size:
         if proceed(model, work, segment, robot, cursors, FOREVER) != SWITCHED:
             break
-        if segment.began == HEEL_STRIKE:
+        if segment.began == Switch.HEEL_STRIKE:
             heel_strikes[strikes] = seconds(segment.stamp, segment.rest)
             strikes += 1
-        elif segment.began == TOE_OFF:
+        elif segment.began == Switch.TOE_OFF:
             toe_offs[offs] = seconds(segment.stamp, segment.rest)
             offs += 1
     return strikes, offs

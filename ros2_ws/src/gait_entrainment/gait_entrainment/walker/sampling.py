@@ -25,10 +25,10 @@ from gait_entrainment.walker.compiled import compiled
 from gait_entrainment.walker.location import position_at
 from gait_entrainment.walker.model import Floats, Model, Stamps
 from gait_entrainment.walker.segment import (
-    DOUBLE_STANCE,
     WORK_SIZE,
     Log,
     Segment,
+    Stance,
     effective_torque,
     leading_force,
     leg_sine_at,
@@ -104,9 +104,9 @@ def fill_samples(model: Model, log: Log, times: Stamps, robot: Torques, table: A
         segment = log[rows[i] - 1]
         elapsed = (times[i] - segment.stamp) / NANO - segment.rest
         position = position_at(model, work, segment, elapsed)
-        row.double_stance = segment.stance == DOUBLE_STANCE
+        row.double_stance = segment.stance == Stance.DOUBLE
         row.leading = segment.leading
-        if segment.stance == DOUBLE_STANCE:
+        if segment.stance == Stance.DOUBLE:
             fill_double_stance(model, segment, position, row)
         else:
             fill_single_stance(model, segment, position, row)

@@ -32,24 +32,23 @@ from gait_entrainment.walker.model import (
     Model,
 )
 
-# The compiled functions read plain integers; the enumerations name them for everyone else.
-DOUBLE_STANCE: Final = 0
-SINGLE_STANCE: Final = 1
-
 
 class Stance(IntEnum):
     """What the walker stands on: both feet, or one."""
 
-    DOUBLE = DOUBLE_STANCE
-    SINGLE = SINGLE_STANCE
+    DOUBLE = 0
+    SINGLE = 1
 
 
-HEEL_STRIKE: Final = 0
-TOE_OFF: Final = 1
-TORQUE_CHANGE: Final = 2
-UNLOADING: Final = 3
-FALL: Final = 4
-FLY_OFF: Final = 5
+class Switch(IntEnum):
+    """What ends a segment and begins the next one; the last two end the walk."""
+
+    HEEL_STRIKE = 0
+    TOE_OFF = 1
+    TORQUE_CHANGE = 2
+    UNLOADING = 3
+    FALL = 4
+    FLY_OFF = 5
 
 
 class Segment(Protocol):
@@ -111,7 +110,7 @@ def gained_apex(model: Model, segment: Segment, position: float) -> float:
 @compiled
 def leg_sine_at(model: Model, stance: int, position: float) -> float:
     """sin(theta) of the leading leg."""
-    if stance == SINGLE_STANCE:
+    if stance == Stance.SINGLE:
         return -math.sin(position)
     return linkage.leg_sine(model, math.cos(position))
 
@@ -130,7 +129,7 @@ def leading_force(model: Model, segment: Segment, position: float) -> float:
     sine = leg_sine_at(model, segment.stance, position)
     square = squared_rate(model, segment, position)
     force = linkage.pendulum_force(model, math.sqrt(1.0 - sine * sine), square)
-    if segment.stance == DOUBLE_STANCE:
+    if segment.stance == Stance.DOUBLE:
         arm = linkage.unloading_arm(model, math.sin(position), sine)
         force -= arm * effective_torque(segment, position)
     return force
@@ -144,7 +143,7 @@ def motion(model: Model, segment: Segment, position: float) -> tuple[float, floa
     In single stance the position, in double stance sin(theta): psi itself speeds up twentyfold.
     theta_ddot is half the derivative of theta_dot^2 by theta.
     """
-    if segment.stance == SINGLE_STANCE:
+    if segment.stance == Stance.SINGLE:
         rate = math.sqrt(max(0.0, squared_rate(model, segment, position)))
         return position, rate, 0.5 * model.per_drop * math.sin(position)
     cos_ankle = math.cos(position)
@@ -162,7 +161,7 @@ def motion(model: Model, segment: Segment, position: float) -> tuple[float, floa
 @compiled
 def position_of(model: Model, stance: int, coordinate: float) -> float:
     """Position where the coordinate of `motion` has this value."""
-    if stance == SINGLE_STANCE:
+    if stance == Stance.SINGLE:
         return coordinate
     cosine = linkage.ankle_cosine(model, coordinate)
     return math.acos(max(-1.0, min(1.0, cosine)))
@@ -210,13 +209,13 @@ def stall_panel(
     """
     middle, half = 0.5 * (start + end), 0.5 * (end - start)
     stall_torque = effective_torque(segment, segment.end)
-    stall_sine = leg_sine_at(model, DOUBLE_STANCE, segment.end)
+    stall_sine = leg_sine_at(model, Stance.DOUBLE, segment.end)
     stall_cosine = math.sqrt(1.0 - stall_sine * stall_sine)
     for i in range(PANEL_NODES):
         u = middle + half * model.rule[NODES, i]
         back = u * u
         position = segment.end - back
-        sine = leg_sine_at(model, DOUBLE_STANCE, position)
+        sine = leg_sine_at(model, Stance.DOUBLE, position)
         cosine = math.sqrt(1.0 - sine * sine)
         rise = 2.0 * math.sin(segment.end - 0.5 * back) * math.sin(0.5 * back)
         rise *= model.foot_length / model.toe_separation * (sine + stall_sine)
@@ -300,7 +299,7 @@ def double_stance_time(
     model: Model, work: Floats, segment: Segment, start: float, end: float
 ) -> float:
     """Time [s] from one position of double stance to a later one, in panels that converge."""
-    to_stall = segment.ends == FALL
+    to_stall = segment.ends == Switch.FALL
     widest = PANEL_WIDTH
     if to_stall:
         start = math.sqrt(max(0.0, segment.end - start))

@@ -19,7 +19,7 @@ from gait_entrainment.conventions import nanoseconds
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.walker.batch import Pulses, Walk, _torque_changes, walk_steps
 from gait_entrainment.walker.model import Model, make_model, start_apex
-from gait_entrainment.walker.segment import FALL, SEGMENT
+from gait_entrainment.walker.segment import SEGMENT, Switch
 from gait_entrainment_studies.locking.pulsed_gait import Floats
 
 # A lag that creeps by less than this per stride [s], for several strides, is called locked. So a
@@ -130,7 +130,7 @@ def walk_under_pulses(
     walk, ends = _walk(model, 2 * strides, pulses)
     ending = None
     if walk.heel_strikes.size <= 2 * strides:
-        ending = Outcome.FELL if ends == FALL else Outcome.FLEW_OFF
+        ending = Outcome.FELL if ends == Switch.FALL else Outcome.FLEW_OFF
     toe_offs = walk.toe_offs[1::2]
     last = walk.heel_strikes[-1]
     return PulsedWalk(
