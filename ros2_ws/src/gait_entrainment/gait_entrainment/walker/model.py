@@ -54,7 +54,12 @@ PI: Any = Extended("3.14159265358979323846264338327950288")
 
 
 class Model(Protocol):
-    """Constants of one walker. Positions in double stance are psi, in single stance -theta."""
+    """
+    Constants of one walker. Positions in double stance are psi, in single stance -theta.
+
+    In single stance, and in what gravity does, theta counts from the vertical; in the linkage from
+    the normal of the ground. Only on a slope do the two differ.
+    """
 
     mass: float
     leg_length: float
@@ -76,7 +81,12 @@ class Model(Protocol):
     per_drop: float
     """Squared rate per relative height, 2 g / L."""
     strike_gain: float
-    """Squared rate at heel strike over that at the apex: `per_drop` times the drop."""
+    """Squared rate right before heel strike over that at the apex: `per_drop` times the drop,"""
+    start_gain: float
+    """and the same right after it: on rising ground the new leading leg leans further."""
+    slope_sine: float
+    """Sine and cosine of the angle by which the ground rises."""
+    slope_cosine: float
     restitution: float
     """Squared rate after a collision over that before it."""
     start_apex: float
@@ -153,16 +163,23 @@ def _converged_apex(whole: Floats, rule: Floats) -> float:
     return float(apexes[first]) if first < apexes.size else float("inf")
 
 
-def make_model(p: WalkerParameters) -> Model:
-    """Work out the constants of a walker."""
+def make_model(p: WalkerParameters, slope: float = 0.0) -> Model:
+    """
+    Work out the constants of a walker on ground that rises by `slope` [rad].
+
+    A slope turns gravity against ground and linkage and changes nothing else. It is an extension
+    of the paper; samples of the walker are those of level ground.
+    """
     alpha, end = Extended(p.leg_angle), Extended(p.max_plantarflexion)
+    rise = Extended(slope)
     start = PI / 2 - alpha
     separation = 2 * p.leg_length * np.sin(alpha) - p.foot_length
     peak_torque = geometry.spring_torque(start, p.ankle_stiffness, end)
     per_energy = 2 / Extended(p.mass * p.leg_length**2)
     per_drop = 2 * p.gravity / Extended(p.leg_length)
     push_off = geometry.torque_work(end - start, peak_torque, p.ankle_stiffness)
-    strike_gain = per_drop * geometry.drop(np.sin(alpha), np.cos(alpha))
+    strike_gain = per_drop * geometry.drop(np.sin(alpha - rise), np.cos(alpha - rise))
+    start_gain = per_drop * geometry.drop(np.sin(alpha + rise), np.cos(alpha + rise))
     restitution = np.cos(2 * alpha) ** 2
 
     # Functions of the ankle's angle over double stance.
@@ -174,11 +191,17 @@ def make_model(p: WalkerParameters) -> Model:
         cosine = np.sqrt(1 - leg_sine(psi) ** 2)
         return geometry.leg_per_ankle(np.sin(psi), cosine, p.foot_length, separation)
 
+    def lean(psi: Any) -> tuple[Any, Any]:
+        """Sine and cosine of the leading leg's angle from the vertical."""
+        sine = leg_sine(psi)
+        cosine = np.sqrt(1 - sine**2)
+        turned = sine * np.cos(rise) + cosine * np.sin(rise)
+        return turned, cosine * np.cos(rise) - sine * np.sin(rise)
+
     def gain(psi: Any) -> Any:
         """Squared rate at psi, unperturbed, less `apex` at heel strike."""
-        sine = leg_sine(psi)
         work = geometry.torque_work(psi - start, peak_torque, p.ankle_stiffness)
-        return per_energy * work + per_drop * geometry.drop(sine, np.sqrt(1 - sine**2))
+        return per_energy * work + per_drop * geometry.drop(*lean(psi))
 
     def hold(psi: Any, pulse: float) -> Any:
         """Leading-leg force with a pulse on since heel strike, if `apex` was zero there."""
@@ -187,7 +210,7 @@ def make_model(p: WalkerParameters) -> Model:
         torque = pulse + geometry.spring_torque(psi, p.ankle_stiffness, end)
         squared_rate = gain(psi) + per_energy * pulse * (psi - start)
         carried = geometry.pendulum_force(
-            np.sqrt(1 - sine**2), squared_rate, p.mass, p.gravity, p.leg_length
+            lean(psi)[1], squared_rate, p.mass, p.gravity, p.leg_length
         )
         return carried - arm * torque
 
@@ -204,7 +227,7 @@ def make_model(p: WalkerParameters) -> Model:
     toe_off_sine = leg_sine(end)
     toe_off = np.arcsin(toe_off_sine)
     half = 0.5 * (alpha + toe_off)
-    theta = toe_off - half + half * single_rule[NODES]
+    theta = toe_off - half + half * single_rule[NODES] + rise
     single_stance = np.array(
         [per_drop * geometry.drop(np.sin(theta), np.cos(theta)), half * single_rule[WEIGHTS]]
     )
@@ -226,19 +249,26 @@ def make_model(p: WalkerParameters) -> Model:
         stiffness=p.ankle_stiffness,
         max_plantarflexion=end,
         double_stance_start=start,
-        strike_position=alpha,
-        toe_off_position=-toe_off,
+        strike_position=alpha - rise,
+        toe_off_position=-toe_off - rise,
         swing_hip=geometry.trailing_leg_angle(end, toe_off_sine, *lengths),
         swing_hip_slope=hip_per_ankle * ankle_slope,
         swing_ankle_slope=ankle_slope,
         per_energy=per_energy,
         per_drop=per_drop,
         strike_gain=strike_gain,
+        start_gain=start_gain,
+        slope_sine=np.sin(rise),
+        slope_cosine=np.cos(rise),
         restitution=restitution,
-        start_apex=per_energy * push_off * restitution / (1 - restitution) - strike_gain,
-        toe_off_half_sine=0.5 * geometry.drop(toe_off_sine, np.cos(toe_off)),
+        start_apex=(
+            per_energy * push_off * restitution / (1 - restitution)
+            - strike_gain
+            + (strike_gain - start_gain) / (1 - restitution)
+        ),
+        toe_off_half_sine=0.5 * geometry.drop(lean(end)[0], np.cos(toe_off + rise)),
         strike_hold=geometry.pendulum_force(
-            np.cos(alpha), strike_gain, p.mass, p.gravity, p.leg_length
+            np.cos(alpha - rise), strike_gain, p.mass, p.gravity, p.leg_length
         ),
         rule=rule,
         whole_double_stance=double_stance,
@@ -262,4 +292,4 @@ def start_apex(model: Any, speed: float | None) -> float:
         return float(model["start_apex"])
     if not 0.0 < speed < float("inf"):
         raise ValueError(f"initial_speed {speed} m/s is not a positive, finite number")
-    return float((speed / model["leg_length"]) ** 2 - model["strike_gain"])
+    return float((speed / model["leg_length"]) ** 2 - model["start_gain"])

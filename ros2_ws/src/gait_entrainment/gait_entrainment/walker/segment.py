@@ -142,25 +142,41 @@ def leg_sine_at(model: Model, phase: int, position: float) -> float:
 
 
 @compiled
+def leaned(model: Model, sine: float, cosine: float) -> tuple[float, float]:
+    """Sine and cosine of an angle from the vertical, from those off the ground's normal."""
+    up, along = model.slope_cosine, model.slope_sine
+    return sine * up + cosine * along, cosine * up - sine * along
+
+
+@compiled
+def lean_at(model: Model, phase: int, position: float) -> tuple[float, float]:
+    """Sine and cosine of the leading leg's angle from the vertical."""
+    sine = leg_sine_at(model, phase, position)
+    cosine = math.sqrt(1.0 - sine * sine)
+    if phase == SINGLE_STANCE:
+        return sine, cosine
+    return leaned(model, sine, cosine)
+
+
+@compiled
 def squared_rate(model: Model, segment: Segment, position: float) -> float:
     """theta_dot^2 at a position of the segment, from energy; negative beyond a stall."""
-    sine = leg_sine_at(model, segment.phase, position)
-    fall = drop(sine, math.sqrt(1.0 - sine * sine))
-    return gained_apex(model, segment, position) + model.per_drop * fall
+    sine, cosine = lean_at(model, segment.phase, position)
+    return gained_apex(model, segment, position) + model.per_drop * drop(sine, cosine)
 
 
 @compiled
 def leading_force(model: Model, segment: Segment, position: float) -> float:
     """Ground reaction F_B [N] of the leading leg, along the leg; negative where it would pull."""
-    sine = leg_sine_at(model, segment.phase, position)
     force = pendulum_force(
-        math.sqrt(1.0 - sine * sine),
+        lean_at(model, segment.phase, position)[1],
         squared_rate(model, segment, position),
         model.mass,
         model.gravity,
         model.leg_length,
     )
     if segment.phase == DOUBLE_STANCE:
+        sine = leg_sine_at(model, segment.phase, position)
         arm = unloading_arm(
             math.sin(position), sine, model.leg_length, model.foot_length, model.separation
         )
@@ -184,10 +200,9 @@ def motion(model: Model, segment: Segment, position: float) -> tuple[float, floa
     cosine = math.sqrt(1.0 - sine * sine)
     sin_ankle = math.sqrt(1.0 - cos_ankle * cos_ankle)
     slope = leg_per_ankle(sin_ankle, cosine, model.foot_length, model.separation)
-    square = gained_apex(model, segment, position) + model.per_drop * drop(sine, cosine)
-    square = max(0.0, square)
+    square = max(0.0, squared_rate(model, segment, position))
     push = model.per_energy * effective_torque(segment, position) / slope
-    acceleration = 0.5 * (model.per_drop * sine - push)
+    acceleration = 0.5 * (model.per_drop * leaned(model, sine, cosine)[0] - push)
     return sine, -cosine * math.sqrt(square), cosine * acceleration - sine * square
 
 
@@ -222,7 +237,8 @@ def panel(
         sine = leg_sine(cos_ankle, model.leg_length, model.foot_length, model.separation)
         cosine = math.sqrt(1.0 - sine * sine)
         gain = torque_work(rotation + x, segment.torque, segment.stiffness)
-        square = segment.apex + model.per_energy * gain + model.per_drop * drop(sine, cosine)
+        fall = drop(*leaned(model, sine, cosine))
+        square = segment.apex + model.per_energy * gain + model.per_drop * fall
         slope = leg_per_ankle(sin_ankle, cosine, model.foot_length, model.separation)
         time[i] = slope / math.sqrt(square)
     return weighed(model, work, half)
@@ -250,9 +266,11 @@ def stall_panel(
         sine = leg_sine_at(model, DOUBLE_STANCE, position)
         cosine = math.sqrt(1.0 - sine * sine)
         rise = 2.0 * math.sin(segment.end - 0.5 * back) * math.sin(0.5 * back)
+        ahead = model.per_drop * model.slope_sine * model.foot_length / model.separation * rise
         rise *= model.foot_length / model.separation * (sine + stall_sine)
+        level = model.per_drop * rise / (cosine + stall_cosine)
         gain = torque_work(-back, stall_torque, segment.stiffness)
-        square = model.per_energy * gain + model.per_drop * rise / (cosine + stall_cosine)
+        square = model.per_energy * gain + model.slope_cosine * level + ahead
         slope = leg_per_ankle(math.sin(position), cosine, model.foot_length, model.separation)
         time[i] = -2.0 * u * slope / math.sqrt(square)
     return weighed(model, work, half)
