@@ -8,7 +8,7 @@ import json
 import pytest
 
 from gait_entrainment.commands import main
-from gait_entrainment_studies.paper import compare, explain
+from gait_entrainment_studies.paper.comparison import compare, explain
 
 
 @pytest.fixture(scope="module")

@@ -13,11 +13,11 @@ The exact walker (docs/model.md).
     sampling        posture, torques, forces at any instant
     promise         the torque promised by the ankle robot
     walker          all of it in time
-    batch           whole walks in one call, and the step-to-step function
+    batch           the step-to-step function
     run             one run of it, with the account that a node must report
 """
 
-from gait_entrainment.walker.batch import Pulses, Step, Walk, step_to_step, walk
+from gait_entrainment.walker.batch import Step, step_to_step
 from gait_entrainment.walker.run import Stretch, WalkerRun
 from gait_entrainment.walker.sampling import Samples
 from gait_entrainment.walker.segment import Phase
@@ -27,14 +27,11 @@ __all__ = [
     "Ending",
     "EndingKind",
     "Phase",
-    "Pulses",
     "Samples",
     "Step",
     "Stretch",
     "Transition",
-    "Walk",
     "Walker",
     "WalkerRun",
     "step_to_step",
-    "walk",
 ]

@@ -22,17 +22,9 @@ from gait_entrainment import geometry
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-def _sources() -> tuple[str, int]:
-    """Stamp of every source file that the compiled functions are made of."""
-    here = Path(__file__).parent
-    files = [Path(geometry.__file__), *sorted(here.glob("*.py"))]
-    digest = hashlib.sha256()
-    for file in files:
-        digest.update(file.read_bytes())
-    return digest.hexdigest(), len(files)
-
-
-_STAMP = _sources()
+_WALKER = hashlib.sha256()
+for _file in (Path(geometry.__file__), *sorted(Path(__file__).parent.glob("*.py"))):
+    _WALKER.update(_file.read_bytes())
 
 
 def compiled(function: Function) -> Function:
@@ -40,8 +32,10 @@ def compiled(function: Function) -> Function:
     Compile at the first call, and keep the machine code on disk for the next process.
 
     Numba drops a kept function when that function's own file changes. Ours are inlined into one
-    another across files, so each is kept under the stamp of all of them.
+    another across files, so each is kept under a stamp of the walker's files and its own.
     """
+    stamp = _WALKER.copy()
+    stamp.update(Path(function.__code__.co_filename).read_bytes())
     dispatcher: Any = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
-    dispatcher._cache._cache_file._source_stamp = _STAMP
+    dispatcher._cache._cache_file._source_stamp = stamp.hexdigest(), 0
     return cast(Function, dispatcher)

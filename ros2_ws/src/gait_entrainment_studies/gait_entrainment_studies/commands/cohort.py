@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 from gait_entrainment_studies.commands.pulse_options import check_at_least
 
 if TYPE_CHECKING:
-    from gait_entrainment_studies.cohort import Study, StudyPlan, Subjects
+    from gait_entrainment_studies.cohort.study import Study, StudyPlan
+    from gait_entrainment_studies.cohort.subjects import Subjects
 
 DESCRIPTION = (
     "Draw subjects, give each its own stride-to-stride variability, conduct the experiment on "
@@ -74,12 +75,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Draw, conduct, judge, print."""
-    from gait_entrainment_studies.cohort import (
-        StudyPlan,
-        SubjectDistributions,
-        draw_subjects,
-        run_study,
-    )
+    from gait_entrainment_studies.cohort.study import StudyPlan, run_study
+    from gait_entrainment_studies.cohort.subjects import SubjectDistributions, draw_subjects
 
     names = [item.name for item in fields(SubjectDistributions)]
     given = {name: tuple(value) for name in names if (value := getattr(options, name))}
@@ -124,7 +121,7 @@ def _outcome(
 ) -> dict[str, Any]:
     import numpy as np
 
-    from gait_entrainment_studies.cohort import measured_basin_percent, verdicts
+    from gait_entrainment_studies.cohort.study import measured_basin_percent, verdicts
 
     def mean(values: list[float]) -> float | None:
         finite = [value for value in values if np.isfinite(value)]

@@ -31,7 +31,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print the range of the walker, and the map in JSON."""
-    from gait_entrainment_studies.existence import existence_map, stiffness_range
+    from gait_entrainment_studies.existence.stiffness_range import existence_map, stiffness_range
 
     try:
         walker = chosen_walker(options)

@@ -20,7 +20,7 @@ from gait_entrainment_studies.commands.pulse_options import (
 )
 
 if TYPE_CHECKING:
-    from gait_entrainment_studies.locking import Piece
+    from gait_entrainment_studies.locking.branches import Piece
 
 DESCRIPTION = (
     "Solve for the 1:1 phase-locked gaits: borders of the pulse periods with a stable lock, "
@@ -58,7 +58,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Solve, walk, print."""
-    from gait_entrainment_studies.locking import PulsedGait, locked_gaits, pieces_of, shares_of
+    from gait_entrainment_studies.locking.attractors import shares_of
+    from gait_entrainment_studies.locking.branches import locked_gaits, pieces_of
+    from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
 
     try:
         walker = chosen_walker(options)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from gait_entrainment_studies.paper import Comparison
+    from gait_entrainment_studies.paper.comparison import Comparison
 
 DESCRIPTION = "Hold the model against Ahn and Hogan (2012), with the parameters of Table 1."
 EXAMPLES = """examples:
@@ -28,7 +28,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print the comparison; a number that differs is a finding, not a failure."""
-    from gait_entrainment_studies.paper import compare, explain
+    from gait_entrainment_studies.paper.comparison import compare, explain
 
     rows, explanations = compare(), explain()
     paths = []

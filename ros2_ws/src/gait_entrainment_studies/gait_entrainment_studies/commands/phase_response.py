@@ -53,8 +53,8 @@ def run(options: argparse.Namespace) -> int:
     """Solve and print; the curve itself goes to JSON and CSV."""
     import numpy as np
 
-    from gait_entrainment_studies.locking import PulsedGait
-    from gait_entrainment_studies.phase_response import phase_response, predictions
+    from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
+    from gait_entrainment_studies.phase_response.response import phase_response, predictions
 
     offsets = np.array(options.period_offset or [-0.05])
     try:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from gait_entrainment.parameters import WalkerParameters
 
 if TYPE_CHECKING:
-    from gait_entrainment_studies.locking import PulsedGait
+    from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
 
 PAPER_FRACTION = 0.1
 PAPER_WIDTH = 0.1

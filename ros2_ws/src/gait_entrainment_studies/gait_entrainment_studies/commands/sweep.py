@@ -18,7 +18,7 @@ from gait_entrainment_studies.commands.pulse_options import (
 )
 
 if TYPE_CHECKING:
-    from gait_entrainment_studies.sweep import Axis
+    from gait_entrainment_studies.sweep.plan import Axis
 
 # The exact borders are drawn at this many torques or more: a coarse sweep has smooth borders too.
 _BORDER_TORQUES = 50
@@ -74,7 +74,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Sweep what is missing, join, draw."""
     from gait_entrainment.parameters import ParameterError
-    from gait_entrainment_studies.sweep import SweepError, SweepPlan, SweepStore
+    from gait_entrainment_studies.sweep.plan import SweepError, SweepPlan
+    from gait_entrainment_studies.sweep.store import SweepStore
 
     try:
         if options.jobs is not None and options.jobs < 1:
@@ -109,7 +110,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _axis(name: str, values: Sequence[float]) -> "Axis":
-    from gait_entrainment_studies.sweep import Axis, SweepError
+    from gait_entrainment_studies.sweep.plan import Axis, SweepError
 
     least, most, count = values
     if not float(count).is_integer():
@@ -121,7 +122,11 @@ def _fill(plan: Any, store: Any, options: argparse.Namespace) -> None:
     """Make and write the rows that are missing."""
     from tqdm import tqdm
 
-    from gait_entrainment_studies.sweep import available_cores, rows_by_dask, rows_by_processes
+    from gait_entrainment_studies.sweep.engine import (
+        available_cores,
+        rows_by_dask,
+        rows_by_processes,
+    )
 
     missing = store.missing()
     if not missing:
@@ -142,8 +147,9 @@ def _fill(plan: Any, store: Any, options: argparse.Namespace) -> None:
 def _report(plan: Any, store: Any, options: argparse.Namespace) -> None:
     import numpy as np
 
-    from gait_entrainment_studies.sweep import exact_borders, read_sweep
+    from gait_entrainment_studies.sweep.borders import exact_borders
     from gait_entrainment_studies.sweep.figures import draw_locked_lags, draw_tongue
+    from gait_entrainment_studies.sweep.store import read_sweep
 
     table, _ = read_sweep(store.finish())
     torques = plan.torque_fractions

@@ -17,10 +17,9 @@ import numpy as np
 
 from gait_entrainment.conventions import nanoseconds
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment.walker.batch import Pulses, Walk, _torque_changes, walk_steps
-from gait_entrainment.walker.model import Model, make_model, start_apex
-from gait_entrainment.walker.segment import FALL, SEGMENT
-from gait_entrainment_studies.locking.pulsed_gait import Floats
+from gait_entrainment.walker import EndingKind
+from gait_entrainment.walker.model import Floats, Model, make_model
+from gait_entrainment_studies.walks import Pulses, walk
 
 # A lag that creeps by less than this per stride [s], for several strides, is called locked. So a
 # pulse period closer than this to a border is decided by the solver, not by walking.
@@ -44,6 +43,9 @@ class Outcome(str, Enum):
     """Too short to tell; or, past a flip, bound to the pulses without ever repeating."""
     FELL = "fell"
     FLEW_OFF = "flew off"
+
+
+_ENDINGS = {None: None, EndingKind.FALL: Outcome.FELL, EndingKind.FLY_OFF: Outcome.FLEW_OFF}
 
 
 @dataclass(frozen=True)
@@ -122,23 +124,17 @@ def walk_under_pulses(
     model, stride = _prepared(parameters)
     # Enough for strides a third longer than the pulse period or the walker's own.
     count = int(4 / 3 * (strides + 1) * max(stride / period, 1.0)) + 1
-    # Pulses that come after the end of the clock are none.
+    # There are no pulses after the end of the clock.
     count = min(count, 1 + int(_CLOCK / period))
     onsets = np.rint(np.arange(count) * (min(period, _CLOCK) * 1e9)).astype(np.int64)
     onsets += nanoseconds(initial_phase * stride)
-    pulses = Pulses(onsets, nanoseconds(width), torque)
-    walk, ends = _walk(model, 2 * strides, pulses)
-    ending = None
-    if walk.heel_strikes.size <= 2 * strides:
-        ending = Outcome.FELL if ends == FALL else Outcome.FLEW_OFF
-    toe_offs = walk.toe_offs[1::2]
-    last = walk.heel_strikes[-1]
+    walked = walk(model, 2 * strides, Pulses(onsets, nanoseconds(width), torque))
     return PulsedWalk(
         period=period,
-        heel_strikes=walk.heel_strikes[::2],
-        toe_offs=toe_offs,
-        onsets=onsets[: np.searchsorted(onsets, last * 1e9)] * 1e-9,
-        ending=ending,
+        heel_strikes=walked.heel_strikes[::2],
+        toe_offs=walked.toe_offs[1::2],
+        onsets=onsets[: np.searchsorted(onsets, walked.heel_strikes[-1] * 1e9)] * 1e-9,
+        ending=_ENDINGS[walked.ending],
     )
 
 
@@ -146,14 +142,4 @@ def walk_under_pulses(
 def _prepared(parameters: WalkerParameters) -> tuple[Model, float]:
     """Return the walker's constants, and its unperturbed stride period [s]."""
     model = make_model(parameters)
-    walk, _ = _walk(model, 2, None)
-    return model, float(walk.heel_strikes[-1])
-
-
-def _walk(model: Model, steps: int, pulses: Pulses | None) -> tuple[Walk, int]:
-    """Walk as `walker.batch.walk` does, the constants made before; also what ended it."""
-    log, strikes, offs = np.zeros(1, SEGMENT), np.empty(steps), np.empty(steps)
-    apex = start_apex(model, None)
-    counts = walk_steps(model, log, *_torque_changes(pulses), apex, strikes, offs)
-    walk = Walk(np.concatenate([[0.0], strikes[: counts[0]]]), offs[: counts[1]])
-    return walk, int(log[0]["ends"])
+    return model, float(walk(model, 2).heel_strikes[-1])

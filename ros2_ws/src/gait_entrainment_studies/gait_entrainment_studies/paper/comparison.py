@@ -14,16 +14,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment_studies.locking import (
+from gait_entrainment_studies.locking.branches import (
     Border,
-    Outcome,
     Piece,
     Place,
-    PulsedGait,
     locked_gaits,
     pieces_of,
     stable_intervals,
 )
+from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
+from gait_entrainment_studies.locking.walked import Outcome
 from gait_entrainment_studies.paper.experiments import (
     floquet_by_convergence,
     floquet_by_differences,

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment_studies.locking import LockedGait, PulsedGait, locked_gaits, pieces_of
-from gait_entrainment_studies.locking.pulsed_gait import Floats
+from gait_entrainment_studies.locking.branches import LockedGait, locked_gaits, pieces_of
+from gait_entrainment_studies.locking.pulsed_gait import Floats, PulsedGait
 
 # What is left of a disturbance when the gait counts as recovered: below rounding.
 _RECOVERED = 1e-17

@@ -11,23 +11,3 @@ The Arnold tongue: pulse period x torque x initial phase.
     borders    the exact borders
     figures    the picture
 """
-
-from gait_entrainment_studies.sweep.borders import StableInterval, exact_borders
-from gait_entrainment_studies.sweep.engine import available_cores, rows_by_dask, rows_by_processes
-from gait_entrainment_studies.sweep.plan import Axis, SweepError, SweepPlan
-from gait_entrainment_studies.sweep.row import sweep_row
-from gait_entrainment_studies.sweep.store import SweepStore, read_sweep
-
-__all__ = [
-    "Axis",
-    "StableInterval",
-    "SweepError",
-    "SweepPlan",
-    "SweepStore",
-    "available_cores",
-    "exact_borders",
-    "read_sweep",
-    "rows_by_dask",
-    "rows_by_processes",
-    "sweep_row",
-]

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment_studies.locking import PulsedGait, pieces_of, stable_intervals
-from gait_entrainment_studies.locking.pulsed_gait import Floats
+from gait_entrainment_studies.locking.branches import pieces_of, stable_intervals
+from gait_entrainment_studies.locking.pulsed_gait import Floats, PulsedGait
 
 
 @dataclass(frozen=True)

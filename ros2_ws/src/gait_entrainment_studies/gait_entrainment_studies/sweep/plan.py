@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment_studies.locking import PulsedGait
-from gait_entrainment_studies.locking.pulsed_gait import Floats
+from gait_entrainment_studies.locking.pulsed_gait import Floats, PulsedGait
 
 _PACKAGES = ("gait_entrainment", "numpy", "scipy", "numba", "pyarrow")
 

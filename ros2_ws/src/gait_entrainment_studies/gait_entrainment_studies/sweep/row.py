@@ -7,13 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from gait_entrainment_studies.locking import (
-    Outcome,
-    PulsedGait,
-    pieces_of,
-    stable_intervals,
-    walk_under_pulses,
-)
+from gait_entrainment_studies.locking.branches import pieces_of, stable_intervals
+from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
+from gait_entrainment_studies.locking.walked import Outcome, walk_under_pulses
 from gait_entrainment_studies.sweep.plan import SweepPlan
 
 # A lag that creeps by less than this per stride [s] counts as locked by the last stride. At a

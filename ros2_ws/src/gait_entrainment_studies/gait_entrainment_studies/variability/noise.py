@@ -5,7 +5,11 @@
 
 import numpy as np
 
+from gait_entrainment.errors import UsageError
 from gait_entrainment_studies.locking.pulsed_gait import Floats
+
+# What numpy's generators are seeded with.
+Seed = int | tuple[int, ...]
 
 # Draws beyond this many standard deviations are cut off: no step has an absurd push-off.
 TRUNCATION = 3.0
@@ -18,10 +22,10 @@ def step_noise(generator: np.random.Generator, steps: int, size: int, hurst: flo
     `hurst` 0.5 is white; above, up to 1, neighbours resemble each other over long stretches
     (strides of adults: about 0.75). By circulant embedding (Davies and Harte 1987), exact.
 
-    Raises ValueError for a Hurst exponent out of range.
+    Raises UsageError for a Hurst exponent out of range.
     """
     if not 0.5 <= hurst < 1:
-        raise ValueError(f"hurst {hurst:g} is out of range; allowed: 0.5 (white) to below 1")
+        raise UsageError(f"hurst {hurst:g} is out of range; allowed: 0.5 (white) to below 1")
     lags = np.arange(steps + 1.0)
     power = 2 * hurst
     covariance = 0.5 * (np.abs(lags + 1) ** power - 2 * lags**power + np.abs(lags - 1) ** power)

@@ -2,226 +2,206 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Many walkers stepping at once, past the paper's limits. An extension: off in everything else.
+Many walkers with what the paper's model does not have. An extension: off in everything else.
 
-Each column of the arrays is a walker of its own, and each step may have its own stiffness. What
-the paper's model does not have, each zero unless it is asked for:
+They are the exact walker, step by step, with
 
 - noise: the stiffness of each push-off is drawn anew;
 - asymmetry: the perturbed leg pushes off with (1 + a) k, the other with (1 - a) k;
-- slope: the ground rises by an angle gamma, so gravity leans by gamma and heights are
-  1 - cos(theta + gamma).
+- slope: the ground rises by an angle, so gravity leans by it.
 
-The equations are those of `locking.PulsedGait`, but a step begins with any speed and the pulse at
-any time, so the ankle angles where it begins and ends are found by Newton steps on the time.
-Times are good to about 1e-9 s, and to 1e-5 s where a negative pulse unloads the trailing foot.
+Arrays have a column for each of the n walkers.
 """
 
-import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import elliprf
 
-from gait_entrainment import geometry
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, nanoseconds
+from gait_entrainment.errors import UsageError
+from gait_entrainment.geometry import torque_work
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment_studies.locking.pulsed_gait import Floats
+from gait_entrainment.walker import EndingKind
+from gait_entrainment.walker.model import Floats, make_model
+from gait_entrainment_studies.variability.noise import Seed, step_noise
+from gait_entrainment_studies.walks import Pulses, walk
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
-_PLACES = np.concatenate([[-1.0], _NODES, [1.0]])
+# Strides of the pilot walk that finds the noise for a coefficient of variation, and its rounds.
+_PILOT_STRIDES = 400
+_PILOT_ROUNDS = 2
+_PILOT_NOISE = 0.02
 
-# A place at a given time: steps, the last angle that they move it by [rad], and the time that may
-# be missing there [s]: more is missing where the walker comes to rest before.
-_MOST_STEPS = 60
-_ANGLE_STEP = 1e-12
-_TIME_STEP = 1e-6
-
-_leg_sine: Any = geometry.leg_sine
-_leg_per_ankle: Any = geometry.leg_per_ankle
-_unloading_arm: Any = geometry.unloading_arm
+# No noise takes more than this of a push-off's stiffness away.
+_LEAST_STIFFNESS = 0.01
 
 
-class Steps(NamedTuple):
-    """One step of every walker; NaN where it fell or flew off."""
+@dataclass(frozen=True)
+class PulseTrains:
+    """One train of pulses per walker, on the leg of heel strike 0; arrays (n,)."""
 
-    apex: Floats
-    """State of the speed right after the next heel strike."""
-    duration: Floats
-    double_stance: Floats
+    first_onset: Floats
+    period: Floats
+    count: int
+    torque: Floats
+    width: float
+
+    def of(self, walker: int) -> Pulses | None:
+        """Return the pulses of one walker; None if it fell before they were planned."""
+        onsets = self.first_onset[walker] + np.arange(self.count) * self.period[walker]
+        if not np.isfinite(onsets).all():
+            return None
+        stamps = np.rint(onsets * NANOSECONDS_PER_SECOND).astype(np.int64)
+        return Pulses(stamps, nanoseconds(self.width), float(self.torque[walker]))
+
+
+@dataclass(frozen=True)
+class PopulationWalk:
+    """Events [s] of n walkers since heel strike 0 of the perturbed leg; NaN after an end."""
+
+    heel_strikes: Floats
+    """(steps + 1, n), both legs; even ones are the perturbed leg's."""
+    toe_offs: Floats
+    """(steps, n), in step s the toe-off after heel strike s."""
     fell: NDArray[np.bool_]
     flew_off: NDArray[np.bool_]
 
-
-class _Stretch(NamedTuple):
-    time: Floats
-    slowest: Floats
-    force: Floats
+    @property
+    def stride_periods(self) -> Floats:
+        """(strides, n) durations of the perturbed leg's strides."""
+        return np.diff(self.heel_strikes[::2], axis=0)
 
 
 class Population:
     """
     Walkers (n,), on ground that rises by `slope` [rad].
 
-    Raises ValueError for a slope that no walker could stand on.
+    Raises UsageError for a slope on which a walker could not stand.
     """
 
     def __init__(self, walkers: Sequence[WalkerParameters], slope: float = 0.0) -> None:
-        def column(name: str) -> Floats:
-            return np.array([[getattr(walker, name)] for walker in walkers])
-
-        self.size = len(walkers)
-        self._length, self._foot = column("leg_length"), column("foot_length")
-        self._separation, self._mass = column("toe_separation"), column("mass")
-        self._gravity, self._angle = column("gravity"), column("leg_angle")
-        self._start, self._off = column("double_stance_start"), column("max_plantarflexion")
-        self._toe_off_angle = column("toe_off_angle")
-        self._kept = column("floquet_multiplier")
-        self._per_energy = 2 / (self._mass * self._length**2)
-        self._per_drop = 2 * self._gravity / self._length
-        self.stiffness = column("ankle_stiffness")[:, 0]
-        self.slope = slope
-        if not abs(slope) < float(self._angle.min()):
-            raise ValueError(
+        steepest = min(walker.leg_angle for walker in walkers)
+        if not abs(slope) < steepest:
+            raise UsageError(
                 f"slope {slope:g} rad is out of range; allowed: within the leg angle,"
-                f" {float(self._angle.min()):.4g} rad"
+                f" {steepest:.4g} rad"
             )
+        self.size = len(walkers)
+        self.stiffness = np.array([walker.ankle_stiffness for walker in walkers])
+        self._models = [_made_for_noise(walker, slope) for walker in walkers]
 
     def periodic_apex(self, first: Floats, second: Floats) -> Floats:
         """
-        State of the speed that repeats itself every two steps without noise.
+        `apex` that repeats itself every two steps without noise, right after a heel strike.
 
         `first` and `second` are the stiffness [N m/rad] of the two push-offs; arrays (n,).
         """
-        none = np.zeros_like(self._angle)
-        apex, kept = none, self._kept
-        # A step maps the state linearly; from zero, two of them give the map's constant.
-        for k in (first, second):
-            leaving = apex + self._per_energy * self._work(
-                self._start, self._off, k[:, None], none
-            )
-            apex = kept * (leaving + self._height_gain(-self._angle))
-            apex = apex - self._height_gain(self._angle)
-        repeated: Floats = (apex / (1 - kept**2))[:, 0]
-        return repeated
-
-    def step(
-        self, apex: Floats, stiffness: Floats, onset: Floats, width: float, torque: Floats
-    ) -> Steps:
-        """
-        Walk one step from right after a heel strike.
-
-        The trailing ankle has this stiffness [N m/rad] and gets a pulse of `torque` [N m] and
-        `width` [s] at `onset` [s] after the heel strike; before it if negative. Arrays (n,).
-        """
-        k, pulse = stiffness[:, None], torque[:, None]
-        none = np.zeros_like(pulse)
-        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            energy, low, elapsed = apex[:, None], self._start, np.zeros((self.size, 1))
-            slowest, force = np.full((self.size, 1), np.inf), np.full((self.size, 1), np.inf)
-            pieces = [(onset[:, None], none), (onset[:, None] + width, pulse)]
-            last = [(np.full((self.size, 1), np.inf), none)]
-            for edge, acting in pieces + last if torque.any() else last:
-                whole = self._stretch(low, self._off, energy, k, acting)
-                left = np.clip(edge - elapsed, 0.0, None)
-                # One that would fall under a lasting pulse may still outlive this one.
-                inside = np.isfinite(left) & ~(left >= whole.time)
-                high, done = self._off, whole
-                if inside.any():
-                    place = self._place(low, np.where(inside, left, 0.0), energy, k, acting)
-                    high = np.where(inside, place, self._off)
-                    done = self._stretch(low, high, energy, k, acting)
-                # What lies beyond the edges of the pulse has not been walked under it.
-                walked = high > low
-                slowest = np.fmin(slowest, np.where(walked, done.slowest, np.inf))
-                force = np.fmin(force, np.where(walked, done.force, np.inf))
-                energy = energy + self._per_energy * self._work(low, high, k, acting)
-                elapsed = elapsed + np.where(inside, left, whole.time)
-                low = high
-            swing = self._single_stance(energy)
-            before = energy + self._height_gain(-self._angle)
-            struck = np.cos(-self._angle + self.slope) * self._gravity - self._length * before
-            fell = ~((slowest > 0) & (energy > 0))
-            flew = ~fell & ~((force >= 0) & (struck >= 0))
-            ended = fell | flew
-            after = self._kept * before - self._height_gain(self._angle)
-            duration = elapsed + swing
-        return Steps(
-            apex=np.where(ended, np.nan, after)[:, 0],
-            duration=np.where(ended, np.nan, duration)[:, 0],
-            double_stance=np.where(ended, np.nan, elapsed)[:, 0],
-            fell=fell[:, 0],
-            flew_off=flew[:, 0],
-        )
-
-    def _height_gain(self, angle: Floats) -> Floats:
-        """Squared rate at an angle theta over that at the apex, by height alone."""
-        gain: Floats = self._per_drop * (1 - np.cos(angle + self.slope))
-        return gain
-
-    def _work(self, low: Floats, angle: Floats, k: Floats, torque: Floats) -> Floats:
-        """Work of spring and pulse from `low` on; none once the pulse has eaten up the spring."""
-        first = np.maximum(k * (self._off - low) + torque, 0.0)
-        turned = np.minimum(angle - low, first / k)
-        work: Floats = turned * (first - 0.5 * k * turned)
-        return work
-
-    def _posture(self, psi: Floats) -> tuple[Floats, Floats, Floats]:
-        lengths = (self._length, self._foot, self._separation)
-        sine = _leg_sine(np.cos(psi), *lengths)
-        cosine = np.sqrt(1 - sine**2)
-        return sine, cosine, _leg_per_ankle(np.sin(psi), cosine, *lengths[1:])
-
-    def _square(
-        self, low: Floats, psi: Floats, energy: Floats, k: Floats, torque: Floats
-    ) -> tuple[Floats, Floats, Floats]:
-        """Squared rate at psi; sine and transmission there."""
-        sine, cosine, slope = self._posture(psi)
-        leaned = cosine * math.cos(self.slope) - sine * math.sin(self.slope)
-        square = energy + self._per_energy * self._work(low, psi, k, torque)
-        return square + self._per_drop * (1 - leaned), sine, slope
-
-    def _stretch(
-        self, low: Floats, high: Floats, energy: Floats, k: Floats, torque: Floats
-    ) -> _Stretch:
-        half = 0.5 * (high - low)
-        psi = low + half * (1 + _PLACES)
-        square, sine, slope = self._square(low, psi, energy, k, torque)
-        time = half * ((slope / np.sqrt(square))[:, 1:-1] @ _WEIGHTS)[:, None]
-        theta = np.arcsin(sine)
-        push = np.maximum(k * (self._off - psi) + torque, 0.0)
-        lengths = (self._length, self._foot, self._separation)
-        held = self._gravity * np.cos(theta + self.slope) - self._length * square
-        force = self._mass * held - _unloading_arm(np.sin(psi), sine, *lengths) * push
-        return _Stretch(time, square.min(axis=1, keepdims=True), force.min(axis=1, keepdims=True))
-
-    def _place(
-        self, low: Floats, left: Floats, energy: Floats, k: Floats, torque: Floats
-    ) -> Floats:
-        """Ankle angle after this time; NaN where the walker comes to rest before."""
-        psi, first, last = low, low, self._off
-        for _ in range(_MOST_STEPS):
-            square, _, slope = self._square(low, psi, energy, k, torque)
-            missing = left - self._stretch(low, psi, energy, k, torque).time
-            # NaN: past the place of rest.
-            short = missing > 0
-            first, last = np.where(short, psi, first), np.where(short, last, psi)
-            following = psi + missing * np.sqrt(square) / slope
-            within = (first <= following) & (following <= last)
-            following = np.where(within, following, 0.5 * (first + last))
-            step, psi = np.abs(following - psi), following
-            if not ((step > _ANGLE_STEP) & np.isfinite(energy)).any():
-                break
-        found: Floats = np.where(np.abs(missing) < _TIME_STEP, psi, np.nan)
+        found = np.zeros(self.size)
+        for index, model in enumerate(self._models):
+            apex, kept = 0.0, model["restitution"]
+            turn = model["max_plantarflexion"] - model["double_stance_start"]
+            # A step maps the apex linearly; from zero, two of them give the map's constant.
+            for k in (first[index], second[index]):
+                apex += model["per_energy"] * torque_work(turn, k * turn, k)
+                apex = kept * (apex + model["strike_gain"]) - model["start_gain"]
+            found[index] = apex / (1 - kept**2)
         return found
 
-    def _single_stance(self, energy: Floats) -> Floats:
-        """Time from toe-off to heel strike, from and to the apex by R_F."""
-        total = np.zeros_like(energy)
-        energy = np.where(energy > 0, energy, np.nan)
-        for angle in (self._toe_off_angle + self.slope, self._angle - self.slope):
-            z = np.sin(angle / 2) ** 2
-            arguments = energy * (1 - z), energy + 2 * self._per_drop * z, energy
-            total += np.sign(angle) * 2 * np.sqrt(z) * elliprf(*arguments)
-        return total
+    def walk(
+        self, stiffness: Floats, initial_apex: Floats, trains: PulseTrains | None = None
+    ) -> PopulationWalk:
+        """Walk with this stiffness (steps, n) of the push-offs, from `initial_apex` (n,)."""
+        steps = len(stiffness)
+        heel_strikes = np.full((steps + 1, self.size), np.nan)
+        toe_offs = np.full((steps, self.size), np.nan)
+        endings: list[EndingKind | None] = []
+        for index, model in enumerate(self._models):
+            pulses = None if trains is None else trains.of(index)
+            apex, stiff = float(initial_apex[index]), np.ascontiguousarray(stiffness[:, index])
+            walked = walk(model, steps, pulses, apex, stiff)
+            heel_strikes[: walked.heel_strikes.size, index] = walked.heel_strikes
+            toe_offs[: walked.toe_offs.size, index] = walked.toe_offs
+            endings.append(walked.ending)
+        fell = np.array([ending is EndingKind.FALL for ending in endings])
+        flew_off = np.array([ending is EndingKind.FLY_OFF for ending in endings])
+        return PopulationWalk(heel_strikes, toe_offs, fell, flew_off)
+
+
+def _made_for_noise(walker: WalkerParameters, slope: float) -> Any:
+    """
+    Return constants (`Model`) that hold for any stiffness.
+
+    Those of the whole double stance do not, so it is made a quadrature of its own each time, and
+    searched for a fall or fly-off.
+    """
+    model: Any = make_model(walker, slope)
+    model["whole_double_stance_apex"] = np.inf
+    model["least_gain"] = -np.inf
+    return model
+
+
+class PopulationWalker:
+    """
+    The walk that each walker of a population makes with its noise, as far as it is asked for.
+
+    `noise` (n,) is the standard deviation of the push-off stiffness over its mean, `hurst` its
+    correlation (see `noise`), `asymmetry` the excess of the perturbed leg's stiffness.
+    Raises UsageError for an asymmetry or Hurst exponent out of range.
+    """
+
+    def __init__(
+        self,
+        population: Population,
+        steps: int,
+        seed: Seed,
+        noise: Floats,
+        hurst: float = 0.5,
+        asymmetry: float = 0.0,
+    ) -> None:
+        if not -1 < asymmetry < 1:
+            raise UsageError(f"asymmetry {asymmetry:g} is out of range; allowed: -1 to 1")
+        self._population, mean = population, population.stiffness
+        draws = step_noise(np.random.default_rng(seed), steps, population.size, hurst)
+        # In odd steps the perturbed leg trails and pushes off.
+        sides = np.where(np.arange(steps)[:, None] % 2 == 1, 1 + asymmetry, 1 - asymmetry)
+        self._stiffness = mean * sides * np.clip(1 + noise * draws, _LEAST_STIFFNESS, None)
+        # In the gait of this slope and these legs: no transient enters period or variation.
+        self._apex = population.periodic_apex(mean * (1 - asymmetry), mean * (1 + asymmetry))
+
+    def walk(self, steps: int, trains: PulseTrains | None = None) -> PopulationWalk:
+        """Walk so many steps; with pulses, which may be planned from a shorter walk before."""
+        return self._population.walk(self._stiffness[:steps], self._apex, trains)
+
+
+def noise_for(
+    population: Population, coefficient_of_variation: Floats, seed: Seed, hurst: float = 0.5
+) -> Floats:
+    """
+    Return the noise (n,) with which each walker's stride period varies by this coefficient.
+
+    Found by pilot walks, in which the coefficient is nearly proportional to the noise. Of a walker
+    that falls in them the strides before the fall count; it may fall in the experiment too.
+    """
+    noise = np.full(population.size, _PILOT_NOISE)
+    for _ in range(_PILOT_ROUNDS):
+        walker = PopulationWalker(population, 2 * _PILOT_STRIDES, seed, noise, hurst)
+        periods = np.ma.masked_invalid(walker.walk(2 * _PILOT_STRIDES).stride_periods)
+        found = np.ma.filled(periods.std(axis=0, ddof=1) / periods.mean(axis=0), np.nan)
+        # One that fell before its third stride tells nothing new.
+        noise = np.where(found > 0, noise * coefficient_of_variation / found, noise)
+    return noise
+
+
+def locked_runs(lags: Floats, locked_lag: float, tolerance: float) -> tuple[float, list[int]]:
+    """
+    Return the fraction of strides locked, and the lengths of the runs of them.
+
+    A stride is locked while its pulse lies within `tolerance` [s] of the lock of the walker
+    without noise.
+    """
+    near = np.abs(lags - locked_lag) <= tolerance
+    runs = [len(list(run)) for locked, run in groupby(near.tolist()) if locked]
+    return float(near.mean()) if near.size else float("nan"), runs

@@ -10,15 +10,10 @@ import pytest
 from gait_entrainment.commands import main
 from gait_entrainment.protocol import Protocol, PulsePlan
 from gait_entrainment.simulation import simulate
-from gait_entrainment_studies.cohort import (
-    StudyPlan,
-    SubjectDistributions,
-    draw_subjects,
-    run_study,
-    table_1_subjects,
-    verdicts,
-)
-from gait_entrainment_studies.locking import PulsedGait, locked_gaits
+from gait_entrainment_studies.cohort.study import StudyPlan, run_study, table_1_subjects, verdicts
+from gait_entrainment_studies.cohort.subjects import SubjectDistributions, draw_subjects
+from gait_entrainment_studies.locking.branches import locked_gaits
+from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
 
 
 def test_without_variability_the_trial_is_the_experiment_of_entrain_simulate():

@@ -8,17 +8,16 @@ from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.protocol import Protocol, PulsePlan
 from gait_entrainment.simulation import simulate
 from gait_entrainment.walker import step_to_step
-from gait_entrainment_studies.locking import (
+from gait_entrainment_studies.locking.attractors import shares_of
+from gait_entrainment_studies.locking.branches import (
     Border,
-    Outcome,
     Place,
-    PulsedGait,
     locked_gaits,
     pieces_of,
-    shares_of,
     stable_intervals,
-    walk_under_pulses,
 )
+from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
+from gait_entrainment_studies.locking.walked import Outcome, walk_under_pulses
 
 TABLE_1 = WalkerParameters()
 GAIT = PulsedGait(TABLE_1, 0.1 * TABLE_1.peak_torque, 0.1)

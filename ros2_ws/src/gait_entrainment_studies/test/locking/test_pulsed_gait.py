@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from walked_stride import walk_a_stride
 
 from gait_entrainment.parameters import ParameterError, WalkerParameters
-from gait_entrainment_studies.locking import PulsedGait
+from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
 
 TABLE_1 = WalkerParameters()
 

@@ -17,19 +17,13 @@ import pytest
 
 from gait_entrainment.commands import main
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment_studies.locking import Outcome, walk_under_pulses
-from gait_entrainment_studies.sweep import (
-    Axis,
-    SweepError,
-    SweepPlan,
-    SweepStore,
-    engine,
-    exact_borders,
-    read_sweep,
-    rows_by_dask,
-    rows_by_processes,
-    sweep_row,
-)
+from gait_entrainment_studies.locking.walked import Outcome, walk_under_pulses
+from gait_entrainment_studies.sweep import engine
+from gait_entrainment_studies.sweep.borders import exact_borders
+from gait_entrainment_studies.sweep.engine import rows_by_dask, rows_by_processes
+from gait_entrainment_studies.sweep.plan import Axis, SweepError, SweepPlan
+from gait_entrainment_studies.sweep.row import sweep_row
+from gait_entrainment_studies.sweep.store import SweepStore, read_sweep
 
 pytest.importorskip("pyarrow", reason="a sweep is kept as Parquet: pip install pyarrow")
 

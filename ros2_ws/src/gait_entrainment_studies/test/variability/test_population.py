@@ -10,14 +10,14 @@ from scipy.integrate import solve_ivp
 
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.walker import step_to_step
-from gait_entrainment_studies.locking import walk_under_pulses
-from gait_entrainment_studies.variability import (
+from gait_entrainment_studies.locking.walked import walk_under_pulses
+from gait_entrainment_studies.variability.noise import step_noise
+from gait_entrainment_studies.variability.population import (
     Population,
     PopulationWalker,
     PulseTrains,
     locked_runs,
     noise_for,
-    step_noise,
 )
 
 TABLE_1 = WalkerParameters()
@@ -81,10 +81,9 @@ def test_a_step_on_a_slope_is_that_of_the_equations_of_motion(slope):
         motion, (0, 3), double.y[:, -1],
         args=(False,), events=crossing(-p.leg_angle), **tight,
     )  # fmt: skip
-    zero = np.zeros(1)
-    step = population.step(apex, population.stiffness, zero, 1.0, zero)
-    assert step.double_stance[0] == pytest.approx(double.t[-1], abs=1e-8)
-    assert step.duration[0] == pytest.approx(double.t[-1] + single.t[-1], abs=1e-8)
+    walk = population.walk(population.stiffness[None], apex)
+    assert walk.toe_offs[0, 0] == pytest.approx(double.t[-1], abs=1e-8)
+    assert walk.heel_strikes[1, 0] == pytest.approx(double.t[-1] + single.t[-1], abs=1e-8)
 
 
 def test_noise_gives_the_chosen_variation_and_the_same_walk_for_the_same_seed():
@@ -170,8 +169,11 @@ def test_a_walker_outlives_a_pulse_under_which_it_would_fall_if_it_lasted():
     torque = np.array([-100.0, -75.0, -95.0, -160.0, 60.0])
     population = Population([TABLE_1] * 5)
     apex = population.periodic_apex(population.stiffness, population.stiffness)
-    steps = population.step(apex, population.stiffness, onset, 0.1, torque)
+    # The perturbed leg trails in the second step, from heel strike 1 on.
+    trains = PulseTrains(PERIOD / 2 + onset, np.full(5, PERIOD), 1, torque, 0.1)
+    walk = population.walk(np.tile(population.stiffness, (2, 1)), apex, trains)
     reference = step_to_step(TABLE_1, TABLE_1.speed_after_collision, onset, 0.1, torque)
     # The last has ended before heel strike, where it would lift the leading leg.
-    assert not (steps.fell | steps.flew_off)[[0, 1, 2, 4]].any()
-    assert steps.duration == pytest.approx(reference.duration, abs=1e-5, nan_ok=True)
+    assert not (walk.fell | walk.flew_off)[[0, 1, 2, 4]].any()
+    duration = np.diff(walk.heel_strikes, axis=0)[1]
+    assert duration == pytest.approx(reference.duration, abs=1e-5, nan_ok=True)

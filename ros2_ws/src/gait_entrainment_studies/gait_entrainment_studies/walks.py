@@ -1,0 +1,134 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Whole walks in one compiled call: the transitions that `Walker` runs, without its log.
+
+A walk gives the same bits as a `Walker`. Beyond that, each push-off may have its own stiffness.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gait_entrainment.walker import EndingKind
+from gait_entrainment.walker.compiled import compiled
+from gait_entrainment.walker.model import Floats, Model, start_apex
+from gait_entrainment.walker.promise import EVER
+from gait_entrainment.walker.segment import (
+    FALL,
+    HEEL_STRIKE,
+    SEGMENT,
+    SINGLE_STANCE,
+    TOE_OFF,
+    WORK_SHAPE,
+    Log,
+)
+from gait_entrainment.walker.trajectory import (
+    SWITCHED,
+    Stamps,
+    first_cursors,
+    proceed,
+    start_walking,
+)
+from gait_entrainment.walker.transitions import seconds
+
+FOREVER = 2**62
+
+
+class Pulses(NamedTuple):
+    """Square pulses on one ankle, not overlapping: onsets [ns], width [ns], torque [N m]."""
+
+    onsets: Stamps
+    width: int
+    torque: float
+
+
+class Walk(NamedTuple):
+    """Events [s] of a walk: heel strikes from number 0 on, and the toe-off after each."""
+
+    heel_strikes: Floats
+    toe_offs: Floats
+    ending: EndingKind | None
+    """How it ended before its last step, if it did."""
+
+
+def walk(
+    model: Model,
+    steps: int,
+    pulses: Pulses | None = None,
+    initial_apex: float | None = None,
+    stiffness: Floats | None = None,
+) -> Walk:
+    """
+    Walk `steps` steps from heel strike 0 of the leg whose ankle the pulses perturb.
+
+    The walk starts as a `Walker` does, unless `initial_apex` (see `model`) says otherwise.
+    `stiffness` (steps,) is that of each push-off [N m/rad]; it is written into the model, which
+    must be made for that (`variability.population`). Raises ValueError for overlapping pulses.
+    """
+    heel_strikes, toe_offs = np.empty(steps), np.empty(steps)
+    log = np.zeros(1, SEGMENT)
+    strikes, offs = walk_steps(
+        model,
+        log,
+        *_torque_changes(pulses),
+        start_apex(model, None) if initial_apex is None else initial_apex,
+        np.empty(0) if stiffness is None else stiffness,
+        heel_strikes,
+        toe_offs,
+    )
+    ending = None
+    if strikes < steps:
+        ending = EndingKind.FALL if log[0]["ends"] == FALL else EndingKind.FLY_OFF
+    return Walk(np.append(0.0, heel_strikes[:strikes]), toe_offs[:offs], ending)
+
+
+def _torque_changes(pulses: Pulses | None) -> tuple[Stamps, Floats]:
+    """Changes of both sides as `trajectory` wants them, the left one first and never perturbed."""
+    left = np.array([EVER]), np.zeros(1)
+    if pulses is None:
+        return np.concatenate([left[0], left[0]]), np.zeros(2)
+    onsets = np.asarray(pulses.onsets, np.int64)
+    if pulses.width <= 0 or np.any(np.diff(onsets) < pulses.width):
+        raise ValueError(f"pulses of {pulses.width} ns must be wider than 0 and not overlap")
+    changes = np.append(EVER, np.stack([onsets, onsets + pulses.width], axis=1))
+    torques = np.append(0.0, np.tile([pulses.torque, 0.0], onsets.size))
+    # Of two changes of one stamp the later counts, and one that changes nothing is no switch.
+    last = np.append(np.diff(changes) != 0, True)
+    changes, torques = changes[last], torques[last]
+    real = np.append(True, np.diff(torques) != 0.0)
+    return np.append(left[0], changes[real]), np.append(left[1], torques[real])
+
+
+@compiled
+def walk_steps(
+    model: Model,
+    log: Log,
+    changes: Stamps,
+    torques: Floats,
+    apex: float,
+    stiffness: Floats,
+    heel_strikes: Floats,
+    toe_offs: Floats,
+) -> tuple[int, int]:
+    """Fill in the events [s] after heel strike 0, until one array is full; return how many."""
+    segment = log[0]
+    work, cursors = np.empty(WORK_SHAPE), first_cursors(1)
+    strikes, offs = 0, 0
+    if stiffness.size > 0:
+        model.stiffness = stiffness[0]
+    start_walking(model, segment, 1, apex)
+    while strikes < heel_strikes.size:
+        if segment.phase == SINGLE_STANCE and strikes + 1 < stiffness.size:
+            model.stiffness = stiffness[strikes + 1]  # of the push-off that comes next
+        outcome = proceed(model, work, segment, changes, torques, 1, cursors, FOREVER)
+        if outcome != SWITCHED:
+            break
+        if segment.began == HEEL_STRIKE:
+            heel_strikes[strikes] = seconds(segment.stamp, segment.rest)
+            strikes += 1
+        elif segment.began == TOE_OFF:
+            toe_offs[offs] = seconds(segment.stamp, segment.rest)
+            offs += 1
+    return strikes, offs
