@@ -19,7 +19,8 @@ from gait_entrainment.gait import GaitEvent, Verdict, analyze
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment_studies.cohort.subjects import Subjects
 from gait_entrainment_studies.locking.branches import locked_gaits, pieces_of, stable_intervals
-from gait_entrainment_studies.locking.pulsed_gait import Floats, PulsedGait
+from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
+from gait_entrainment_studies.locking.roots import Floats
 from gait_entrainment_studies.variability.population import (
     Population,
     PopulationWalk,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gait_entrainment.parameters import ParameterError, WalkerParameters
-from gait_entrainment_studies.locking.pulsed_gait import Floats
+from gait_entrainment_studies.locking.roots import Floats
 
 
 def _pair(mean: float, deviation: float, meaning: str, unit: str) -> Any:

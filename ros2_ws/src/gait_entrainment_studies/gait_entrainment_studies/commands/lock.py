@@ -58,9 +58,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Solve, walk, print."""
-    from gait_entrainment_studies.locking.attractors import shares_of
     from gait_entrainment_studies.locking.branches import locked_gaits, pieces_of
     from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
+    from gait_entrainment_studies.locking.walked import shares_of
 
     try:
         walker = chosen_walker(options)
@@ -74,7 +74,6 @@ def run(options: argparse.Namespace) -> int:
     pieces = pieces_of(gait)
     locks = locked_gaits(gait, period, pieces)
     shares = shares_of(gait, period, locks, options.phases)
-    drawn = dict(zip(map(id, shares.locks), shares.drawn, strict=True))
     outcome = {
         "unperturbed_stride_period": gait.unperturbed_period,
         "pulse_period": period,
@@ -85,7 +84,7 @@ def run(options: argparse.Namespace) -> int:
             {
                 **asdict(lock),
                 "multipliers": [[m.real, m.imag] for m in lock.multipliers],
-                "share_of_initial_phases": drawn.get(id(lock)),
+                "share_of_initial_phases": shares.drawn.get(lock),
             }
             for lock in locks
         ],

@@ -17,8 +17,8 @@ from gait_entrainment.drawing import (
     new_figure,
     save_figure,
 )
-from gait_entrainment_studies.locking.branches import Border, LockedGait, Piece, Place
-from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
+from gait_entrainment_studies.locking.branches import Border, LockedGait, Piece
+from gait_entrainment_studies.locking.pulsed_gait import Place, PulsedGait
 
 _COLOURS = {Place.EARLY: ORANGE, Place.INSIDE: BLUE, Place.LATE: GREEN}
 
@@ -28,12 +28,11 @@ def draw_branches(
 ) -> list[Path]:
     """Draw all branches, stable or not, their borders, and the locked gaits at one period."""
     figure, axes = new_figure()
-    along = {Place.EARLY: gait.early, Place.INSIDE: gait.inside, Place.LATE: gait.late}
     named: set[object] = set()
     for piece in pieces:
         if not piece.feasible:
             continue
-        gaits = along[piece.place](np.linspace(piece.first.angle, piece.last.angle, 80))
+        gaits = gait.along(piece.place)(np.linspace(piece.first.angle, piece.last.angle, 80))
         offsets = (gaits.period - gait.unperturbed_period) * 1e3
         label = None if piece.place in named else piece.place.value
         named.add(piece.place)

@@ -17,12 +17,11 @@ from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment_studies.locking.branches import (
     Border,
     Piece,
-    Place,
     locked_gaits,
     pieces_of,
     stable_intervals,
 )
-from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
+from gait_entrainment_studies.locking.pulsed_gait import Place, PulsedGait
 from gait_entrainment_studies.locking.walked import Outcome
 from gait_entrainment_studies.paper.experiments import (
     floquet_by_convergence,

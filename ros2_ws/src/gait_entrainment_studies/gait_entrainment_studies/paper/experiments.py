@@ -10,7 +10,8 @@ import numpy as np
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.walker import Samples, Walker
-from gait_entrainment_studies.locking.pulsed_gait import Floats, PulsedGait
+from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
+from gait_entrainment_studies.locking.roots import Floats
 from gait_entrainment_studies.locking.walked import Outcome, PulsedWalk, walk_under_pulses
 
 PULSE_WIDTH = 0.1

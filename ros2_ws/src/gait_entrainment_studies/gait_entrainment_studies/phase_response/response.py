@@ -17,7 +17,8 @@ import numpy as np
 
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment_studies.locking.branches import LockedGait, locked_gaits, pieces_of
-from gait_entrainment_studies.locking.pulsed_gait import Floats, PulsedGait
+from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
+from gait_entrainment_studies.locking.roots import Floats
 
 # What is left of a disturbance when the gait counts as recovered: below rounding.
 _RECOVERED = 1e-17

@@ -9,7 +9,8 @@ import numpy as np
 
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment_studies.locking.branches import pieces_of, stable_intervals
-from gait_entrainment_studies.locking.pulsed_gait import Floats, PulsedGait
+from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
+from gait_entrainment_studies.locking.roots import Floats
 
 
 @dataclass(frozen=True)

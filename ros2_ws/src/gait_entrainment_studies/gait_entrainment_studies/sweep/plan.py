@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment_studies.locking.pulsed_gait import Floats, PulsedGait
+from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
+from gait_entrainment_studies.locking.roots import Floats
 
 _PACKAGES = ("gait_entrainment", "numpy", "scipy", "numba", "pyarrow")
 

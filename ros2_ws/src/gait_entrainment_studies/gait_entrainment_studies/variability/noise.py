@@ -6,7 +6,7 @@
 import numpy as np
 
 from gait_entrainment.errors import UsageError
-from gait_entrainment_studies.locking.pulsed_gait import Floats
+from gait_entrainment_studies.locking.roots import Floats
 
 # What numpy's generators are seeded with.
 Seed = int | tuple[int, ...]

@@ -8,16 +8,14 @@ from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.protocol import Protocol, PulsePlan
 from gait_entrainment.simulation import simulate
 from gait_entrainment.walker import step_to_step
-from gait_entrainment_studies.locking.attractors import shares_of
 from gait_entrainment_studies.locking.branches import (
     Border,
-    Place,
     locked_gaits,
     pieces_of,
     stable_intervals,
 )
-from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
-from gait_entrainment_studies.locking.walked import Outcome, walk_under_pulses
+from gait_entrainment_studies.locking.pulsed_gait import Place, PulsedGait
+from gait_entrainment_studies.locking.walked import Outcome, shares_of, walk_under_pulses
 
 TABLE_1 = WalkerParameters()
 GAIT = PulsedGait(TABLE_1, 0.1 * TABLE_1.peak_torque, 0.1)
@@ -102,7 +100,7 @@ def test_dorsiflexion_pulses_lock_to_longer_periods_where_they_are_solved_to():
     stable = [lock for lock in locked_gaits(gait, period) if lock.stable]
     assert [lock.place for lock in stable] == [Place.EARLY]
     shares = shares_of(gait, period, stable, 8)
-    assert shares.drawn == (1.0,)
+    assert list(shares.drawn.values()) == [1.0]
     walk = walk_under_pulses(TABLE_1, gait.torque, 0.1, period, 0.3, 200)
     # To the end of the walk, though its strides are longer than the unperturbed ones.
     assert walk.lags[-1] == pytest.approx(stable[0].lag, abs=5e-9)
