@@ -16,10 +16,10 @@ from gait_entrainment_nodes.messaging.domain import claimed_domain
 
 # What is wrong; the options; what the line must name, field and allowed range.
 WRONG_USAGE = {
-    "negative width": (["--width=-0.1"], ["width", "-0.1", "at least 1e-09"]),
+    "negative width": (["--width=-0.1"], ["width", "-0.1", "1e-09 to 10 s"]),
     "overlapping pulses": (["--width=0.4", "--period=0.3"], ["width", "0.3", "below the period"]),
     "weak spring": (["--ankle-stiffness=60"], ["ankle_stiffness", "60", "allowed:"]),
-    "NaN": (["--mass=nan"], ["mass", "nan", "finite number"]),
+    "NaN": (["--mass=nan"], ["mass", "nan", "above 0"]),
     "infinite": (["--period-offset=inf"], ["period_offset", "inf", "-100"]),
     "no baseline": (["--baseline=1"], ["baseline", "1", "at least 2"]),
     "sample rate": (["--sample-rate=1001"], ["--sample-rate", "1001", "0 to 1000"]),

@@ -9,7 +9,7 @@ valves in ``schedule`` and report its pressure sensor in ``promise`` and ``read`
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.robot import (
@@ -20,6 +20,7 @@ from gait_entrainment.robot import (
     RobotState,
     TorqueProfile,
 )
+from gait_entrainment.settings import setting
 
 STEP = 1_000_000  # of the simulation [ns]
 
@@ -28,14 +29,7 @@ STEP = 1_000_000  # of the simulation [ns]
 class PneumaticOptions:
     """What a user can choose: pneumatic:filling=0.02."""
 
-    filling: float = field(
-        default=0.01,
-        metadata={
-            "meaning": "time in which the muscle fills",
-            "unit": "s",
-            "range": (0.001, 0.1),
-        },
-    )
+    filling: float = setting(0.01, "time in which the muscle fills", "s", (0.001, 0.1))
 
 
 class PneumaticAnkleRobot(AnkleRobot):
@@ -49,7 +43,6 @@ class PneumaticAnkleRobot(AnkleRobot):
         self.capabilities = Capabilities(
             peak_torque=20.0,
             torque_rate=20.0 / options.filling,
-            own_pulse_timer=True,
             measures_torque=False,
             simulated=True,
             state_rate=1000.0,

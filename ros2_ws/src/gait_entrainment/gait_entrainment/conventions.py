@@ -4,7 +4,6 @@
 """Vocabulary that every part shares: sides, kinds of gait events, and nanosecond stamps."""
 
 import enum
-from dataclasses import field
 from typing import Any
 
 NANOSECONDS_PER_SECOND = 1_000_000_000
@@ -27,11 +26,6 @@ class EventKind(enum.IntEnum):
 
     HEEL_STRIKE = 0
     TOE_OFF = 1
-
-
-def setting(default: float, meaning: str, unit: str, allowed: tuple[float, float]) -> Any:
-    """Return a field of a dataclass that a front end can offer: meaning, unit, lowest, highest."""
-    return field(default=default, metadata={"meaning": meaning, "unit": unit, "range": allowed})
 
 
 def nanoseconds(seconds: float) -> int:

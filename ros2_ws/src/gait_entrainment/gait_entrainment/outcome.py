@@ -151,8 +151,7 @@ def timing_outcome(timings: Sequence[PulseTiming], stride: float) -> dict[str, A
         "sent": distribution(timings, "sent", stride),
         "measured": distribution(timings, "measured", stride),
         "each_ms": [
-            {"sent": _late(t.commanded, t.sent), "measured": _late(t.commanded, t.measured)}
-            for t in timings
+            {kind: timing.late_ms(kind) for kind in ("sent", "measured")} for timing in timings
         ],
     }
 
@@ -172,7 +171,3 @@ def timing_summary(outcome: dict[str, Any]) -> list[str]:
             f"{figures['p99_ms']:.1f} (99 %), {figures['worst_ms']:.1f} (worst{share}){missing}"
         )
     return lines
-
-
-def _late(commanded: int, onset: int | None) -> float | None:
-    return None if onset is None else (onset - commanded) / 1e6

@@ -4,29 +4,24 @@
 """
 Parameters of the ankle-actuated walker (Table 1 of Ahn and Hogan 2012) and what they imply.
 
-A walker exists only where the linkage closes and a period-one gait vaults over each step without
+A walker exists only if the linkage closes and a period-one gait vaults over each step without
 flying off the ground. Its construction checks that, and an error says by how much it fails. The
-gait's speed follows from energy alone (Eq. 7, 8), so all of this is in closed form but for two
-one-dimensional searches over double stance, which the paper left to simulation.
+gait's speed follows from energy alone (Eq. 7, 8), so everything here is in closed form except for
+two one-dimensional searches over double stance, which the paper left to simulation.
 """
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 from gait_entrainment import geometry
+from gait_entrainment.settings import SettingError, check_settings, setting
 
 
-class ParameterError(ValueError):
-    """A value is out of its range; the message is one line: field, value, range, what to do."""
-
-
-def _parameter(default: float, meaning: str, unit: str, symbol: str, most: float) -> Any:
-    # The range is what a front end offers; construction says what of it makes a walker.
-    metadata = {"meaning": meaning, "unit": unit, "symbol": symbol, "range": (0.0, most)}
-    return field(default=default, metadata=metadata)
+class ParameterError(SettingError):
+    """Parameters that make no walker; the message is one line: field, value, what is allowed."""
 
 
 # Points of the search over double stance. The functions searched are smooth on that scale, and
@@ -52,44 +47,40 @@ def greatest(function: Callable[[float], float], lower: float, upper: float) -> 
     return max(values[best], function(0.5 * (a + b)))
 
 
+def _positive(default: float, meaning: str, unit: str, most: float) -> Any:
+    return setting(default, meaning, unit, (0.0, most), least_excluded=True)
+
+
 @dataclass(frozen=True)
 class WalkerParameters:
     """
     The walker of Table 1: point mass, two massless legs with feet, a spring at the trailing ankle.
 
-    Raises ParameterError at construction where a value is not a number or out of range, or where
-    the walker has no period-one gait.
+    The names of the paper are, in this order, m, L, l, g, alpha, mu and k. Construction raises
+    ParameterError for a value that is out of range and for a walker without a period-one gait.
     """
 
-    mass: float = _parameter(80.0, "mass", "kg", "m", 1e4)
-    leg_length: float = _parameter(1.0, "leg length", "m", "L", 100.0)
-    foot_length: float = _parameter(0.2, "foot length", "m", "l", 100.0)
-    gravity: float = _parameter(9.81, "gravitational acceleration", "m/s^2", "g", 1e4)
-    leg_angle: float = _parameter(
-        math.pi / 6, "angle of the leg at heel strike", "rad", "alpha", math.pi / 4
+    mass: float = _positive(80.0, "mass", "kg", 1e4)
+    leg_length: float = _positive(1.0, "leg length", "m", 100.0)
+    foot_length: float = _positive(0.2, "foot length", "m", 100.0)
+    gravity: float = _positive(9.81, "gravitational acceleration", "m/s^2", 1e4)
+    leg_angle: float = _positive(
+        math.pi / 6, "angle of the leg at heel strike", "rad", math.pi / 4
     )
-    max_plantarflexion: float = _parameter(
-        2.576, "maximal plantarflexion of the ankle, where toe-off is", "rad", "mu", math.pi
+    max_plantarflexion: float = _positive(
+        2.576, "plantarflexion of the ankle at toe-off, its largest", "rad", math.pi
     )
-    ankle_stiffness: float = _parameter(87.3, "ankle stiffness", "N m/rad", "k", 1e7)
+    ankle_stiffness: float = _positive(87.3, "ankle stiffness", "N m/rad", 1e7)
 
     def __post_init__(self) -> None:
         """Check every field, the linkage, and that the period-one gait exists."""
-        for item in fields(self):
-            value = getattr(self, item.name)
-            number = isinstance(value, int | float) and not isinstance(value, bool)
-            if not number or not math.isfinite(value) or value <= 0:
-                raise ParameterError(
-                    f"{item.name} {value!r} is not a positive, finite number of"
-                    f" {item.metadata['unit']}"
-                )
-            object.__setattr__(self, item.name, float(value))
         try:
+            check_settings(self)
             self._check_linkage()
             self._check_gait()
-        except ParameterError:
-            raise
-        except (ArithmeticError, ValueError):  # an overflow, a root or angle that is none
+        except SettingError as error:
+            raise ParameterError(str(error)) from None
+        except (ArithmeticError, ValueError):  # an overflow, the root of a negative number
             raise ParameterError(
                 "the values are too large, too small or too far apart to calculate with"
             ) from None
@@ -99,52 +90,54 @@ class WalkerParameters:
         # cos(2 alpha) > 0: above pi/4 the collision would throw the mass back.
         least, most = math.asin(min(1.0, self.foot_length / (2 * self.leg_length))), math.pi / 4
         if least >= most:
-            raise ParameterError(
-                f"foot_length {self.foot_length:g} m is too long for legs of"
+            raise SettingError(
+                f"foot_length: {self.foot_length:g} m is too long for legs of"
                 f" {self.leg_length:g} m; allowed:"
                 f" below {2 * self.leg_length * math.sin(most):g} m"
             )
-        if not least < self.leg_angle < most:
-            raise ParameterError(
-                f"leg_angle {self.leg_angle:.6g} rad is out of range by"
-                f" {max(least - self.leg_angle, self.leg_angle - most):.3g} rad;"
-                f" allowed: {least:.6g} to {most:.6g} rad"
-                " (2 L sin(alpha) > l, and the collision must not reverse the motion)"
-            )
+        _check_angle(
+            "leg_angle",
+            self.leg_angle,
+            least,
+            most,
+            "2 L sin(alpha) > l, and the collision must not reverse the motion",
+        )
         cosine = geometry.ankle_cosine(
             -math.sin(self.leg_angle), self.leg_length, self.foot_length, self.toe_separation
         )
-        least, most = self.double_stance_start, math.acos(max(-1.0, cosine))
-        if not least < self.max_plantarflexion < most:
-            raise ParameterError(
-                f"max_plantarflexion {self.max_plantarflexion:.6g} rad is out of range by"
-                f" {max(least - self.max_plantarflexion, self.max_plantarflexion - most):.3g} rad;"
-                f" allowed: {least:.6g} to {most:.6g} rad"
-                " (above pi/2 - alpha, and toe-off before the next heel strike)"
-            )
+        _check_angle(
+            "max_plantarflexion",
+            self.max_plantarflexion,
+            self.double_stance_start,
+            math.acos(max(-1.0, cosine)),
+            "above pi/2 - alpha, and toe-off before the next heel strike",
+        )
 
     def _check_gait(self) -> None:
         """Refuse a stiffness with which the period-one gait falls or flies off."""
         least, most = self.just_vault_over_stiffness, self.just_fly_off_stiffness
-        if not least < most:  # also where one of them is not a number
-            raise ParameterError(
-                f"leg_angle {self.leg_angle:.6g} rad with max_plantarflexion"
+        if not least < most:  # also if one of them is not a number
+            raise SettingError(
+                f"leg_angle: {self.leg_angle:.6g} rad with max_plantarflexion"
                 f" {self.max_plantarflexion:.6g} rad leaves no gait: the walker falls below an"
                 f" ankle_stiffness of {least:.4g} N m/rad and flies off above {most:.4g} N m/rad"
             )
-        allowed = f"allowed: {least:.6g} to {most:.6g} N m/rad"
+        if least < self.ankle_stiffness < most:
+            return
         if self.ankle_stiffness <= least:
-            raise ParameterError(
-                f"ankle_stiffness {self.ankle_stiffness:g} N m/rad is not above the"
-                f" just-vault-over stiffness: the walker falls for want of"
-                f" {-self.least_kinetic_energy:.3g} J; {allowed}"
+            reason = (
+                "is not above the just-vault-over stiffness: the walker falls for want of"
+                f" {-self.least_kinetic_energy:.3g} J"
             )
-        if self.ankle_stiffness >= most:
-            raise ParameterError(
-                f"ankle_stiffness {self.ankle_stiffness:g} N m/rad is not below the just-fly-off"
-                f" stiffness: the walker flies off, its leading leg would have to pull with"
-                f" {-self.least_leading_force:.3g} N; {allowed}"
+        else:
+            reason = (
+                "is not below the just-fly-off stiffness: the walker flies off, its leading leg"
+                f" would have to pull with {-self.least_leading_force:.3g} N"
             )
+        raise SettingError(
+            f"ankle_stiffness: {self.ankle_stiffness:g} N m/rad {reason};"
+            f" allowed: {least:.6g} to {most:.6g} N m/rad"
+        )
 
     # Linkage
 
@@ -207,6 +200,9 @@ class WalkerParameters:
         """Speed [m/s] of the mass just after a collision in the period-one gait."""
         return self.restitution * self.collision_speed
 
+    # Barrier and ground reaction of the period-one gait. Energies and forces are linear in the
+    # stiffness, so they are kept in two parts: one without it, and one per unit of it.
+
     def _work_per_stiffness(self, ankle: float) -> float:
         """Work of the spring from heel strike to psi, per unit of stiffness [rad^2]."""
         start = self.double_stance_start
@@ -232,46 +228,6 @@ class WalkerParameters:
     @property
     def _apex_height(self) -> float:
         return self.leg_length * geometry.drop(math.sin(self.leg_angle), math.cos(self.leg_angle))
-
-    def _over_double_stance(self, function: Callable[[float], float]) -> float:
-        return greatest(function, self.double_stance_start, self.max_plantarflexion)
-
-    @cached_property
-    def just_vault_over_stiffness(self) -> float:
-        """
-        Stiffness k_C [N m/rad] below which the period-one gait does not vault over.
-
-        Eq. 9 takes the barrier at the apex of single stance; here double stance counts too, which
-        decides where toe-off comes after the apex.
-        """
-        weight = self.mass * self.gravity
-
-        def needed(ankle: float) -> float:
-            return weight * self._height(ankle) / self._energy_per_stiffness(ankle)
-
-        stiffness = self._over_double_stance(needed)
-        if self.toe_off_angle > 0:
-            whole = self._energy_per_stiffness(self.max_plantarflexion)
-            stiffness = max(stiffness, weight * self._apex_height / whole)
-        return stiffness
-
-    @property
-    def least_kinetic_energy(self) -> float:
-        """Kinetic energy [J] at the barrier of the period-one gait; negative if it would fall."""
-        weight = self.mass * self.gravity
-
-        def lacking(ankle: float) -> float:
-            gained = self.ankle_stiffness * self._energy_per_stiffness(ankle)
-            return weight * self._height(ankle) - gained
-
-        energy = -self._over_double_stance(lacking)
-        if self.toe_off_angle > 0:
-            whole = self._energy_per_stiffness(self.max_plantarflexion)
-            energy = min(energy, self.ankle_stiffness * whole - weight * self._apex_height)
-        return energy
-
-    # Ground reaction of the period-one gait: what holds the leading leg down, minus k times what
-    # lifts it.
 
     def _hold(self, ankle: float) -> float:
         """Force [N] on the leading leg at psi of a walker that rises and falls without a push."""
@@ -301,25 +257,62 @@ class WalkerParameters:
     def _lift_before_collision(self) -> float:
         return 2 * self._energy_per_stiffness(self.max_plantarflexion) / self.leg_length
 
+    def _most_on_the_way_up(self, function: Callable[[float, float], float]) -> float:
+        """Greatest value, up to the apex, of a function of potential energy and energy per k."""
+        weight = self.mass * self.gravity
+
+        def at(ankle: float) -> float:
+            return function(weight * self._height(ankle), self._energy_per_stiffness(ankle))
+
+        most = greatest(at, self.double_stance_start, self.max_plantarflexion)
+        if self.toe_off_angle > 0:  # the apex is in single stance
+            whole = self._energy_per_stiffness(self.max_plantarflexion)
+            most = max(most, function(weight * self._apex_height, whole))
+        return most
+
+    def _most_while_leading(self, function: Callable[[float, float], float]) -> float:
+        """Greatest value, while a leg leads or stands, of a function of hold and lift per k."""
+
+        def at(ankle: float) -> float:
+            return function(self._hold(ankle), self._lift_per_stiffness(ankle))
+
+        # In single stance the force is least at its end.
+        return max(
+            greatest(at, self.double_stance_start, self.max_plantarflexion),
+            function(self._hold_before_collision, self._lift_before_collision),
+        )
+
+    @cached_property
+    def just_vault_over_stiffness(self) -> float:
+        """
+        Stiffness k_C [N m/rad] below which the period-one gait does not vault over.
+
+        Eq. 9 takes the barrier at the apex of single stance; here double stance counts too, and
+        decides if toe-off comes after the apex.
+        """
+        return self._most_on_the_way_up(lambda potential, gained: potential / gained)
+
+    @property
+    def least_kinetic_energy(self) -> float:
+        """Kinetic energy [J] at the barrier of the period-one gait; negative if it would fall."""
+        stiffness = self.ankle_stiffness
+        return -self._most_on_the_way_up(lambda potential, gained: potential - stiffness * gained)
+
     @cached_property
     def just_fly_off_stiffness(self) -> float:
-        """
-        Stiffness [N m/rad] above which the leading leg of the period-one gait lifts off.
-
-        The least over double stance, its ends included, and the end of single stance.
-        """
-        stiffness = -self._over_double_stance(
-            lambda ankle: -self._hold(ankle) / self._lift_per_stiffness(ankle)
-        )
-        return min(stiffness, self._hold_before_collision / self._lift_before_collision)
+        """Stiffness [N m/rad] above which the leading leg of the period-one gait lifts off."""
+        return -self._most_while_leading(lambda hold, lift: -hold / lift)
 
     @property
     def least_leading_force(self) -> float:
         """Smallest ground reaction [N] of the leading leg over the period-one gait."""
-        force = -self._over_double_stance(
-            lambda ankle: (
-                self.ankle_stiffness * self._lift_per_stiffness(ankle) - self._hold(ankle)
-            )
+        return -self._most_while_leading(lambda hold, lift: self.ankle_stiffness * lift - hold)
+
+
+def _check_angle(name: str, angle: float, least: float, most: float, why: str) -> None:
+    """Refuse an angle [rad] that is not between two others."""
+    if not least < angle < most:
+        raise SettingError(
+            f"{name}: {angle:.6g} rad is out of range by {max(least - angle, angle - most):.3g}"
+            f" rad; allowed: {least:.6g} to {most:.6g} rad ({why})"
         )
-        struck = self._hold_before_collision - self.ankle_stiffness * self._lift_before_collision
-        return min(force, struck)

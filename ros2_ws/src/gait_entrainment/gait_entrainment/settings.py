@@ -9,8 +9,10 @@ files, command-line options, driver options and ROS parameters are all read by `
 ``Setting.parse``, so that the same mistake gets the same answer everywhere.
 """
 
+import contextlib
 import math
 from dataclasses import dataclass, field, fields
+from enum import Enum
 from typing import Any
 
 from gait_entrainment.errors import UsageError
@@ -22,34 +24,44 @@ class SettingError(UsageError):
 
 @dataclass(frozen=True)
 class Setting:
-    """What may be set: a number within bounds, a whole number, a switch, or a text."""
+    """What may be set: a number within bounds, a whole number, a switch, a choice or a text."""
 
     meaning: str
-    kind: type = float  # float, int, bool or str
+    kind: type = float  # float, int, bool, str or an enumeration
     unit: str = ""  # "1" if the number has none
     least: float = -math.inf
     most: float = math.inf
     least_excluded: bool = False
     most_excluded: bool = False
     choices: tuple[str, ...] = ()  # the texts that are allowed; empty allows any
+    plain: bool = False  # whether the text must do as the name of a folder
+    optional: bool = False  # whether None is allowed
 
     @property
     def allowed(self) -> str:
         """What is allowed, in words."""
+        if issubclass(self.kind, Enum):
+            return ", ".join(member.name.lower() for member in self.kind)
         if self.choices:
             return ", ".join(self.choices)
         if self.kind is bool:
             return "true, false"
         if self.kind is str:
-            return "a text"
-        bounds = []
-        if self.least > -math.inf:
-            bounds.append(f"{'above' if self.least_excluded else 'at least'} {self.least:g}")
-        if self.most < math.inf:
-            bounds.append(f"{'below' if self.most_excluded else 'at most'} {self.most:g}")
+            return "a plain name" if self.plain else "a text"
         number = "a whole number " if self.kind is int else ""
         unit = f" {self.unit}" if self.unit not in ("", "1") else ""
-        return number + (" and ".join(bounds) or "any finite number") + unit
+        return number + self._bounds() + unit
+
+    def _bounds(self) -> str:
+        least, most = (f"{b}" if isinstance(b, int) else f"{b:g}" for b in (self.least, self.most))
+        bounds = []
+        if self.least > -math.inf:
+            bounds.append(f"{'above' if self.least_excluded else 'at least'} {least}")
+        if self.most < math.inf:
+            bounds.append(f"{'below' if self.most_excluded else 'at most'} {most}")
+        if len(bounds) == 2 and not (self.least_excluded or self.most_excluded):
+            return f"from {least} to {most}" if self.kind is int else f"{least} to {most}"
+        return " and ".join(bounds) or "any finite number"
 
     def check(self, name: str, value: object) -> Any:
         """
@@ -61,30 +73,45 @@ class Setting:
             if it is of another kind, not finite, or out of range.
 
         """
-        given = value
-        if self.kind is float and isinstance(value, int) and not isinstance(value, bool):
-            # A whole number too large for a float is beyond every bound.
-            value = float(value) if abs(value) < 2**1000 else math.copysign(math.inf, value)
-        if type(value) is not self.kind or not self._within(value):
-            raise SettingError(f"{name}: {given!r}; allowed: {self.allowed}")
+        if value is None and self.optional:
+            return None
+        switch = isinstance(value, bool)  # which Python takes for a whole number
+        if self.kind is float and isinstance(value, int | float) and not switch:
+            try:
+                value = float(value)
+            except OverflowError:  # a whole number with hundreds of digits
+                value = math.inf if value > 0 else -math.inf
+        fits = isinstance(value, self.kind) and switch == (self.kind is bool)
+        if not fits or not self._within(value):
+            raise SettingError(f"{name}: {value!r}; allowed: {self.allowed}")
         return value
 
     def parse(self, name: str, text: str) -> Any:
         """Return the value that a text stands for; raises SettingError as ``check`` does."""
-        value: object = text
-        if self.kind is bool:
-            value = {"true": True, "false": False}.get(text, text)
-        elif self.kind is not str:
-            try:
-                value = self.kind(text)
-            except ValueError:
-                value = text
-        return self.check(name, value)
+        kind: Any = self.kind
+        value = None
+        if kind is str:
+            value = text
+        elif kind is bool:
+            value = {"true": True, "false": False}.get(text)
+        elif issubclass(kind, Enum):
+            value = kind.__members__.get(text.upper())
+        else:
+            with contextlib.suppress(ValueError):
+                value = kind(text)
+        try:
+            return self.check(name, text if value is None else value)
+        except SettingError:
+            raise SettingError(f"{name}: {text!r}; allowed: {self.allowed}") from None
 
     def _within(self, value: Any) -> bool:
-        if self.kind is str:
-            return not self.choices or value in self.choices
-        if self.kind is bool:
+        if self.choices:
+            return value in self.choices
+        if self.plain:  # no separator, not hidden, nothing that cannot be seen
+            return bool(value.isprintable() and value.strip()) and not (
+                "/" in value or value.startswith(".")
+            )
+        if self.kind not in (int, float):
             return True
         above = value > self.least if self.least_excluded else value >= self.least
         below = value < self.most if self.most_excluded else value <= self.most
@@ -107,10 +134,12 @@ def setting(
 
 def settings_of(dataclass_type: Any) -> dict[str, Setting]:
     """Return what can be set of a dataclass, by the names of its fields."""
-    return {f.name: f.metadata["setting"] for f in fields(dataclass_type)}
+    return {
+        f.name: f.metadata["setting"] for f in fields(dataclass_type) if "setting" in f.metadata
+    }
 
 
 def check_settings(instance: Any) -> None:
-    """Check every field of a dataclass, as its ``__post_init__``; floats become floats."""
+    """Check every setting of a dataclass, as its ``__post_init__``; floats become floats."""
     for name, told in settings_of(type(instance)).items():
         object.__setattr__(instance, name, told.check(name, getattr(instance, name)))

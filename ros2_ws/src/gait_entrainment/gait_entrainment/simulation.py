@@ -17,9 +17,9 @@ from gait_entrainment.protocol import Protocol
 from gait_entrainment.robot import (
     DeviceLimits,
     LimitError,
+    MeasuredOnsets,
     PulseTiming,
     PulseTrain,
-    TimingAudit,
     find_driver,
 )
 from gait_entrainment.walker import Ending, WalkerRun
@@ -79,14 +79,16 @@ def simulate(
     run = WalkerRun(protocol.walker, first_heel_strike=protocol.side, sample_rate=None)
     events: list[GaitEvent] = []
     onsets: list[int] = []
-    audit, timings = TimingAudit(), []
+    measured = MeasuredOnsets()
     while not run.ended:
         horizon = conductor.horizon(run.reached)
         profile = robot.promise(horizon.until)
         onsets += profile.onsets
+        measured.add_promise(profile.onsets, profile.valid_until)
         for onset in profile.onsets:
-            audit.add_pulse(onset, protocol.pulse_torque, protocol.pulses.width)
-        timings += audit.add_states(robot.read())
+            measured.add_pulse(onset, protocol.pulse_torque, protocol.pulses.width)
+        for state in robot.read():
+            measured.add_state(state)
         run.accept(profile)
         for transition in run.advance(horizon.until, last=horizon.last).transitions:
             event = GaitEvent(transition.stamp, transition.kind, transition.side, transition.step)
@@ -94,14 +96,14 @@ def simulate(
             train = conductor.add_event(event)
             if train is not None:
                 robot.schedule(train)
-    timings += audit.finish()
+    measured.finish()
     if measured_onsets:
-        onsets = [timing.onset for timing in timings]
+        onsets = [timing.onset for timing in measured.timings]
     return Simulation(
         protocol=protocol,
         events=tuple(events),
         onsets=tuple(onsets),
-        timings=tuple(timings),
+        timings=tuple(measured.timings),
         train=conductor.train,
         measured_period=conductor.measured_period,
         ending=run.ending,

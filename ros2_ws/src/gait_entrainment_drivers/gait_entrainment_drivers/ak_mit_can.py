@@ -4,11 +4,12 @@
 """Driver of a CubeMars AK motor in MIT mode on any bus that python-can knows."""
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
-from gait_entrainment.conventions import Side, setting
+from gait_entrainment.conventions import Side
 from gait_entrainment.robot.faults import DeviceError, Fault
+from gait_entrainment.settings import setting
 from gait_entrainment_drivers.ak_mit import (
     ENTER,
     EXIT,
@@ -28,10 +29,7 @@ from gait_entrainment_drivers.host_loop import Reading
 class AkMitCanOptions(CanMotorOptions):
     """Bus, motor and transmission."""
 
-    motor: str = field(
-        default="AK80-9",
-        metadata={"meaning": "type, which fixes the ranges", "unit": "", "choices": tuple(MOTORS)},
-    )
+    motor: str = setting("AK80-9", "type, which fixes the ranges", choices=tuple(MOTORS))
     motor_id: int = setting(1, "id of the motor", "", (1, 127))
 
 

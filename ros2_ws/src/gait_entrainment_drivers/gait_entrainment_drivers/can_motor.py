@@ -6,12 +6,13 @@
 import contextlib
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
 
-from gait_entrainment.conventions import Side, setting
+from gait_entrainment.conventions import Side
 from gait_entrainment.robot.contract import Capabilities
 from gait_entrainment.robot.faults import DeviceError, LimitError
+from gait_entrainment.settings import setting
 from gait_entrainment_drivers.can_bus import open_bus
 from gait_entrainment_drivers.host_loop import HostTimedRobot
 
@@ -27,10 +28,8 @@ _ASK_PERIOD = 0.05
 class CanMotorOptions:
     """Bus, transmission and loop."""
 
-    interface: str = field(
-        default="socketcan", metadata={"meaning": "python-can interface", "unit": ""}
-    )
-    channel: str = field(default="can0", metadata={"meaning": "channel of the bus", "unit": ""})
+    interface: str = setting("socketcan", "python-can interface")
+    channel: str = setting("can0", "channel of the bus")
     port: int = setting(0, "UDP port of udp_multicast; 0 is python-can's own", "", (0, 65535))
     bitrate: int = setting(1_000_000, "of the bus", "bit/s", (10_000, 1_000_000))
     ratio: float = setting(
@@ -71,7 +70,6 @@ class CanMotorRobot(HostTimedRobot):
         self.capabilities = Capabilities(
             peak_torque=motor_torque * abs(options.ratio),
             torque_rate=float("inf"),
-            own_pulse_timer=False,
             measures_torque=True,
             simulated=False,
             state_rate=options.rate,

@@ -27,8 +27,9 @@ from gait_entrainment.robot.drivers import Driver
 from gait_entrainment.robot.faults import DeviceError, LimitError
 from gait_entrainment.robot.guard import GuardedRobot
 from gait_entrainment.robot.limits import DeviceLimits
+from gait_entrainment.robot.measured_onsets import MeasuredOnsets
 from gait_entrainment.robot.pulse_train import PulseTrain
-from gait_entrainment.robot.timing import PulseTiming, TimingAudit, quantile
+from gait_entrainment.robot.timing import quantile
 
 _SIDE = Side.RIGHT
 # A robot in simulated time is promised in stretches of this length [ns]: not a multiple of any
@@ -219,7 +220,7 @@ def construction(bench: Bench) -> None:
     if not is_dataclass(options):
         raise BrokenPromiseError("Options is no dataclass.")
     for option in fields(options):
-        if not {"meaning", "unit"} <= set(option.metadata):
+        if "setting" not in option.metadata:
             raise BrokenPromiseError(
                 f"The option {option.name} does not tell its meaning and unit."
             )
@@ -519,11 +520,14 @@ def timing(bench: Bench) -> None:
     train = bench.train(count=count, duration=0.12, period=0.3)
     bench.robot.schedule(train)
     bench.run(_LEAD + count * train.period + 0.3)
-    audit = TimingAudit()
+    onsets = MeasuredOnsets()
+    onsets.add_promise([train.onset(number) for number in range(count)], train.onset(count))
     for number in range(count):
-        audit.add_pulse(train.onset(number), train.torque, train.duration)
-    timings: list[PulseTiming] = [*audit.add_states(bench.states), *audit.finish()]
-    measured = [t.measured - t.commanded for t in timings if t.measured is not None]
+        onsets.add_pulse(train.onset(number), train.torque, train.duration)
+    for state in bench.states:
+        onsets.add_state(state)
+    onsets.finish()
+    measured = [t.measured - t.commanded for t in onsets.timings if t.measured is not None]
     if len(measured) < count:
         raise BrokenPromiseError(f"{count - len(measured)} of {count} pulses show in no state.")
     late = sorted(onset / NANOSECONDS_PER_SECOND for onset in measured)

@@ -8,8 +8,9 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
-from gait_entrainment.conventions import Side, setting
+from gait_entrainment.conventions import Side
 from gait_entrainment.robot.faults import DeviceError
+from gait_entrainment.settings import setting
 from gait_entrainment_drivers.can_motor import ANSWER_TIMEOUT, CanMotorOptions, CanMotorRobot
 from gait_entrainment_drivers.host_loop import Reading
 from gait_entrainment_drivers.odrive import (

@@ -12,7 +12,7 @@ import can
 import pytest
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.robot import DeviceError, LimitError, PulseTrain, TimingAudit, find_driver
+from gait_entrainment.robot import DeviceError, LimitError, MeasuredOnsets, PulseTrain, find_driver
 from gait_entrainment_drivers.ak_mit import ENTER, EXIT, MOTORS, Command, pack_command
 from gait_entrainment_drivers.ak_mit_can import AkMitCanOptions, AkMitCanRobot
 from gait_entrainment_drivers.ak_motor_emulator import EmulatedAkMotor
@@ -78,11 +78,14 @@ def test_pulses_arrive_and_are_measured(reply_bytes, tmp_path):
     impulse = sum((end - begin) / 1e9 * torque for begin, end, torque in pieces)
     # Two pulses of 8 N m and 0.15 s, up to the ticks of the loop and frames that were lost.
     assert impulse == pytest.approx(2 * 8 * 0.15, rel=0.15)
-    audit = TimingAudit()
+    measured = MeasuredOnsets()
+    measured.add_promise(onsets, states[-1].stamp)
     for onset in onsets:
-        audit.add_pulse(onset, 8.0, 0.15)
-    timings = [*audit.add_states(states), *audit.finish()]
-    for timing in timings:
+        measured.add_pulse(onset, 8.0, 0.15)
+    for state in states:
+        measured.add_state(state)
+    measured.finish()
+    for timing in measured.timings:
         assert timing.commanded <= timing.sent
         # Interpolated between two states: a motor that answers within the tick in which it was
         # told is placed up to a tick earlier.
@@ -208,7 +211,7 @@ def test_a_host_that_ends_by_itself_leaves_zero_torque(end, tmp_path):
     ("options", "words"),
     [
         ("motor=AK70-9", "motor: 'AK70-9'; allowed: AK60-6, AK70-10"),
-        ("motor_id=0", "motor_id: '0'; allowed: 1 to 127"),
+        ("motor_id=0", "motor_id: '0'; allowed: a whole number from 1 to 127"),
         ("motor_id=one", "motor_id: 'one'"),
         ("ratio=0", "ratio: 0"),
         ("rate=5000", "rate: '5000'"),

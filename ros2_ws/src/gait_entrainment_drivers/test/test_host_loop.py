@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.robot import Capabilities, DeviceError, Fault, PulseTrain
-from gait_entrainment.robot.guard import GuardedRobot, contract_breach
+from gait_entrainment.robot.guard import GuardedRobot
 from gait_entrainment_drivers.host_loop import HostTimedRobot, Reading
 
 from .emulator_process import until
@@ -32,7 +32,7 @@ class Echo(HostTimedRobot):
     """A device that measures what it was asked for; a test can hold it up."""
 
     Options = NoOptions
-    capabilities = Capabilities(50.0, math.inf, False, True, False, 500.0)
+    capabilities = Capabilities(50.0, math.inf, True, False, 500.0)
 
     def __init__(self, lateness=0.5):
         super().__init__(Side.LEFT, rate=500.0, silence=5.0, lateness=lateness)
@@ -100,7 +100,7 @@ def test_each_sample_holds_until_the_next_however_it_is_asked_for(gaps, torques,
     told, begin = {}, 10
     for cut in [*sorted(c for c in cuts if c >= 10), 200]:
         profile = device.promise(max(cut, begin))
-        assert contract_breach(profile, begin, max(cut, begin)) == ""
+        profile.check(begin, max(cut, begin))
         begin = profile.valid_until
         ends = [*profile.times[1:], profile.valid_until]
         for start, end, torque in zip(profile.times, ends, profile.torques, strict=True):

@@ -4,45 +4,17 @@
 """Options that name a protocol and change single fields of it, for every command that runs one."""
 
 import argparse
-from dataclasses import fields
 from enum import Enum
 from operator import attrgetter
 
-from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment.protocol import DEFAULT_PROTOCOL, Protocol, read_protocol
+from gait_entrainment.protocol import DEFAULT_PROTOCOL, FIELDS, Protocol, read_protocol
 
-# Option -> (field of the protocol, type, what it says in the help)
-_OPTIONS = {
-    "--period-offset": ("pulses.period_offset", float, "pulse period minus stride period [s]"),
-    "--period": ("pulses.period", float, "pulse period [s], instead of an offset"),
-    "--initial-phase": (
-        "pulses.initial_phase",
-        float,
-        "first pulse, as a fraction of a stride after the baseline [0, 1)",
-    ),
-    "--torque": ("pulses.torque", float, "height of the pulses [N m], plantarflexion positive"),
-    "--torque-fraction": (
-        "pulses.torque_fraction",
-        float,
-        "the same as a fraction of the peak ankle torque, -1 to 1",
-    ),
-    "--width": ("pulses.width", float, "duration of a pulse [s]"),
-    "--baseline": ("baseline", int, "strides before the pulses"),
-    "--pulses": ("pulses.count", int, "number of pulses"),
-    "--washout": ("washout", int, "strides after the strides of the pulses"),
-    "--side": ("side", str, "the perturbed leg: left or right"),
-    "--name": ("name", str, "name of the experiment"),
-    "--driver": ("driver", str, "ankle robot driver, as entrain driver list has them"),
-    "--seed": ("seed", int, "seed of whatever is random"),
-    **{
-        "--" + f.name.replace("_", "-"): (
-            f"walker.{f.name}",
-            float,
-            f"{f.metadata['meaning']} [{f.metadata['unit']}]",
-        )
-        for f in fields(WalkerParameters)
-    },
-}
+
+def _option(field: str) -> str:
+    """Return the option that changes a field of the protocol."""
+    if field == "pulses.count":
+        return "--pulses"
+    return "--" + field.rpartition(".")[2].replace("_", "-")
 
 
 def add_protocol_options(parser: argparse.ArgumentParser) -> None:
@@ -51,12 +23,13 @@ def add_protocol_options(parser: argparse.ArgumentParser) -> None:
         "protocol", nargs="?", metavar="PROTOCOL.yaml", help="default: the paper's example"
     )
     group = parser.add_argument_group("fields of the protocol")
-    for option, (field, kind, text) in _OPTIONS.items():
+    for field, told in FIELDS.items():
+        unit = f" [{told.unit}]" if told.unit not in ("", "1") else ""
+        kind = str if issubclass(told.kind, Enum) else told.kind
         group.add_argument(
-            option,
+            _option(field),
             dest=field,
-            type=kind,
-            help=text + _default_text(field),
+            help=told.meaning + unit + _default_text(field),
             metavar=kind.__name__.upper(),
         )
 
@@ -82,8 +55,6 @@ def chosen_protocol(options: argparse.Namespace) -> Protocol:
     """
     given = vars(options)
     overrides = {
-        field: (given[field], option)
-        for option, (field, _, _) in _OPTIONS.items()
-        if given[field] is not None
+        field: (given[field], _option(field)) for field in FIELDS if given[field] is not None
     }
     return read_protocol(options.protocol, overrides)

@@ -17,12 +17,13 @@ import statistics
 from bisect import bisect_left
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
-from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, setting
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment.gait.drift import drift_of
 from gait_entrainment.gait.pulse_phase import PulsePhase
 from gait_entrainment.gait.strides import Stride
+from gait_entrainment.settings import check_settings, setting
 
 
 class Verdict(enum.IntEnum):
@@ -37,15 +38,7 @@ class Verdict(enum.IntEnum):
 
 @dataclass(frozen=True)
 class VerdictSettings:
-    """
-    Every number in the verdict.
-
-    Raises
-    ------
-    ValueError
-        names the field that is out of range and the range.
-
-    """
+    """Every number in the verdict; raises SettingError for one that is out of range."""
 
     window: int = setting(20, "latest pulses judged at a time", "1", (5, 1000))
     confidence: float = setting(
@@ -98,12 +91,8 @@ class VerdictSettings:
     )
 
     def __post_init__(self) -> None:
-        """Hold each field against its range."""
-        for f in fields(self):
-            value, (low, high) = getattr(self, f.name), f.metadata["range"]
-            if not low <= value <= high or (f.type is int and value != int(value)):
-                kind = "a whole number from " if f.type is int else ""
-                raise ValueError(f"{f.name}: {value!r}; allowed: {kind}{low} to {high}")
+        """Check every field."""
+        check_settings(self)
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,11 +3,12 @@
 
 """What an experiment shall do: the protocol file, validated."""
 
-from gait_entrainment.protocol.protocol import Protocol, ProtocolError, PulsePlan
+from gait_entrainment.protocol.protocol import FIELDS, Protocol, ProtocolError, PulsePlan
 from gait_entrainment.protocol.reader import DEFAULT_PROTOCOL, read_protocol, write_protocol
 
 __all__ = [
     "DEFAULT_PROTOCOL",
+    "FIELDS",
     "Protocol",
     "ProtocolError",
     "PulsePlan",

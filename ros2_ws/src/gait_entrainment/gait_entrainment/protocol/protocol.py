@@ -10,12 +10,18 @@ peak ankle torque, at a period 50 ms below the walker's own stride period.
 
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side, nanoseconds
+from gait_entrainment.errors import UsageError
 from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment.settings import Setting, check_settings, setting, settings_of
+
+# A million strides are three weeks of walking: no run is longer.
+_MOST = 1_000_000
 
 
-class ProtocolError(ValueError):
+class ProtocolError(UsageError):
     """A protocol that cannot be conducted; the message says place, field and what is allowed."""
 
 
@@ -28,13 +34,42 @@ class PulsePlan:
     ``period_offset``, is given; the other is None.
     """
 
-    count: int = 50  # number of pulses
-    width: float = 0.1  # duration of each pulse [s]
-    torque: float | None = None  # height [N m], plantarflexion positive
-    torque_fraction: float | None = 0.1  # height as a fraction of the walker's peak ankle torque
-    period: float | None = None  # from onset to onset [s]
-    period_offset: float | None = -0.05  # period minus the stride period of the baseline [s]
-    initial_phase: float = 0.0  # place of the first pulse in the stride after the baseline, [0, 1)
+    count: int = setting(50, "number of pulses", within=(1, _MOST))
+    # A pulse shorter than a nanosecond has no stamps.
+    width: float = setting(0.1, "duration of a pulse", "s", (1e-9, 10.0))
+    torque: float | None = setting(
+        None, "height of the pulses, plantarflexion positive", "N m", kind=float, optional=True
+    )
+    torque_fraction: float | None = setting(
+        0.1, "the same as a fraction of the peak ankle torque", "1", (-1.0, 1.0), optional=True
+    )
+    # Until the stride period is measured, the experiment proceeds by at most a pulse period.
+    period: float | None = setting(
+        None,
+        "pulse period, from onset to onset, instead of an offset",
+        "s",
+        (1e-3, 100.0),
+        kind=float,
+        optional=True,
+    )
+    period_offset: float | None = setting(
+        -0.05,
+        "pulse period minus the stride period of the baseline",
+        "s",
+        (-100.0, 100.0),
+        optional=True,
+    )
+    initial_phase: float = setting(
+        0.0,
+        "place of the first pulse in the stride after the baseline",
+        "1",
+        (0.0, 1.0),
+        most_excluded=True,
+    )
+
+    def __post_init__(self) -> None:
+        """Check every field by itself; Protocol checks what concerns several."""
+        check_settings(self)
 
     def period_for(self, measured_period: float) -> float:
         """
@@ -43,7 +78,7 @@ class PulsePlan:
         Raises
         ------
         ProtocolError
-            where successive pulses would overlap.
+            if successive pulses would overlap.
 
         """
         if self.period is not None:
@@ -64,14 +99,16 @@ class PulsePlan:
 class Protocol:
     """One experiment, complete: what read_protocol returns and what a bag keeps."""
 
-    name: str = "paper_example"  # names the bag folder
-    side: Side = Side.RIGHT  # the perturbed leg
-    baseline: int = 15  # unperturbed strides at the start
+    name: str = setting("paper_example", "name of the experiment, and of its bag", plain=True)
+    side: Side = setting(Side.RIGHT, "the perturbed leg: left or right")
+    baseline: int = setting(15, "unperturbed strides before the pulses", within=(1, _MOST))
     pulses: PulsePlan = field(default_factory=PulsePlan)
-    washout: int = 15  # strides after the strides of the pulses
+    washout: int = setting(15, "strides after the strides of the pulses", within=(0, _MOST))
     walker: WalkerParameters = field(default_factory=WalkerParameters)
-    driver: str = "ideal"  # ankle robot driver
-    seed: int = 0  # for drivers and walkers that draw random numbers
+    driver: str = setting(
+        "ideal", "ankle robot driver, as entrain driver list has them", plain=True
+    )
+    seed: int = setting(0, "seed of whatever is random", within=(0, 2**63 - 1))
 
     @property
     def strides(self) -> int:
@@ -87,7 +124,8 @@ class Protocol:
         return self.pulses.torque_fraction * self.walker.peak_torque
 
     def __post_init__(self) -> None:
-        """Check what concerns more than one field; the reader checks each field by itself."""
+        """Check every field, and what concerns more than one."""
+        check_settings(self)
         plan = self.pulses
         if (plan.torque is None) == (plan.torque_fraction is None):
             raise ProtocolError("pulses: give either torque or torque_fraction")
@@ -100,3 +138,12 @@ class Protocol:
                 f"baseline: {self.baseline} leaves no complete stride to measure period_offset "
                 "from; allowed: at least 2, or at least 1 with an absolute period"
             )
+
+
+SECTIONS: dict[str, type[Any]] = {"pulses": PulsePlan, "walker": WalkerParameters}
+# All fields of a protocol, by the names that files and messages use: "pulses.width".
+FIELDS: dict[str, Setting] = settings_of(Protocol) | {
+    f"{section}.{name}": told
+    for section, content in SECTIONS.items()
+    for name, told in settings_of(content).items()
+}

@@ -7,79 +7,29 @@ Protocol files: YAML in, a validated Protocol out, with the line of whatever is 
 PyYAML's node graph keeps the line of every key, which its loaded dictionaries do not.
 """
 
-import contextlib
-import math
-import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import yaml
 
-from gait_entrainment.conventions import Side
-from gait_entrainment.parameters import ParameterError, WalkerParameters
-from gait_entrainment.protocol.protocol import Protocol, ProtocolError, PulsePlan
+from gait_entrainment.parameters import ParameterError
+from gait_entrainment.protocol.protocol import FIELDS, SECTIONS, Protocol, ProtocolError
+from gait_entrainment.settings import SettingError
 
 DEFAULT_PROTOCOL = Protocol()
 
-
-@dataclass(frozen=True)
-class _Entry:
-    value: object
-    where: str  # file and line, or the command-line option that set it
-
-
-@dataclass(frozen=True)
-class _Range:
-    """What a number may be: bounds, open or closed, with the unit for the message."""
-
-    low: float = -math.inf
-    high: float = math.inf
-    low_open: bool = False
-    high_open: bool = False
-    unit: str = ""
-
-    def __contains__(self, value: float) -> bool:
-        above = value > self.low if self.low_open else value >= self.low
-        below = value < self.high if self.high_open else value <= self.high
-        return math.isfinite(value) and above and below
-
-    def __str__(self) -> str:
-        bounds = []
-        if math.isfinite(self.low):
-            bounds.append(("above " if self.low_open else "at least ") + f"{self.low:g}")
-        if math.isfinite(self.high):
-            bounds.append(("below " if self.high_open else "at most ") + f"{self.high:g}")
-        unit = f" {self.unit}" if self.unit else ""
-        return (" and ".join(bounds) or "any finite number") + unit
-
-
-# Counts end where a run would last for days: a million strides are three weeks of walking. A pulse
-# shorter than a nanosecond has no stamps, and a run is promised in steps of at most a pulse period
-# until the stride period is known.
-_COUNT = _Range(1, 1_000_000)
-_RANGES = {
-    "baseline": _COUNT,
-    "washout": _Range(0, 1_000_000),
-    "seed": _Range(0, 2**63 - 1),
-    "pulses.count": _COUNT,
-    "pulses.width": _Range(1e-9, 10, unit="s"),
-    "pulses.torque": _Range(unit="N m"),
-    "pulses.torque_fraction": _Range(-1, 1, unit="of the peak ankle torque"),
-    "pulses.period": _Range(1e-3, 100, unit="s"),
-    "pulses.period_offset": _Range(-100, 100, unit="s"),
-    "pulses.initial_phase": _Range(0, 1, high_open=True),
-}
-_INTEGERS = {"baseline", "washout", "seed", "pulses.count"}
-_TEXTS = {"name", "driver"}
-_WALKER_FIELDS = [f"walker.{f.name}" for f in fields(WalkerParameters)]
-_FIELDS = {*_RANGES, *_TEXTS, *_WALKER_FIELDS, "side"}
 # Of two ways to say the same, the one that is given replaces the other.
 _ALTERNATIVES = (
     ("pulses.torque", "pulses.torque_fraction"),
     ("pulses.period", "pulses.period_offset"),
 )
+
+
+class _Entry(NamedTuple):
+    value: object
+    where: str  # file and line, or the command-line option that set it
 
 
 def read_protocol(
@@ -94,7 +44,7 @@ def read_protocol(
         Path of a YAML file, the text of one (with a line break), or None for the default.
     overrides
         Values that replace those of the file: dotted field name -> (value, who says so), for
-        instance ``{"pulses.width": (0.2, "--width")}``.
+        instance ``{"pulses.width": (0.2, "--width")}``. A text is read as what it stands for.
 
     Raises
     ------
@@ -103,17 +53,16 @@ def read_protocol(
 
     """
     entries = dict(_entries(source)) if source is not None else {}
-    overrides = overrides or {}
+    replacing = {key: _Entry(*given) for key, given in (overrides or {}).items()}
     for pair in _ALTERNATIVES:
-        if any(key in overrides for key in pair):
-            for alternative in pair:
-                entries.pop(alternative, None)
-    entries |= {key: _Entry(*given) for key, given in overrides.items()}
-    for pair in _ALTERNATIVES:
-        if all(key in entries for key in pair):
-            where = entries[pair[1]].where
+        if any(key in replacing for key in pair):
+            for key in pair:
+                entries.pop(key, None)
+    entries |= replacing
+    for first, second in _ALTERNATIVES:
+        if first in entries and second in entries:
             raise ProtocolError(
-                f"{where}: {pair[1]}: give either {pair[0]} or {pair[1]}, not both"
+                f"{entries[second].where}: {second}: give either {first} or {second}, not both"
             )
     return _build(entries)
 
@@ -164,21 +113,18 @@ def _walk(node: yaml.Node, name: str, prefix: str) -> Iterator[tuple[str, _Entry
         if key in seen:
             raise ProtocolError(f"{where}: {key}: appears twice; keep one")
         seen.add(key)
-        if key in ("pulses", "walker"):
+        if key in SECTIONS:
             yield from _walk(value_node, name, key + ".")
-        elif key not in _FIELDS or "." in str(key_node.value):  # a section's field has one place
-            known = ", ".join(
-                sorted(f[len(prefix) :] for f in _FIELDS if f.startswith(prefix) and f != prefix)
-                if prefix
-                else sorted({f.split(".")[0] for f in _FIELDS})
-            )
+        elif key not in FIELDS or "." in str(key_node.value):  # a section's field has one place
+            inside = [field.removeprefix(prefix) for field in FIELDS if field.startswith(prefix)]
+            known = ", ".join(sorted({field.partition(".")[0] for field in inside}))
             raise ProtocolError(f"{where}: {key}: unknown field; allowed: {known}")
         elif not isinstance(value_node, yaml.ScalarNode):
             raise ProtocolError(f"{where}: {key}: must be a single value")
         else:
             try:
                 value = yaml.SafeLoader("").construct_object(value_node)
-            except Exception:  # an unknown tag, a month 13: PyYAML lets pass what it runs into
+            except Exception:  # an unknown tag, a month 13: PyYAML passes on what it runs into
                 raise ProtocolError(
                     f"{where}: {key}: {value_node.value[:40]!r} cannot be read as a value"
                 ) from None
@@ -186,57 +132,32 @@ def _walk(node: yaml.Node, name: str, prefix: str) -> Iterator[tuple[str, _Entry
 
 
 def _build(entries: Mapping[str, _Entry]) -> Protocol:
-    values = {key: _checked(key, entry) for key, entry in entries.items()}
-    sections: dict[str, dict[str, Any]] = {"": {}, "pulses": {}, "walker": {}}
-    for key, value in values.items():
-        section, _, field_name = key.rpartition(".")
-        sections[section][field_name] = value
+    sections: dict[str, dict[str, Any]] = {"": {}, **{section: {} for section in SECTIONS}}
+    for key, (value, where) in entries.items():
+        told, (section, _, name) = FIELDS[key], key.rpartition(".")
+        try:
+            # YAML 1.1 reads 1e-3, which has no dot, as a text.
+            read = told.parse(key, value) if isinstance(value, str) else told.check(key, value)
+            sections[section][name] = read
+        except SettingError as error:
+            raise ProtocolError(f"{where}: {error}") from None
     # A torque or a period that is given leaves no place for the default of its alternative.
     for pair in _ALTERNATIVES:
         for given, default in (pair, pair[::-1]):
-            if given in values:
+            if given in entries:
                 sections["pulses"][default.partition(".")[2]] = None
+    values = sections.pop("")
     try:
-        return Protocol(
-            pulses=PulsePlan(**sections["pulses"]),
-            walker=WalkerParameters(**sections["walker"]),
-            **sections[""],
-        )
+        values |= {name: SECTIONS[name](**content) for name, content in sections.items()}
+        return Protocol(**values)
     except ParameterError as error:
-        # The message begins with the field; where that is a default, the others are at fault.
-        named = f"walker.{str(error).split()[0]}"
-        present = [key for key in _WALKER_FIELDS if key in entries]
+        # The message begins with the field; if that is a default, the others are at fault.
+        named = f"walker.{str(error).partition(':')[0]}"
+        present = [key for key in entries if key.startswith("walker.")]
         places = [entries[key].where for key in ([named] if named in present else present)]
-        raise ProtocolError(f"{', '.join(places)}: walker: {error}") from None
+        raise ProtocolError(f"{', '.join(dict.fromkeys(places))}: walker: {error}") from None
     except ProtocolError as error:
-        # What is wrong may lie in a default; then the field that does not go with it is at fault.
+        # What is wrong may be a default; then the field that does not go with it is at fault.
         suspects = (str(error).partition(":")[0], "pulses.period")
         place = next((entries[key].where + ": " for key in suspects if key in entries), "")
         raise ProtocolError(f"{place}{error}") from None
-
-
-def _checked(key: str, entry: _Entry) -> object:
-    value = entry.value
-    if key == "side":
-        if str(value).lower() not in ("left", "right"):
-            raise ProtocolError(f"{entry.where}: side: {value!r}; allowed: left, right")
-        return Side[str(value).upper()]
-    if key in _TEXTS:
-        # The name becomes a folder's: no separators, nothing hidden, nothing empty or unseen.
-        plain = isinstance(value, str) and value.isprintable() and value.strip()
-        if not plain or "/" in str(value) or str(value).startswith("."):
-            raise ProtocolError(f"{entry.where}: {key}: {value!r}; allowed: a plain name")
-        return value
-    allowed = _RANGES.get(key, _Range())
-    if isinstance(value, str):  # YAML 1.1 reads 1e-3, which has no dot, as text
-        with contextlib.suppress(ValueError):
-            value = float(value)
-    elif isinstance(value, int) and abs(value) > sys.float_info.max:
-        value = math.copysign(math.inf, 1 if value > 0 else -1)
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ProtocolError(f"{entry.where}: {key}: {value!r} is not a number; allowed: {allowed}")
-    if key in _INTEGERS and not isinstance(value, int):
-        raise ProtocolError(f"{entry.where}: {key}: {value!r}; allowed: a whole number {allowed}")
-    if value not in allowed:
-        raise ProtocolError(f"{entry.where}: {key}: {value}; allowed: {allowed}")
-    return value if key in _INTEGERS else float(value)

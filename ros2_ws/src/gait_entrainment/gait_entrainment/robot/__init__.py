@@ -9,9 +9,9 @@ from gait_entrainment.robot.faults import DeviceError, Fault, LimitError
 from gait_entrainment.robot.guard import GuardedRobot
 from gait_entrainment.robot.limits import DeviceLimits
 from gait_entrainment.robot.measured_onsets import MeasuredOnsets
-from gait_entrainment.robot.profile import TorqueProfile
+from gait_entrainment.robot.profile import ProfileError, TorqueProfile
 from gait_entrainment.robot.pulse_train import PulseTrain
-from gait_entrainment.robot.timing import PulseTiming, TimingAudit, measured_onset
+from gait_entrainment.robot.timing import PulseTiming, measured_onset
 
 __all__ = [
     "AnkleRobot",
@@ -23,10 +23,10 @@ __all__ = [
     "GuardedRobot",
     "LimitError",
     "MeasuredOnsets",
+    "ProfileError",
     "PulseTiming",
     "PulseTrain",
     "RobotState",
-    "TimingAudit",
     "TorqueProfile",
     "driver_names",
     "find_driver",

@@ -20,7 +20,6 @@ class Capabilities:
 
     peak_torque: float  # [N m]; inf where it has no limit of its own
     torque_rate: float  # steepest change of torque [N m/s]; inf for a jump
-    own_pulse_timer: bool  # times its pulses itself; else the host streams torque to it
     measures_torque: bool  # what read() reports is measured; else it is computed
     simulated: bool  # lives in simulated time: promises ahead, touches no clock and no person
     state_rate: float  # states per second [Hz]; 0 where there is one per change of torque

@@ -10,9 +10,7 @@ found under the entry point ``gait_entrainment.drivers``.
 """
 
 import importlib
-import math
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
@@ -21,6 +19,7 @@ from gait_entrainment.robot.contract import AnkleRobot
 from gait_entrainment.robot.faults import DeviceError, LimitError
 from gait_entrainment.robot.guard import GuardedRobot
 from gait_entrainment.robot.limits import DeviceLimits
+from gait_entrainment.settings import SettingError, settings_of
 
 ENTRY_POINTS = "gait_entrainment.drivers"
 # Those of this package are named here, so that a simulation need not search all packages first.
@@ -94,35 +93,15 @@ def _load(name: str, target: str) -> type[AnkleRobot]:
 
 def _options(name: str, options_type: type[Any], text: str) -> Any:
     """Return a driver's options from OPTION=VALUE,OPTION=VALUE."""
-    known: Mapping[str, Any] = {f.name: f for f in fields(options_type)}
+    known = settings_of(options_type)
     values = {}
     for part in filter(None, text.split(",")):
         key, equals, value = part.partition("=")
         if not equals or key not in known:
             allowed = ", ".join(known) or "none"
             raise LimitError(f"driver: {name}: option {part!r}; allowed: {allowed}, as NAME=VALUE")
-        values[key] = _value(f"driver: {name}: {key}", known[key], value)
+        try:
+            values[key] = known[key].parse(f"driver: {name}: {key}", value)
+        except SettingError as error:
+            raise LimitError(str(error)) from None
     return options_type(**values)
-
-
-def _value(where: str, option: Any, text: str) -> Any:
-    """Return an option's value of the type of its default, within its range."""
-    kind = type(option.default)
-    if kind is bool:
-        if text not in ("true", "false"):
-            raise LimitError(f"{where}: {text!r}; allowed: true, false")
-        return text == "true"
-    if kind is str:
-        choices = option.metadata.get("choices")
-        if choices is not None and text not in choices:
-            raise LimitError(f"{where}: {text!r}; allowed: {', '.join(choices)}")
-        return text
-    low, high = option.metadata.get("range", (-math.inf, math.inf))
-    try:
-        value = kind(text)
-    except ValueError:
-        value = math.nan
-    if not low <= value <= high:
-        unit = option.metadata["unit"]
-        raise LimitError(f"{where}: {text!r}; allowed: {low:g} to {high:g} {unit}")
-    return value

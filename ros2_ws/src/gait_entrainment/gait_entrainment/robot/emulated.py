@@ -29,11 +29,12 @@ from typing import Any
 
 import numpy as np
 
-from gait_entrainment.conventions import Side, setting
+from gait_entrainment.conventions import Side
 from gait_entrainment.robot.contract import AnkleRobot, Capabilities, RobotState
 from gait_entrainment.robot.faults import DeviceError, LimitError
 from gait_entrainment.robot.profile import TorqueProfile
 from gait_entrainment.robot.pulse_train import PulseTrain
+from gait_entrainment.settings import check_settings, setting
 
 _TICK = 1_000_000  # of the device's torque loop [ns]
 # Bounds of random numbers drawn ahead at a time: a generator call per tick would be slow.
@@ -61,7 +62,8 @@ class EmulatedOptions:
     state_rate: float = setting(500.0, "states per second; a divisor of 1000", "Hz", (1.0, 1000.0))
 
     def __post_init__(self) -> None:
-        """Check what has no range of its own."""
+        """Check every field, and that the states fall on ticks of the torque loop."""
+        check_settings(self)
         if 1000 % self.state_rate:
             raise LimitError(f"state_rate: {self.state_rate:g} Hz; allowed: a divisor of 1000")
 
@@ -78,7 +80,6 @@ class EmulatedAnkleRobot(AnkleRobot):
         self.capabilities = Capabilities(
             peak_torque=options.peak_torque,
             torque_rate=options.torque_rate,
-            own_pulse_timer=True,
             measures_torque=True,
             simulated=True,
             state_rate=options.state_rate,

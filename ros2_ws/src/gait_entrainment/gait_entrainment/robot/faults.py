@@ -5,12 +5,14 @@
 
 from dataclasses import dataclass
 
+from gait_entrainment.errors import EntrainmentError
 
-class DeviceError(RuntimeError):
+
+class DeviceError(EntrainmentError, RuntimeError):
     """The device cannot do what was asked: one line that says what and what to do."""
 
 
-class LimitError(ValueError):
+class LimitError(EntrainmentError, ValueError):
     """A request outside what is allowed; the message names field, value and limit."""
 
 

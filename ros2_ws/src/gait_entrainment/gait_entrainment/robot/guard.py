@@ -15,7 +15,6 @@ docs/safety.md.
 
 import atexit
 import contextlib
-import itertools
 import math
 import threading
 import time
@@ -37,7 +36,7 @@ from gait_entrainment.robot.faults import (
     LimitError,
 )
 from gait_entrainment.robot.limits import DeviceLimits
-from gait_entrainment.robot.profile import TorqueProfile
+from gait_entrainment.robot.profile import ProfileError, TorqueProfile
 from gait_entrainment.robot.pulse_train import PulseTrain
 
 # How often the watchdog looks whether the experiment has fallen silent [s].
@@ -290,10 +289,11 @@ class GuardedRobot:
         if not self._begun:
             raise DeviceError("no run is under way; begin one first")
         profile = self._call(lambda: self._robot.promise(until))
-        broken = contract_breach(profile, begin, until)
-        if broken:
+        try:
+            profile.check(begin, until)
+        except ProfileError as error:
             self.stop(DRIVER_FAILED)
-            raise DeviceError(f"the driver broke its contract: {broken}")
+            raise DeviceError(f"the driver broke its contract: {error}") from None
         self.delivered += len(profile.onsets)
         self.promised_until = profile.valid_until
         fault = self._delivered_torque.add(profile)
@@ -356,23 +356,6 @@ class GuardedRobot:
             time.sleep(_WATCH_PERIOD)
 
 
-def contract_breach(profile: TorqueProfile, begin: int, until: int) -> str:
-    """Return which promise of a profile is broken, or an empty text."""
-    times = [*profile.times, profile.valid_until]
-    if not profile.times or len(profile.times) != len(profile.torques):
-        return "a profile needs one torque for each time, and at least one"
-    if profile.times[0] != begin:
-        return f"a profile from {profile.times[0]} ns does not adjoin the one up to {begin} ns"
-    if profile.valid_until > until:
-        return f"a profile up to {profile.valid_until} ns goes beyond the {until} ns asked for"
-    empty = profile.valid_until == begin and len(profile.times) == 1
-    if not empty and any(a >= b for a, b in itertools.pairwise(times)):
-        return "the times of a profile are not ascending"
-    if not all(math.isfinite(torque) for torque in profile.torques):
-        return f"the torques of a profile are not all finite: {profile.torques}"
-    return ""
-
-
 class _DeliveredTorque:
     """Watches the delivered torque, and its impulse within any stretch as long as a stride."""
 
@@ -386,9 +369,8 @@ class _DeliveredTorque:
 
     def add(self, profile: TorqueProfile) -> Fault | None:
         """Account for a profile; return a fault where it exceeds a limit."""
-        ends = [*profile.times[1:], profile.valid_until]
         found = None
-        for begin, end, torque in zip(profile.times, ends, profile.torques, strict=True):
+        for begin, end, torque in profile.pieces:
             if torque == 0:
                 continue
             if abs(torque) > self._torque:

@@ -34,7 +34,6 @@ class IdealAnkleRobot(AnkleRobot):
     capabilities = Capabilities(
         peak_torque=math.inf,
         torque_rate=math.inf,
-        own_pulse_timer=True,
         measures_torque=False,
         simulated=True,
         state_rate=0.0,

@@ -6,9 +6,9 @@
 import math
 from dataclasses import dataclass, replace
 
-from gait_entrainment.conventions import setting
 from gait_entrainment.robot.faults import LimitError
 from gait_entrainment.robot.pulse_train import PulseTrain
+from gait_entrainment.settings import check_settings, setting
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,10 @@ class DeviceLimits:
         "s",
         (0.05, 60.0),
     )
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        check_settings(self)
 
     def check_pulse(self, torque: float, duration: float) -> None:
         """

@@ -4,26 +4,30 @@
 """
 The onset of each pulse as measured, while a run goes on or from its record: one code for both.
 
-What a robot tells of its pulses comes in three streams: promises name the onsets, announcements
-say height and width, states show the torque. On topics, each may be ahead of the others.
+A robot reports its pulses in three streams: promises name the onsets, announcements give height
+and width, states show the torque. On topics, each may be ahead of the others.
 """
 
 from bisect import bisect_left, insort
+from collections.abc import Sequence
 from operator import attrgetter
 
+from gait_entrainment.conventions import nanoseconds
 from gait_entrainment.robot.contract import RobotState
-from gait_entrainment.robot.timing import LONGEST_GAP, PulseTiming, TimingAudit
+from gait_entrainment.robot.timing import LONGEST_GAP, PulseTiming, measured_onset
 
 _STAMP = attrgetter("stamp")
+# A device this late after the end of a pulse did not deliver it [s].
+LATEST = 0.2
 
 
 class MeasuredOnsets:
     """
-    Times each pulse once all that it depends on is here; never sooner.
+    Times each pulse once everything that it depends on is known; never sooner.
 
-    A state is looked at when every pulse that begins before it has been promised and announced,
-    and a later state is known. So the timings are those of an audit of the whole run at once,
-    however the streams interleave. (A stop is not bound by this: it happens when it happens.)
+    A pulse is judged by the states up to LATEST after its end, or up to the onset of the next
+    pulse. So the timings are those of the whole run at once, however the streams interleave. (A
+    stop is not bound by this: it happens when it happens.)
 
     Each ``add`` returns the onsets that have become known, with the instant before which none
     will follow: what ``GaitAnalyzer.add_promise`` takes.
@@ -40,65 +44,81 @@ class MeasuredOnsets:
     def __init__(self) -> None:
         self.timings: list[PulseTiming] = []
         self.states_until = 0
-        self._audit = TimingAudit()
         self._promised = 0  # every pulse that begins before this has been named [ns]
-        self._named: list[int] = []  # onsets whose pulse has not been announced yet; ascending
-        self._announced: dict[int, tuple[float, float]] = {}  # height, width; not named yet
-        self._audited: list[int] = []  # onsets of pulses that the audit has not judged yet
-        self._states: list[RobotState] = []  # not looked at yet; ascending
+        self._named: list[int] = []  # onsets of pulses not judged yet; ascending
+        self._announced: dict[int, tuple[float, float]] = {}  # their height, width
+        self._states: list[RobotState] = []  # ascending; those of pulses not judged yet
 
-    def add_promise(self, onsets: list[int], valid_until: int) -> tuple[list[int], int]:
+    def add_promise(self, onsets: Sequence[int], valid_until: int) -> tuple[list[int], int]:
         """Take the onsets of pulses [ns], and the promise that no others lie before an instant."""
         self._named += onsets
         self._promised = valid_until
-        return self._resolve()
+        return self._judge_what_is_known()
 
-    def add_pulse(self, onset: int, height: float, duration: float) -> tuple[list[int], int]:
+    def add_pulse(self, onset: int, height: float, width: float) -> tuple[list[int], int]:
         """Take the announcement of a pulse: onset [ns], height [N m], width [s]."""
-        self._announced[onset] = height, duration
-        return self._resolve()
+        self._announced[onset] = height, width
+        return self._judge_what_is_known()
 
     def add_state(self, state: RobotState) -> tuple[list[int], int]:
         """Take a state of the robot."""
         insort(self._states, state, key=_STAMP)
         self.states_until = max(self.states_until, state.stamp)
-        return self._resolve()
+        return self._judge_what_is_known()
 
     def stop(self, stamp: int) -> None:
         """Take a stop [ns]: pulses that begin from it on were promised and never came."""
         self._promised = min(self._promised, stamp)
-        self._audit.stop(stamp)
         self._named = [onset for onset in self._named if onset < stamp]
-        self._audited = [onset for onset in self._audited if onset < stamp]
 
     def finish(self) -> list[int]:
         """End the run; returns the remaining onsets. One never announced is as commanded."""
-        self._hand_over()
-        onsets = self._take([*self._audit.add_states(self._states), *self._audit.finish()])
-        self._states = []
-        self.timings += [PulseTiming(onset, None, None) for onset in self._named]
-        self.timings.sort(key=attrgetter("commanded"))
-        return onsets + self._named
+        onsets, _ = self._judge_what_is_known(ended=True)
+        return onsets
 
-    def _resolve(self) -> tuple[list[int], int]:
-        self._hand_over()
-        known = min([self._promised, self.states_until, *self._named[:1]])
-        count = bisect_left(self._states, known, key=_STAMP)
-        ready, self._states = self._states[:count], self._states[count:]
-        onsets = self._take(self._audit.add_states(ready))
+    def _judge_what_is_known(self, ended: bool = False) -> tuple[list[int], int]:
+        count = len(self.timings)
+        while self._named and (ended or self._next_is_known()):
+            self.timings.append(self._judge())
+        until = min([self._promised, *self._named[:1]])
+        self._forget_states_before(until)
         # A crossing lies at most one gap before the state that shows it.
-        until = min([self._promised, *self._named[:1], *self._audited[:1]]) - LONGEST_GAP
-        return onsets, until
+        return [timing.onset for timing in self.timings[count:]], until - LONGEST_GAP
 
-    def _hand_over(self) -> None:
-        """Give the audit the pulses that have been named and announced, in their order."""
-        while self._named and self._named[0] in self._announced:
-            onset = self._named.pop(0)
-            self._audited.append(onset)
-            self._audit.add_pulse(onset, *self._announced.pop(onset))
+    def _next_is_known(self) -> bool:
+        """Whether the next pulse, the one after it, and all states in between are known."""
+        onset, *later = self._named[:2]
+        if onset not in self._announced:
+            return False
+        end = self._end(onset, self._announced[onset][1], later)
+        return end < self.states_until and (bool(later) or end <= self._promised)
 
-    def _take(self, timings: list[PulseTiming]) -> list[int]:
-        """Keep timings and return their onsets."""
-        self._audited = self._audited[len(timings) :]
-        self.timings += timings
-        return [timing.onset for timing in timings]
+    def _judge(self) -> PulseTiming:
+        """Take the next pulse from those named, and return its timing."""
+        onset = self._named.pop(0)
+        height, width = self._announced.pop(onset, (0.0, 0.0))
+        if height == 0:  # a sham, or never announced: no state can show it
+            return PulseTiming(onset, None, None)
+        end = self._end(onset, width, self._named[:1])
+        self._forget_states_before(onset)
+        seen = [state for state in self._states if state.stamp <= end]
+        during = (state for state in seen if state.stamp >= onset)
+        sent = next((state.stamp for state in during if state.commanded / height > 0), None)
+        stamps, torques = [s.stamp for s in seen], [s.measured for s in seen]
+        found = measured_onset(stamps, torques, height)
+        if found is None:
+            return PulseTiming(onset, sent, None)
+        index, measured = found
+        if seen[index].measured == seen[index].commanded:
+            # Equal to the last bit: not measured but computed, and known at each of its jumps.
+            measured = seen[index].stamp
+        return PulseTiming(onset, sent, measured)
+
+    def _end(self, onset: int, width: float, later: Sequence[int]) -> int:
+        """Return the end [ns] of the states by which a pulse is judged."""
+        return min([onset + nanoseconds(width + LATEST), *later])
+
+    def _forget_states_before(self, instant: int) -> None:
+        """Drop the states before an instant [ns], except for the last one."""
+        first = bisect_left(self._states, instant, key=_STAMP)
+        del self._states[: max(first - 1, 0)]

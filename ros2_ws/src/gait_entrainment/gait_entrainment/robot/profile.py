@@ -3,9 +3,16 @@
 
 """A torque profile: what an ankle robot promises to deliver up to an instant."""
 
+import itertools
+import math
 from dataclasses import dataclass
 
 from gait_entrainment.conventions import Side
+from gait_entrainment.errors import EntrainmentError
+
+
+class ProfileError(EntrainmentError, ValueError):
+    """A torque profile that breaks a promise; the message says which."""
 
 
 @dataclass(frozen=True)
@@ -15,6 +22,7 @@ class TorqueProfile:
 
     ``torques[i]`` [N m] holds on ``[times[i], times[i + 1])``, the last one up to
     ``valid_until`` [ns]. Profiles adjoin: ``times[0]`` is the ``valid_until`` of the one before.
+    A profile without length (``times == (valid_until,)``) says only that nothing new is known.
     """
 
     side: Side
@@ -22,3 +30,48 @@ class TorqueProfile:
     torques: tuple[float, ...]
     onsets: tuple[int, ...]  # of the pulses that begin in this profile [ns]
     valid_until: int
+
+    @property
+    def pieces(self) -> tuple[tuple[int, int, float], ...]:
+        """Begin [ns], end [ns] and torque [N m] of each stretch of constant torque, in order."""
+        ends = [*self.times[1:], self.valid_until]
+        return tuple(zip(self.times, ends, self.torques, strict=True))
+
+    @property
+    def has_length(self) -> bool:
+        """Whether it says anything about the torque."""
+        return self.times != (self.valid_until,)
+
+    def check(self, begin: int, until: int | None = None) -> None:
+        """
+        Hold the profile against the contract.
+
+        Parameters
+        ----------
+        begin
+            Where the profile before ends [ns].
+        until
+            Up to where it was asked for [ns]; None if that is not known.
+
+        Raises
+        ------
+        ProfileError
+            if it does not adjoin the one before, goes beyond what was asked for, or its pieces
+            are not ascending, finite and one for each time.
+
+        """
+        if not self.times or len(self.times) != len(self.torques):
+            raise ProfileError("a profile needs one torque for each time, and at least one")
+        if self.times[0] != begin:
+            raise ProfileError(
+                f"a profile from {self.times[0]} ns does not adjoin the one up to {begin} ns"
+            )
+        if until is not None and self.valid_until > until:
+            raise ProfileError(
+                f"a profile up to {self.valid_until} ns goes beyond the {until} ns asked for"
+            )
+        borders = [*self.times, self.valid_until]
+        if self.has_length and any(a >= b for a, b in itertools.pairwise(borders)):
+            raise ProfileError("the times of a profile are not ascending")
+        if not all(math.isfinite(torque) for torque in self.torques):
+            raise ProfileError(f"the torques of a profile are not all finite: {self.torques}")

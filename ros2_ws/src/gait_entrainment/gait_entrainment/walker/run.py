@@ -84,18 +84,15 @@ class WalkerRun:
 
         Raises
         ------
-        ValueError
-            where the profile does not adjoin the one before.
+        ProfileError
+            if it does not adjoin the one before, or breaks its contract in another way.
 
         """
-        begin = profile.times[0]
-        if begin != self._promised:
-            raise ValueError(
-                f"a torque profile from {begin} ns does not adjoin the one up to "
-                f"{self._promised} ns: one is missing"
-            )
+        if not profile.has_length:
+            return 0
+        profile.check(self._promised)
         self._promised = profile.valid_until
-        late = max(min(self.reached, profile.valid_until) - begin, 0)
+        late = max(min(self.reached, profile.valid_until) - profile.times[0], 0)
         self.late += late
         if profile.valid_until > self.reached:
             # What is over stays as it was walked, without torque; the rest keeps its instants.

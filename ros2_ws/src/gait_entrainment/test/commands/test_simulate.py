@@ -100,7 +100,7 @@ def test_options_reach_the_walker(capsys):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--width", "-0.1"], ["--width", "pulses.width", "at least 1e-09"]),
+        (["--width", "-0.1"], ["--width", "pulses.width", "1e-09 to 10 s"]),
         (["--width", "nan"], ["--width", "nan"]),
         (["--ankle-stiffness", "60"], ["--ankle-stiffness", "67.4792 to 111.878"]),
         (["--period", "0.05"], ["overlap"]),

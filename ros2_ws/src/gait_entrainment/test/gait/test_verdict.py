@@ -3,7 +3,6 @@
 
 """The verdict: each rule of the definitions by an example, and a second implementation."""
 
-import dataclasses
 import math
 import statistics
 from collections.abc import Sequence
@@ -15,6 +14,7 @@ from synthetic_gait import events_of, ignores, locks, long_range, noisy_walk, re
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.gait import Analysis, Verdict, VerdictSettings, analyze
+from gait_entrainment.settings import settings_of
 
 MS = 1_000_000
 T = 2000 * MS  # unperturbed stride period
@@ -215,15 +215,15 @@ def test_agrees_with_a_second_implementation(response, noise, seed) -> None:  # 
     )
 
 
-@pytest.mark.parametrize("field", dataclasses.fields(VerdictSettings), ids=lambda f: f.name)
-def test_setting_out_of_range_is_refused_by_name(field) -> None:  # type: ignore[no-untyped-def]
-    low, high = field.metadata["range"]
-    assert field.metadata["meaning"]
-    assert field.metadata["unit"]
-    assert low <= field.default <= high
-    for bad in (low - 1, high + 1, math.nan):
-        with pytest.raises(ValueError, match=f"^{field.name}: .*; allowed: "):
-            VerdictSettings(**{field.name: bad})  # type: ignore[arg-type]
+@pytest.mark.parametrize("name", settings_of(VerdictSettings))
+def test_setting_out_of_range_is_refused_by_name(name: str) -> None:
+    told = settings_of(VerdictSettings)[name]
+    assert told.meaning
+    assert told.unit
+    assert told.least <= getattr(VerdictSettings, name) <= told.most
+    for bad in (told.least - 1, told.most + 1, math.nan):
+        with pytest.raises(ValueError, match=f"^{name}: .*; allowed: "):
+            VerdictSettings(**{name: bad})  # type: ignore[arg-type]
 
 
 def test_count_that_is_not_whole_is_refused() -> None:

@@ -26,7 +26,7 @@ class RecordingRobot(AnkleRobot):
     Options = NoOptions
 
     def __init__(self, side, options=None, seed=0, simulated=True):  # noqa: ARG002
-        self.capabilities = Capabilities(20.0, math.inf, True, True, simulated, 100.0)
+        self.capabilities = Capabilities(20.0, math.inf, True, simulated, 100.0)
         self.side = side
         self.calls = []
         self.raises = {}

@@ -21,7 +21,6 @@ from gait_entrainment.robot import (
     TorqueProfile,
 )
 from gait_entrainment.robot.faults import EXPERIMENT_SILENT
-from gait_entrainment.robot.guard import contract_breach
 
 from .recording_robot import RecordingRobot
 
@@ -284,26 +283,6 @@ def test_a_silent_experiment_stops_a_real_device():
     assert driver.stopped.wait(5.0)
     assert guard.faults == (EXPERIMENT_SILENT,)
     guard.close()
-
-
-@pytest.mark.parametrize(
-    ("times", "torques", "until", "words"),
-    [
-        ((), (), 10, "at least one"),
-        ((0, 5), (1.0,), 10, "one torque for each"),
-        ((1,), (0.0,), 10, "does not adjoin"),
-        ((0,), (0.0,), 11, "beyond"),
-        ((0, 5, 5), (0.0, 1.0, 0.0), 10, "ascending"),
-        ((0, 10), (0.0, 1.0), 10, "ascending"),
-        ((0, 3), (0.0, 1.0), 0, "ascending"),
-        ((0,), (math.nan,), 10, "finite"),
-        ((0,), (0.0,), 10, ""),
-        ((0,), (0.0,), 0, ""),
-    ],
-)
-def test_breaches_of_a_profiles_contract(times, torques, until, words):
-    breach = contract_breach(TorqueProfile(Side.LEFT, times, torques, (), until), 0, 10)
-    assert (words in breach) if words else breach == ""
 
 
 def test_a_broken_profile_stops_the_torque():

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.robot import (
+    MeasuredOnsets,
     PulseTiming,
     PulseTrain,
     RobotState,
-    TimingAudit,
     find_driver,
     measured_onset,
 )
@@ -63,12 +63,16 @@ def test_the_audit_of_an_emulated_robot_finds_its_delay_and_lag():
     robot.activate()
     robot.begin(0)
     robot.schedule(PulseTrain(Side.LEFT, 500 * MS, 1.0, 3, 10.0, 0.2))
-    audit, timings = TimingAudit(), []
+    onsets = MeasuredOnsets()
     for until in range(100 * MS, 4000 * MS, 130 * MS):
-        for onset in robot.promise(until).onsets:
-            audit.add_pulse(onset, 10.0, 0.2)
-        timings += audit.add_states(robot.read())
-    timings += audit.finish()
+        promised = robot.promise(until).onsets
+        onsets.add_promise(promised, until)
+        for onset in promised:
+            onsets.add_pulse(onset, 10.0, 0.2)
+        for state in robot.read():
+            onsets.add_state(state)
+    onsets.finish()
+    timings = onsets.timings
     assert [t.commanded for t in timings] == [500 * MS, 1500 * MS, 2500 * MS]
     # Asked for after the delay; half the height is reached ln 2 time constants later.
     half = 7 + 1e3 * math.log(2) / (2 * math.pi * 10)
@@ -78,10 +82,12 @@ def test_the_audit_of_an_emulated_robot_finds_its_delay_and_lag():
 
 
 def test_a_pulse_that_never_came_is_told_as_missing():
-    audit = TimingAudit()
-    audit.add_pulse(100 * MS, 5.0, 0.1)
-    states = [RobotState(t * MS, 0.0, 0.0, math.nan) for t in range(0, 1000, 5)]
-    assert audit.add_states(states) == [PulseTiming(100 * MS, None, None)]
+    onsets = MeasuredOnsets()
+    onsets.add_promise([100 * MS], 1000 * MS)
+    onsets.add_pulse(100 * MS, 5.0, 0.1)
+    for t in range(0, 1000, 5):
+        onsets.add_state(RobotState(t * MS, 0.0, 0.0, math.nan))
+    assert onsets.timings == [PulseTiming(100 * MS, None, None)]
 
 
 def test_the_distribution_is_that_of_the_pulses_seen():

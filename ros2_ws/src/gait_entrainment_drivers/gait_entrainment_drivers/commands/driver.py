@@ -8,12 +8,13 @@ import json
 import math
 import sys
 from collections.abc import Iterable
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.robot import DeviceError, Driver, LimitError, driver_names, find_driver
+from gait_entrainment.settings import Setting, settings_of
 
 if TYPE_CHECKING:
     from gait_entrainment_drivers.conformance import Result
@@ -183,6 +184,13 @@ def _allowed(option: dict[str, Any]) -> str:
     return f"; {low:g} to {high:g}" if high < math.inf else f"; {low:g} or more"
 
 
+def _told(setting: Setting) -> dict[str, Any]:
+    told: dict[str, Any] = {"meaning": setting.meaning, "unit": setting.unit}
+    if setting.choices:
+        return told | {"choices": setting.choices}
+    return told if setting.kind is str else told | {"range": (setting.least, setting.most)}
+
+
 def _description(name: str) -> dict[str, Any]:
     try:
         robot = find_driver(name).robot
@@ -195,6 +203,7 @@ def _description(name: str) -> dict[str, Any]:
     return {
         "summary": text.splitlines()[0] if text else "",
         "options": [
-            {"name": f.name, "default": f.default, **f.metadata} for f in fields(robot.Options)
+            {"name": name, "default": getattr(robot.Options, name), **_told(told)}
+            for name, told in settings_of(robot.Options).items()
         ],
     }

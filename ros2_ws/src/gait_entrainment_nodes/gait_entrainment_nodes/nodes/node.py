@@ -41,6 +41,7 @@ from rclpy.utilities import remove_ros_args
 from std_srvs.srv import Trigger
 
 from gait_entrainment.conventions import Side
+from gait_entrainment.settings import settings_of
 from gait_entrainment_msgs.msg import PublishedCounts
 from gait_entrainment_nodes.messaging.raw_messages import serialize
 from gait_entrainment_nodes.messaging.stamps import header
@@ -392,16 +393,16 @@ def declare_fields(node: Node, dataclass_type: Any, prefix: str = "") -> None:
     """
     Declare every field of a dataclass as a parameter that may change.
 
-    The fields' metadata say meaning, unit and range.
+    The fields' settings say meaning, unit and range.
     """
-    for f in fields(dataclass_type):
+    for name, told in settings_of(dataclass_type).items():
         declare(
             node,
-            prefix + f.name,
-            f.default,
-            f.metadata["meaning"],
-            unit=f.metadata["unit"],
-            within=f.metadata["range"],
+            prefix + name,
+            getattr(dataclass_type, name),
+            told.meaning,
+            unit=told.unit,
+            within=(told.least, told.most),
             read_only=False,
         )
 

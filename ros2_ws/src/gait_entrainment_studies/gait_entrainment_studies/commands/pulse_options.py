@@ -9,6 +9,7 @@ from dataclasses import fields
 from typing import TYPE_CHECKING
 
 from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment.settings import settings_of
 
 if TYPE_CHECKING:
     from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
@@ -20,9 +21,9 @@ PAPER_WIDTH = 0.1
 def add_walker_options(parser: argparse.ArgumentParser) -> None:
     """Add one option per parameter of the walker; the defaults are Table 1."""
     group = parser.add_argument_group("walker (default: Table 1)")
-    for field in fields(WalkerParameters):
-        text = f"{field.metadata['meaning']} [{field.metadata['unit']}]; default {field.default:g}"
-        option = "--" + field.name.replace("_", "-")
+    for name, told in settings_of(WalkerParameters).items():
+        text = f"{told.meaning} [{told.unit}]; default {getattr(WalkerParameters, name):g}"
+        option = "--" + name.replace("_", "-")
         group.add_argument(option, type=float, help=text, metavar="FLOAT")
 
 

@@ -1,0 +1,113 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Between decoded ROS messages and the values of the core, without ROS.
+
+Only attributes of a message are read, so it does not matter which library decoded it: rclpy in a
+node, mcap_ros2 from a bag. The field names are those of gait_entrainment_msgs. Message stamps
+count from 1970, the core's instants from wherever the caller wants: each function subtracts
+``start`` [ns].
+"""
+
+from dataclasses import fields
+from typing import Any
+
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
+from gait_entrainment.errors import UsageError
+from gait_entrainment.gait import GaitEvent, PulsePhase, Stride
+from gait_entrainment.gait.analyzer import Result
+from gait_entrainment.robot import RobotState, TorqueProfile
+
+
+class MessageError(UsageError):
+    """A message that has no meaning, such as one about a third leg."""
+
+
+def nanoseconds_of(stamp: Any) -> int:
+    """Return a ROS time or duration as integer nanoseconds."""
+    return int(stamp.sec) * NANOSECONDS_PER_SECOND + int(stamp.nanosec)
+
+
+def event_of(message: Any, start: int = 0) -> GaitEvent:
+    """Return the gait event of a GaitEvent message; raises MessageError for an unknown kind."""
+    try:
+        kind = EventKind(message.kind)
+    except ValueError:
+        allowed = ", ".join(f"{kind.value} ({kind.name.lower()})" for kind in EventKind)
+        raise MessageError(f"kind: {message.kind}; allowed: {allowed}") from None
+    stamp = nanoseconds_of(message.header.stamp) - start
+    return GaitEvent(stamp, kind, _side_of(message), int(message.step))
+
+
+def stop_of(message: Any, start: int = 0) -> int | None:
+    """
+    Return the instant [ns] of the stop that a TorqueProfile message reports; None if it is none.
+
+    From that instant on there is no torque, and every profile before loses what it promised.
+    """
+    return nanoseconds_of(message.header.stamp) - start if message.stop else None
+
+
+def profile_of(message: Any, start: int = 0) -> TorqueProfile:
+    """
+    Return the torque profile of a TorqueProfile message that reports no stop.
+
+    It is as the message says: ``TorqueProfile.check`` holds it against the profile before. Raises
+    MessageError for an unknown side.
+    """
+    return TorqueProfile(
+        side=_side_of(message),
+        times=tuple(nanoseconds_of(stamp) - start for stamp in message.times),
+        torques=tuple(message.torques),
+        onsets=tuple(nanoseconds_of(stamp) - start for stamp in message.onsets),
+        valid_until=nanoseconds_of(message.valid_until) - start,
+    )
+
+
+def pulse_of(message: Any, start: int = 0) -> tuple[int, float, float]:
+    """Return onset [ns], height [N m] and width [s] of a TorquePulse message."""
+    return nanoseconds_of(message.header.stamp) - start, message.torque, message.duration
+
+
+def state_of(message: Any, start: int = 0) -> RobotState:
+    """Return the state of an AnkleRobotState message; of its faults a message has only names."""
+    return RobotState(
+        stamp=nanoseconds_of(message.header.stamp) - start,
+        commanded=message.commanded_torque,
+        measured=message.measured_torque,
+        angle=message.angle,
+    )
+
+
+def result_values(result: Result, side: Side) -> dict[str, Any]:
+    """
+    Return the fields of the message that publishes a result about the perturbed leg.
+
+    Instants are integer nanoseconds, ``header`` that of its stamp; the field ``run`` is left out.
+    """
+    if isinstance(result, Stride):
+        return {
+            "header": result.end,
+            "side": result.side,
+            "number": result.number,
+            "start": result.start,
+            "period": result.period,
+            "step_periods": result.step_periods,
+        }
+    # A message has the fields of the result, under the same names, except for these.
+    own = {"onset", "stamp", "effective_pulses"}
+    values = {f.name: getattr(result, f.name) for f in fields(result) if f.name not in own}
+    values["side"] = side
+    if isinstance(result, PulsePhase):
+        return values | {"header": result.onset, "toe_off": result.toe_off or 0}
+    since = result.entrained_since_stride or 0
+    return values | {"header": result.stamp, "entrained_since_stride": since}
+
+
+def _side_of(message: Any) -> Side:
+    try:
+        return Side(message.side)
+    except ValueError:
+        allowed = ", ".join(f"{side.value} ({side.name.lower()})" for side in Side)
+        raise MessageError(f"side: {message.side}; allowed: {allowed}") from None
