@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from gait_entrainment.errors import UsageError
 from gait_entrainment.parameters import ParameterError, WalkerParameters
 from gait_entrainment_studies.locking.roots import Floats
 
@@ -23,7 +24,7 @@ class SubjectDistributions:
 
     Assumptions of ours, for adults in general: the human study's own are not known here.
 
-    Raises ValueError for a mean or deviation out of range.
+    Raises UsageError for a mean or deviation out of range.
     """
 
     leg_length: tuple[float, float] = _pair(0.92, 0.05, "leg length", "m")
@@ -36,20 +37,20 @@ class SubjectDistributions:
     )
 
     def __post_init__(self) -> None:
-        """Hold each distribution against its range."""
+        """Check each distribution."""
         for item in fields(self):
             mean, deviation = getattr(self, item.name)
             # Two deviations off it must still be positive.
             if not (mean > 2 * deviation >= 0 and mean < np.inf):
-                raise ValueError(
-                    f"{item.name} {mean:g} +/- {deviation:g} [{item.metadata['unit']}] is out of"
-                    " range; allowed: a mean above twice the deviation, none negative"
+                raise UsageError(
+                    f"{item.name}: {mean:g} +/- {deviation:g} {item.metadata['unit']}; allowed: a"
+                    " mean above twice the deviation, none negative"
                 )
 
 
 @dataclass(frozen=True)
 class Subjects:
-    """The subjects drawn, and how many draws had no gait and were drawn again."""
+    """The subjects drawn, and how many were drawn again because they had no gait."""
 
     walkers: tuple[WalkerParameters, ...]
     variation: Floats
@@ -81,7 +82,7 @@ def draw_subjects(distributions: SubjectDistributions, count: int, seed: int) ->
         except ParameterError:
             redrawn += 1
             if redrawn > 20 * count:
-                raise ValueError(
+                raise UsageError(
                     "peak_torque: hardly a subject drawn has a gait; allowed: about 0.14 to 0.21"
                 ) from None
             continue

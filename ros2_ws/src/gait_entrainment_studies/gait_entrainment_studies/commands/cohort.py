@@ -5,22 +5,36 @@
 
 import argparse
 import csv
-import json
-import sys
-from dataclasses import asdict, fields
+import math
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from gait_entrainment_studies.commands.pulse_options import check_at_least
+import numpy as np
+from scipy.stats import binomtest
 
-if TYPE_CHECKING:
-    from gait_entrainment_studies.cohort.study import Study, StudyPlan
-    from gait_entrainment_studies.cohort.subjects import Subjects
+from gait_entrainment.settings import Setting, setting
+from gait_entrainment_studies.cohort.figures import draw_cohort
+from gait_entrainment_studies.cohort.study import (
+    Study,
+    StudyPlan,
+    measured_basin_percent,
+    run_study,
+    verdicts,
+)
+from gait_entrainment_studies.cohort.subjects import SubjectDistributions, Subjects, draw_subjects
+from gait_entrainment_studies.commands.options import (
+    add_output_options,
+    add_setting,
+    add_settings,
+    answer,
+    chosen,
+)
 
 DESCRIPTION = (
     "Draw subjects, give each its own stride-to-stride variability, conduct the experiment on "
     "each at several pulse periods relative to its measured stride period, and judge each "
-    "trial as a real one. Off the paper: an extension."
+    "trial as a real one. Not in the paper: an extension."
 )
 EXAMPLES = """examples:
   entrain cohort --out cohort               19 subjects, nine pulse periods
@@ -28,101 +42,66 @@ EXAMPLES = """examples:
   entrain cohort --slope -0.02 --period-offset -0.05
 """
 
-_OFFSETS = (-0.12, -0.10, -0.08, -0.06, -0.05, -0.04, -0.02, 0.02, 0.05)
+_PERIOD_OFFSET = Setting("pulse period minus measured stride period", unit="s")
+_OFFSETS = ("-0.12", "-0.1", "-0.08", "-0.06", "-0.05", "-0.04", "-0.02", "0.02", "0.05")
 _HEADLINE = -0.05
+
+
+@dataclass(frozen=True)
+class CohortOptions:
+    """How many are asked."""
+
+    subjects: int = setting(19, "number of subjects", within=(2, math.inf))
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    numbers = parser.add_argument_group("experiment")
-    for option, kind, default, text in (
-        ("--subjects", int, 19, "number of subjects"),
-        ("--seed", int, 0, "seed of subjects and noise"),
-        ("--torque", float, 10.0, "height of the pulses [N m]"),
-        ("--width", float, 0.1, "duration of a pulse [s]"),
-        ("--pulses", int, 50, "pulses in a trial"),
-        ("--initial-phase", float, 0.0, "first pulse, as a fraction of a stride"),
-        ("--hurst", float, 0.75, "correlation of the noise: 0.5 white, to below 1"),
-        ("--slope", float, 0.0, "rise of the ground [rad], uphill positive"),
-        ("--asymmetry", float, 0.0, "excess of the perturbed leg's stiffness, -1 to 1"),
-    ):
-        numbers.add_argument(
-            option,
-            type=kind,
-            default=default,
-            metavar=kind.__name__.upper(),
-            help=f"{text}; default {default}",
-        )
-    numbers.add_argument(
-        "--period-offset",
-        type=float,
-        action="append",
-        metavar="FLOAT",
-        help="pulse period minus measured stride period [s], may be given again; default "
-        + " ".join(map(str, _OFFSETS)),
-    )
+    experiment = parser.add_argument_group("experiment")
+    add_settings(experiment, CohortOptions)
+    add_settings(experiment, StudyPlan)
+    offsets = f"{' '.join(_OFFSETS)}; may be given again"
+    add_setting(experiment, "period_offset", _PERIOD_OFFSET, offsets, action="append")
     drawn = parser.add_argument_group("distributions of the subjects")
-    for name, text in (
-        ("leg-length", "leg length [m]; default 0.92 0.05"),
-        ("mass", "mass [kg]; default 75 12"),
-        ("peak-torque", "peak ankle torque over body weight x leg length; default 0.17 0.01"),
-        ("variation", "coefficient of variation of the stride period; default 0.02 0.005"),
-    ):
-        drawn.add_argument("--" + name, nargs=2, type=float, metavar=("MEAN", "SD"), help=text)
-    parser.add_argument("--out", type=Path, metavar="DIR", help="write figure and trials.csv")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    for item in fields(SubjectDistributions):
+        default = getattr(SubjectDistributions, item.name)
+        text = f"{item.metadata['meaning']} [{item.metadata['unit']}]"
+        drawn.add_argument(
+            "--" + item.name.replace("_", "-"),
+            nargs=2,
+            type=float,
+            default=default,
+            metavar=("MEAN", "SD"),
+            help=f"{text}; default {default[0]:g} {default[1]:g}",
+        )
+    add_output_options(parser, "write figure and trials.csv")
 
 
 def run(options: argparse.Namespace) -> int:
     """Draw, conduct, judge, print."""
-    from gait_entrainment_studies.cohort.study import StudyPlan, run_study
-    from gait_entrainment_studies.cohort.subjects import SubjectDistributions, draw_subjects
-
     names = [item.name for item in fields(SubjectDistributions)]
-    given = {name: tuple(value) for name in names if (value := getattr(options, name))}
-    try:
-        for name, least in (("subjects", 2), ("pulses", 1), ("seed", 0)):
-            check_at_least(name, getattr(options, name), least)
-        distributions = SubjectDistributions(**given)
-        subjects = draw_subjects(distributions, options.subjects, options.seed)
-        plan = StudyPlan(
-            torque=options.torque,
-            width=options.width,
-            period_offsets=tuple(dict.fromkeys(options.period_offset or _OFFSETS)),
-            pulses=options.pulses,
-            initial_phase=options.initial_phase,
-            seed=options.seed,
-            hurst=options.hurst,
-            slope=options.slope,
-            asymmetry=options.asymmetry,
-        )
-        study = run_study(subjects, plan)
-    except ValueError as error:
-        print(f"entrain cohort: {error}", file=sys.stderr)
-        return 2
-    outcome = _outcome(study, subjects, plan, asdict(distributions))
-    print(json.dumps(outcome) if options.json else _summary(outcome))
-    if options.out is not None:
-        from gait_entrainment_studies.cohort.figures import draw_cohort
+    distributions = SubjectDistributions(*(tuple(getattr(options, name)) for name in names))
+    texts = options.period_offset or _OFFSETS
+    offsets = [_PERIOD_OFFSET.parse("period_offset", text) for text in texts]
+    plan = chosen(options, StudyPlan, period_offsets=tuple(dict.fromkeys(offsets)))
+    count = chosen(options, CohortOptions).subjects
+    subjects = draw_subjects(distributions, count, plan.seed)
+    study = run_study(subjects, plan)
 
-        paths = draw_cohort(study, options.out)
-        paths.append(options.out / "trials.csv")
+    def write(folder: Path) -> list[Path]:
+        paths = [*draw_cohort(study, folder), folder / "trials.csv"]
         with open(paths[-1], "w", newline="") as file:
             writer = csv.DictWriter(file, list(asdict(study.trials[0])))
             writer.writeheader()
             writer.writerows(asdict(trial) for trial in study.trials)
-        for path in paths if not options.json else ():
-            print(f"written          {path}")
-    return 0
+        return paths
+
+    outcome = _outcome(study, subjects, plan, asdict(distributions))
+    return answer(options, outcome, _summary(outcome), write, "written          ")
 
 
 def _outcome(
-    study: "Study", subjects: "Subjects", plan: "StudyPlan", distributions: dict[str, Any]
+    study: Study, subjects: Subjects, plan: StudyPlan, distributions: dict[str, Any]
 ) -> dict[str, Any]:
-    import numpy as np
-
-    from gait_entrainment_studies.cohort.study import measured_basin_percent, verdicts
-
     def mean(values: list[float]) -> float | None:
         finite = [value for value in values if np.isfinite(value)]
         return float(np.mean(finite)) if finite else None
@@ -160,9 +139,7 @@ def _outcome(
 
 
 def _of(found: int, count: int) -> str:
-    """Say how many, with the 95 % interval of the share by Wilson's score."""
-    from scipy.stats import binomtest
-
+    """Return how many, with the 95 % interval of the share by Wilson's score."""
     interval = binomtest(found, count).proportion_ci(method="wilson")
     low, high = 100 * interval.low, 100 * interval.high
     return f"{found} of {count}, 95 % interval {low:.0f} to {high:.0f} %"

@@ -4,76 +4,61 @@
 """entrain lock: all phase-locked gaits under one kind of pulse, solved."""
 
 import argparse
-import json
-import sys
-from dataclasses import asdict
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+import math
+from collections import Counter
+from dataclasses import asdict, dataclass
+from typing import Any
 
-from gait_entrainment_studies.commands.pulse_options import (
-    add_pulse_options,
-    add_walker_options,
-    check_at_least,
+from gait_entrainment.settings import setting
+from gait_entrainment_studies.commands.options import (
+    PERIOD_OFFSET,
+    add_gait_options,
+    add_output_options,
+    add_settings,
+    answer,
     check_period_offset,
-    chosen_torque,
-    chosen_walker,
+    chosen,
+    chosen_gait,
 )
-
-if TYPE_CHECKING:
-    from gait_entrainment_studies.locking.branches import Piece
+from gait_entrainment_studies.locking.branches import Piece, locked_gaits, pieces_of
+from gait_entrainment_studies.locking.figures import draw_branches
+from gait_entrainment_studies.locking.walked import shares_of
 
 DESCRIPTION = (
-    "Solve for the 1:1 phase-locked gaits: borders of the pulse periods with a stable lock, "
-    "named as what they are, and the locked gaits at one period with their Floquet "
+    "Solve for the 1:1 phase-locked gaits: the borders of the pulse periods with a stable lock, "
+    "named for what they are, and the locked gaits at one period with their Floquet "
     "multipliers and the share of initial phases that each draws."
 )
 EXAMPLES = """examples:
   entrain lock                                  the paper's pulses at 2 tau_0 - 50 ms
-  entrain lock --period-offset -0.067           where two attractors coexist
+  entrain lock --period-offset -0.067           two attractors coexist
   entrain lock --torque-fraction -0.1 --period-offset 0.02 --out figures
 """
 
 
+@dataclass(frozen=True)
+class LockOptions:
+    """What is asked of the locks."""
+
+    period_offset: float = setting(-0.05, PERIOD_OFFSET.meaning, PERIOD_OFFSET.unit)
+    phases: int = setting(32, "initial phases walked from", within=(1, math.inf))
+
+
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    parser.add_argument(
-        "--period-offset",
-        type=float,
-        default=-0.05,
-        metavar="FLOAT",
-        help="pulse period minus the unperturbed stride period [s]; default -0.05",
-    )
-    parser.add_argument(
-        "--phases",
-        type=int,
-        default=32,
-        metavar="INT",
-        help="initial phases walked from; default 32",
-    )
-    add_pulse_options(parser)
-    add_walker_options(parser)
-    parser.add_argument("--out", type=Path, metavar="DIR", help="draw the branches into a folder")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    add_settings(parser, LockOptions)
+    add_gait_options(parser)
+    add_output_options(parser, "draw the branches into a folder")
 
 
 def run(options: argparse.Namespace) -> int:
     """Solve, walk, print."""
-    from gait_entrainment_studies.locking.branches import locked_gaits, pieces_of
-    from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
-    from gait_entrainment_studies.locking.walked import shares_of
-
-    try:
-        walker = chosen_walker(options)
-        gait = PulsedGait(walker, chosen_torque(options, walker), options.width)
-        check_period_offset(options.period_offset, gait)
-        check_at_least("phases", options.phases, 1)
-    except ValueError as error:
-        print(f"entrain lock: {error}", file=sys.stderr)
-        return 2
-    period = gait.unperturbed_period + options.period_offset
+    gait, asked = chosen_gait(options), chosen(options, LockOptions)
+    check_period_offset(asked.period_offset, gait)
+    period = gait.unperturbed_period + asked.period_offset
     pieces = pieces_of(gait)
     locks = locked_gaits(gait, period, pieces)
-    shares = shares_of(gait, period, locks, options.phases)
+    shares = shares_of(gait, period, locks, asked.phases)
     outcome = {
         "unperturbed_stride_period": gait.unperturbed_period,
         "pulse_period": period,
@@ -88,25 +73,18 @@ def run(options: argparse.Namespace) -> int:
             }
             for lock in locks
         ],
-        "walked": {
-            str(kind.value): shares.outcomes.count(kind) for kind in dict.fromkeys(shares.outcomes)
-        },
+        "walked": {kind.value: count for kind, count in Counter(shares.outcomes).items()},
     }
-    if options.json:
-        print(json.dumps(outcome))
-    else:
-        print(_summary(outcome))
-    if options.out is not None:
-        from gait_entrainment_studies.locking.figures import draw_branches
-
-        for path in draw_branches(gait, pieces, locks, options.out):
-            if not options.json:
-                print(f"figure           {path}")
-    return 0
+    return answer(
+        options,
+        outcome,
+        _summary(outcome),
+        lambda folder: draw_branches(gait, pieces, locks, folder),
+    )
 
 
-def _branch(piece: "Piece") -> dict[str, Any]:
-    """Return a piece as JSON holds it: there is no number where there is no gait."""
+def _branch(piece: Piece) -> dict[str, Any]:
+    """Return a piece as JSON holds it: None for the numbers of a gait that does not exist."""
     ends = {
         name: {key: None if value != value else value for key, value in asdict(end).items()}
         for name, end in (("first", piece.first), ("last", piece.last))

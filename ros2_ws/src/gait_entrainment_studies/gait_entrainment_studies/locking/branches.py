@@ -132,6 +132,15 @@ def stable_intervals(pieces: list[Piece]) -> list[Piece]:
     return [piece for piece in pieces if piece.stable]
 
 
+def basin_of(gait: PulsedGait, pieces: list[Piece]) -> tuple[float, float]:
+    """Return shortest and longest period with a stable lock [s]; the unperturbed one if none."""
+    stable = stable_intervals(pieces)
+    return (
+        min((one.least_period.period for one in stable), default=gait.unperturbed_period),
+        max((one.greatest_period.period for one in stable), default=gait.unperturbed_period),
+    )
+
+
 def _branches(gait: PulsedGait) -> Iterator[tuple[Place, float, float, tuple[Border, Border]]]:
     """Yield each branch: place, range of the ankle angle along it, and its corners."""
     struck, off = gait.heel_strike, gait.toe_off

@@ -189,8 +189,7 @@ class PulsedGait:
         step = self.unperturbed_period / steps_per_pulse
         if not 0 < width < step:
             raise UsageError(
-                f"width {width:g} s is out of range; allowed: above 0 and below a step,"
-                f" {step:.4g} s"
+                f"width: {width:g} s; allowed: above 0 and below a step, {step:.4g} s"
             )
 
     def speed(self, apex: float) -> float:

@@ -25,7 +25,7 @@ def step_noise(generator: np.random.Generator, steps: int, size: int, hurst: flo
     Raises UsageError for a Hurst exponent out of range.
     """
     if not 0.5 <= hurst < 1:
-        raise UsageError(f"hurst {hurst:g} is out of range; allowed: 0.5 (white) to below 1")
+        raise UsageError(f"hurst: {hurst:g}; allowed: at least 0.5, which is white, and below 1")
     lags = np.arange(steps + 1.0)
     power = 2 * hurst
     covariance = 0.5 * (np.abs(lags + 1) ** power - 2 * lags**power + np.abs(lags - 1) ** power)

@@ -86,8 +86,7 @@ class Population:
         steepest = min(walker.leg_angle for walker in walkers)
         if not abs(slope) < steepest:
             raise UsageError(
-                f"slope {slope:g} rad is out of range; allowed: within the leg angle,"
-                f" {steepest:.4g} rad"
+                f"slope: {slope:g} rad; allowed: within the leg angle, {steepest:.4g} rad"
             )
         self.size = len(walkers)
         self.stiffness = np.array([walker.ankle_stiffness for walker in walkers])
@@ -162,7 +161,7 @@ class PopulationWalker:
         asymmetry: float = 0.0,
     ) -> None:
         if not -1 < asymmetry < 1:
-            raise UsageError(f"asymmetry {asymmetry:g} is out of range; allowed: -1 to 1")
+            raise UsageError(f"asymmetry: {asymmetry:g}; allowed: above -1 and below 1")
         self._population, mean = population, population.stiffness
         draws = step_noise(np.random.default_rng(seed), steps, population.size, hurst)
         # In odd steps the perturbed leg trails and pushes off.

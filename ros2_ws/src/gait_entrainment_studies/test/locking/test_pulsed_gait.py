@@ -141,5 +141,5 @@ def existence(leg_angle):
 
 
 def test_a_pulse_longer_than_a_step_is_refused():
-    with pytest.raises(ValueError, match=r"width 1 s .* a step, 0\.9666 s"):
+    with pytest.raises(ValueError, match=r"width: 1 s; .* a step, 0\.9666 s"):
         PulsedGait(TABLE_1, 13.3, 1.0)

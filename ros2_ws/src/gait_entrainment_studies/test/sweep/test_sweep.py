@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from gait_entrainment.commands import main
+from gait_entrainment.errors import UsageError
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment_studies.locking.walked import Outcome, walk_under_pulses
 from gait_entrainment_studies.sweep import engine
@@ -24,8 +25,6 @@ from gait_entrainment_studies.sweep.engine import rows_by_dask, rows_by_processe
 from gait_entrainment_studies.sweep.plan import Axis, SweepError, SweepPlan
 from gait_entrainment_studies.sweep.row import sweep_row
 from gait_entrainment_studies.sweep.store import SweepStore, read_sweep
-
-pytest.importorskip("pyarrow", reason="a sweep is kept as Parquet: pip install pyarrow")
 
 TABLE_1 = WalkerParameters()
 
@@ -165,7 +164,7 @@ def test_a_sweep_is_resumed_only_with_its_own_plan(tmp_path):
     store = SweepStore(tmp_path, plan)
     store.add(1, sweep_row(plan, 1))
     assert SweepStore(tmp_path, plan).missing() == [0, 2]
-    with pytest.raises(SweepError, match=r"plan\.strides 120, not 99: resume it with that"):
+    with pytest.raises(UsageError, match=r"plan\.strides 120, not 99: resume it with that"):
         SweepStore(tmp_path, plan_of(strides=99))
 
 
@@ -233,9 +232,9 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path, capsys):
         (["--period-offsets", "-0.1", "0", "0"], "period_offsets: 0 values"),
         (["--period-offsets", "-0.1", "0", "2.5"], "period_offsets: 2.5 values"),
         (["--torque-fractions", "0", "0.1", "nan"], "torque_fractions: nan values"),
-        (["--width", "1.2"], "width 1.2 s is out of range"),
-        (["--jobs", "-1"], "jobs: -1; allowed: at least 1"),
-        (["--phases", "0"], "phases: 0; allowed: at least 1"),
+        (["--width", "1.2"], "width: 1.2 s; allowed: above 0 and below a step"),
+        (["--jobs", "-1"], "jobs: '-1'; allowed: a whole number at least 1"),
+        (["--phases", "0"], "phases: '0'; allowed: a whole number at least 1"),
         (["--ankle-stiffness", "200"], "the walker flies off"),
     ],
 )

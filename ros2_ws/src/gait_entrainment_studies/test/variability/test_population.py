@@ -134,11 +134,14 @@ def test_locked_runs_count_strides_near_the_lock():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Population([TABLE_1], 0.6), "slope 0.6 rad is out of range"),
-        (lambda: step_noise(np.random.default_rng(0), 9, 1, 1.0), "hurst 1 is out of range"),
+        (lambda: Population([TABLE_1], 0.6), "slope: 0.6 rad; allowed: within the leg angle"),
+        (
+            lambda: step_noise(np.random.default_rng(0), 9, 1, 1.0),
+            "hurst: 1; allowed: at least 0.5",
+        ),
         (
             lambda: PopulationWalker(Population([TABLE_1]), 2, 0, np.zeros(1), asymmetry=2),
-            "asymmetry 2 is out of range",
+            "asymmetry: 2; allowed: above -1",
         ),
     ],
 )
