@@ -8,46 +8,32 @@ from typing import Any
 
 import numpy as np
 
-from gait_entrainment.drawing import (
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PINK,
-    SKY,
-    YELLOW,
-    new_figure,
-    save_figure,
-)
+from gait_entrainment import drawing
 from gait_entrainment_studies.cohort.study import Study, verdicts
 
 _COLOURS = {
-    "entrained": GREEN,
-    "undecided": GREY,
-    "untestable": SKY,
-    "drifting": ORANGE,
-    "lost": YELLOW,
-    "fell": BLUE,
-    "flew off": PINK,
+    "entrained": drawing.GREEN,
+    "undecided": drawing.GREY,
+    "untestable": drawing.SKY,
+    "drifting": drawing.ORANGE,
+    "lost": drawing.YELLOW,
+    "fell": drawing.BLUE,
+    "flew off": drawing.PINK,
 }
 
 
 def draw_cohort(study: Study, folder: Path) -> list[Path]:
     """Draw the share of each verdict, and each subject's basin without noise."""
-    figure, (left, right) = new_figure(1, 2, size=(9.6, 4.0))
+    figure, (left, right) = drawing.new_figure(1, 2, size=(9.6, 4.0))
     _draw_verdicts(study, left)
-    drawn = [left]
     if study.basins.size:
         _draw_basins(study, right)
-        drawn.append(right)
     else:
         right.set_axis_off()
-    for axes in drawn:
+    for axes in (left, right):
         axes.locator_params(axis="y", integer=True)
-        axes.legend(
-            frameon=False, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=4
-        )
-    return save_figure(figure, folder, "cohort")
+        drawing.add_legend(axes, loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=4)
+    return drawing.save_figure(figure, folder, "cohort")
 
 
 def _draw_verdicts(study: Study, axes: Any) -> None:
@@ -65,9 +51,13 @@ def _draw_verdicts(study: Study, axes: Any) -> None:
 
 def _draw_basins(study: Study, axes: Any) -> None:
     percent = np.sort(study.basin_widths)
-    axes.plot(percent, np.arange(1, percent.size + 1), "o", color=BLUE, ms=4)
-    axes.axvline(percent.mean(), color=BLUE, ls="--", lw=1, label=f"mean {percent.mean():.2f} %")
-    axes.axvspan(6.7 - 3.6, 6.7 + 3.6, color=ORANGE, alpha=0.15, lw=0, label="human 6.7 ± 3.6 %")
-    axes.axvline(6.7, color=ORANGE, lw=1)
+    axes.plot(percent, np.arange(1, percent.size + 1), "o", color=drawing.BLUE, ms=4)
+    axes.axvline(
+        percent.mean(), color=drawing.BLUE, ls="--", lw=1, label=f"mean {percent.mean():.2f} %"
+    )
+    axes.axvspan(
+        6.7 - 3.6, 6.7 + 3.6, color=drawing.ORANGE, alpha=0.15, lw=0, label="human 6.7 ± 3.6 %"
+    )
+    axes.axvline(6.7, color=drawing.ORANGE, lw=1)
     axes.set(xlabel="basin of entrainment [% of the stride]", ylabel="subjects, sorted", xlim=0)
     axes.set_title("basins without noise, solved", fontsize=10)

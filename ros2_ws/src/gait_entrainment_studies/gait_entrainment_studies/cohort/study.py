@@ -23,10 +23,10 @@ from gait_entrainment_studies.cohort.subjects import Subjects
 from gait_entrainment_studies.locking.branches import basin_of, locked_gaits, pieces_of
 from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
 from gait_entrainment_studies.locking.roots import Floats
+from gait_entrainment_studies.variability.noise import step_noise
 from gait_entrainment_studies.variability.population import (
     Population,
     PopulationWalk,
-    PopulationWalker,
     PulseTrains,
     locked_runs,
     noise_for,
@@ -109,8 +109,13 @@ def run_study(subjects: Subjects, plan: StudyPlan) -> Study:
 
     Raises UsageError if the plan cannot be conducted.
     """
-    population = Population(subjects.walkers, plan.slope)
-    noise = noise_for(population, subjects.variation, (plan.seed, _PILOT), plan.hurst)
+    population = Population(subjects.walkers, plan.slope, plan.asymmetry)
+    noise = noise_for(
+        Population(subjects.walkers, plan.slope),
+        subjects.variation,
+        (plan.seed, _PILOT),
+        plan.hurst,
+    )
     gaits = [PulsedGait(walker, plan.torque, plan.width) for walker in subjects.walkers]
     pieces = [pieces_of(gait) for gait in gaits]
     # Half the stride is room enough for any stride that noise makes; less the pulse, so that no
@@ -120,15 +125,7 @@ def run_study(subjects: Subjects, plan: StudyPlan) -> Study:
     for offset in plan.period_offsets:
         if not abs(offset) < shortest:
             raise UsageError(f"period_offset: {offset:g} s; allowed: within {shortest:.3g} s")
-        walker = PopulationWalker(
-            population,
-            2 * (plan.baseline + plan.pulses + plan.washout) + 2,
-            (plan.seed, _TRIAL, nanoseconds(offset) % 2**64),
-            noise,
-            plan.hurst,
-            plan.asymmetry,
-        )
-        walk, trains = _conduct(walker, plan, offset, population.size)
+        walk, trains = _conduct(population, noise, plan, offset)
         for subject, gait in enumerate(gaits):
             lock = math.nan
             if plan.solvable:
@@ -143,20 +140,22 @@ def run_study(subjects: Subjects, plan: StudyPlan) -> Study:
 
 
 def _conduct(
-    walker: PopulationWalker, plan: StudyPlan, offset: float, count: int
+    population: Population, noise: Floats, plan: StudyPlan, offset: float
 ) -> tuple[PopulationWalk, PulseTrains]:
-    """Walk the baseline, plan the pulses from it as a protocol does, walk the rest."""
-    baseline = walker.walk(2 * (plan.baseline - 1))
+    """Walk the baseline, plan the pulses from it as a protocol does, walk all of it with them."""
+    steps = 2 * (plan.baseline + plan.pulses + plan.washout)
+    seed = (plan.seed, _TRIAL, nanoseconds(offset) % 2**64)
+    noise = noise * step_noise(seed, steps + 2, population.size, plan.hurst)
+    baseline = population.walk(noise[: 2 * (plan.baseline - 1)])
     measured = baseline.stride_periods.mean(axis=0)
     trains = PulseTrains(
         first_onset=baseline.heel_strikes[-1] + (1 + plan.initial_phase) * measured,
         period=measured + offset,
         count=plan.pulses,
-        torque=np.full(count, plan.torque),
+        torque=np.full(population.size, plan.torque),
         width=plan.width,
     )
-    steps = 2 * (plan.baseline + plan.pulses + plan.washout)
-    return walker.walk(steps, trains), trains
+    return population.walk(noise[:steps], trains), trains
 
 
 def _trial(

@@ -46,13 +46,13 @@ _LONGEST = 4000
 
 
 class Outcome(str, Enum):
-    """What became of a walk under pulses."""
+    """What became of a walk under pulses, the better the earlier."""
 
     LOCKED = "locked"
     ALTERNATING = "locked 2:2: every other stride alike"
-    SLIPPING = "slipping"
     CENSORED = "censored: neither locked nor slipped through a cycle"
     """Too short to tell; or, past a flip, bound to the pulses without ever repeating itself."""
+    SLIPPING = "slipping"
     FELL = "fell"
     FLEW_OFF = "flew off"
 

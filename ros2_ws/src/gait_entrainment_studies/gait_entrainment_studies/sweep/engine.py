@@ -13,8 +13,8 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
@@ -23,9 +23,6 @@ from gait_entrainment_studies.sweep.row import Row, sweep_row
 
 # A scheduler that does not answer within this time [s] is reported.
 SCHEDULER_TIMEOUT = 6.0
-
-# Rows submitted for each worker: enough to keep it busy.
-_AHEAD = 2
 
 Rows = Iterator[tuple[int, Row]]
 
@@ -50,7 +47,9 @@ def rows_by_processes(plan: SweepPlan, indices: Sequence[int], jobs: int) -> Row
         jobs, context, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)
     )
     try:
-        yield from _in_flight(lambda index: pool.submit(sweep_row, plan, index), indices, jobs)
+        futures = {pool.submit(sweep_row, plan, index): index for index in indices}
+        for future in as_completed(list(futures)):
+            yield futures.pop(future), future.result()
     except BrokenProcessPool:
         raise SweepError(
             f"one of {jobs} processes was killed, perhaps because memory ran out: give the same"
@@ -58,20 +57,6 @@ def rows_by_processes(plan: SweepPlan, indices: Sequence[int], jobs: int) -> Row
         ) from None
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
-
-
-def _in_flight(submit: Callable[[int], "Future[Row]"], indices: Sequence[int], jobs: int) -> Rows:
-    waiting = iter(indices)
-    running: dict[Future[Row], int] = {}
-    while True:
-        for index in waiting:
-            running[submit(index)] = index
-            if len(running) >= _AHEAD * jobs:
-                break
-        if not running:
-            return
-        for future in wait(running, return_when=FIRST_COMPLETED).done:
-            yield running.pop(future), future.result()
 
 
 def rows_by_dask(plan: SweepPlan, indices: Sequence[int], scheduler: str) -> Rows:

@@ -15,18 +15,19 @@ Seed = int | tuple[int, ...]
 TRUNCATION = 3.0
 
 
-def step_noise(generator: np.random.Generator, steps: int, size: int, hurst: float) -> Floats:
+def step_noise(seed: Seed, steps: int, size: int, hurst: float = 0.5) -> Floats:
     """
     Return fractional Gaussian noise (steps, size) of unit variance, truncated.
 
-    `hurst` 0.5 is white; above, up to 1, neighbours resemble each other over long stretches
-    (strides of adults: about 0.75). By circulant embedding (Davies and Harte 1987), exact.
+    With `hurst` 0.5 it is white; above, up to 1, neighbours resemble each other over long
+    stretches (strides of adults: about 0.75). By circulant embedding (Davies and Harte 1987),
+    which is exact.
 
     Raises UsageError for a Hurst exponent out of range.
     """
     if not 0.5 <= hurst < 1:
         raise UsageError(f"hurst: {hurst:g}; allowed: at least 0.5, which is white, and below 1")
-    lags = np.arange(steps + 1.0)
+    generator, lags = np.random.default_rng(seed), np.arange(steps + 1.0)
     power = 2 * hurst
     covariance = 0.5 * (np.abs(lags + 1) ** power - 2 * lags**power + np.abs(lags - 1) ** power)
     circulant = np.concatenate([covariance, covariance[-2:0:-1]])

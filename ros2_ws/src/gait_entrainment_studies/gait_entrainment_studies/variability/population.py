@@ -35,8 +35,8 @@ _PILOT_STRIDES = 400
 _PILOT_ROUNDS = 2
 _PILOT_NOISE = 0.02
 
-# No noise takes more than this of a push-off's stiffness away.
-_LEAST_STIFFNESS = 0.01
+# What noise leaves at least of a push-off's stiffness.
+_LEAST = 0.01
 
 
 @dataclass(frozen=True)
@@ -77,56 +77,65 @@ class PopulationWalk:
 
 class Population:
     """
-    Walkers (n,), on ground that rises by `slope` [rad].
+    Walkers (n,), on ground that rises by `slope` [rad], with legs that differ by `asymmetry`.
 
-    Raises UsageError for a slope on which a walker could not stand.
+    Raises UsageError if a walker could not stand on the slope, or push off with both legs.
     """
 
-    def __init__(self, walkers: Sequence[WalkerParameters], slope: float = 0.0) -> None:
+    def __init__(
+        self, walkers: Sequence[WalkerParameters], slope: float = 0.0, asymmetry: float = 0.0
+    ) -> None:
         steepest = min(walker.leg_angle for walker in walkers)
         if not abs(slope) < steepest:
             raise UsageError(
                 f"slope: {slope:g} rad; allowed: within the leg angle, {steepest:.4g} rad"
             )
+        if not -1 < asymmetry < 1:
+            raise UsageError(f"asymmetry: {asymmetry:g}; allowed: above -1 and below 1")
         self.size = len(walkers)
-        self.stiffness = np.array([walker.ankle_stiffness for walker in walkers])
         self._models = [_made_for_noise(walker, slope) for walker in walkers]
+        # In even steps the leg that is not perturbed trails and pushes off.
+        self._sides = 1 - asymmetry, 1 + asymmetry
 
-    def periodic_apex(self, first: Floats, second: Floats) -> Floats:
-        """
-        `apex` that repeats itself every two steps without noise, right after a heel strike.
+    def periodic_apex(self) -> Floats:
+        """`apex` (n,) right after heel strike 0 that repeats itself every stride without noise."""
+        return np.array([self._periodic_apex(model) for model in self._models])
 
-        `first` and `second` are the stiffness [N m/rad] of the two push-offs; arrays (n,).
-        """
-        found = np.zeros(self.size)
-        for index, model in enumerate(self._models):
-            apex, kept = 0.0, model["restitution"]
-            turn = model["max_plantarflexion"] - model["double_stance_start"]
-            # A step maps the apex linearly; from zero, two of them give the map's constant.
-            for k in (first[index], second[index]):
-                apex += model["per_energy"] * torque_work(turn, k * turn, k)
-                apex = kept * (apex + model["strike_gain"]) - model["start_gain"]
-            found[index] = apex / (1 - kept**2)
-        return found
+    def _periodic_apex(self, model: Any) -> float:
+        apex, kept = 0.0, model["restitution"]
+        turn = model["max_plantarflexion"] - model["double_stance_start"]
+        # A step maps the apex linearly; from zero, two of them give the map's constant.
+        for side in self._sides:
+            k = side * model["stiffness"]
+            apex += model["per_energy"] * torque_work(turn, k * turn, k)
+            apex = kept * (apex + model["strike_gain"]) - model["start_gain"]
+        return float(apex / (1 - kept**2))
 
     def walk(
-        self, stiffness: Floats, initial_apex: Floats, trains: PulseTrains | None = None
+        self, noise: Floats, trains: PulseTrains | None = None, apex: Floats | None = None
     ) -> PopulationWalk:
-        """Walk with this stiffness (steps, n) of the push-offs, from `initial_apex` (n,)."""
-        steps = len(stiffness)
-        heel_strikes = np.full((steps + 1, self.size), np.nan)
-        toe_offs = np.full((steps, self.size), np.nan)
+        """
+        Walk with `noise` (steps, n), the deviation of each push-off's stiffness over its mean.
+
+        The walk begins with `apex` (n,), or in the gait of this slope and these legs, so that no
+        transient enters period or variation.
+        """
+        steps = len(noise)
+        strikes = np.full((steps + 1, self.size), np.nan)
+        offs = np.full((steps, self.size), np.nan)
+        factors = np.resize(self._sides, steps)[:, None] * np.clip(1 + noise, _LEAST, None)
+        apex = self.periodic_apex() if apex is None else apex
         endings: list[EndingKind | None] = []
         for index, model in enumerate(self._models):
+            one = model.copy()
             pulses = None if trains is None else trains.of(index)
-            apex, stiff = float(initial_apex[index]), np.ascontiguousarray(stiffness[:, index])
-            walked = walk(model, steps, pulses, apex, stiff)
-            heel_strikes[: walked.heel_strikes.size, index] = walked.heel_strikes
-            toe_offs[: walked.toe_offs.size, index] = walked.toe_offs
+            walked = walk(one, steps, pulses, apex[index], one["stiffness"] * factors[:, index])
+            strikes[: walked.heel_strikes.size, index] = walked.heel_strikes
+            offs[: walked.toe_offs.size, index] = walked.toe_offs
             endings.append(walked.ending)
         fell = np.array([ending is EndingKind.FALL for ending in endings])
         flew_off = np.array([ending is EndingKind.FLY_OFF for ending in endings])
-        return PopulationWalk(heel_strikes, toe_offs, fell, flew_off)
+        return PopulationWalk(strikes, offs, fell, flew_off)
 
 
 def _made_for_noise(walker: WalkerParameters, slope: float) -> Any:
@@ -142,54 +151,22 @@ def _made_for_noise(walker: WalkerParameters, slope: float) -> Any:
     return model
 
 
-class PopulationWalker:
-    """
-    The walk that each walker of a population makes with its noise, as far as it is asked for.
-
-    `noise` (n,) is the standard deviation of the push-off stiffness over its mean, `hurst` its
-    correlation (see `noise`), `asymmetry` the excess of the perturbed leg's stiffness.
-    Raises UsageError for an asymmetry or Hurst exponent out of range.
-    """
-
-    def __init__(
-        self,
-        population: Population,
-        steps: int,
-        seed: Seed,
-        noise: Floats,
-        hurst: float = 0.5,
-        asymmetry: float = 0.0,
-    ) -> None:
-        if not -1 < asymmetry < 1:
-            raise UsageError(f"asymmetry: {asymmetry:g}; allowed: above -1 and below 1")
-        self._population, mean = population, population.stiffness
-        draws = step_noise(np.random.default_rng(seed), steps, population.size, hurst)
-        # In odd steps the perturbed leg trails and pushes off.
-        sides = np.where(np.arange(steps)[:, None] % 2 == 1, 1 + asymmetry, 1 - asymmetry)
-        self._stiffness = mean * sides * np.clip(1 + noise * draws, _LEAST_STIFFNESS, None)
-        # In the gait of this slope and these legs: no transient enters period or variation.
-        self._apex = population.periodic_apex(mean * (1 - asymmetry), mean * (1 + asymmetry))
-
-    def walk(self, steps: int, trains: PulseTrains | None = None) -> PopulationWalk:
-        """Walk so many steps; with pulses, which may be planned from a shorter walk before."""
-        return self._population.walk(self._stiffness[:steps], self._apex, trains)
-
-
 def noise_for(
     population: Population, coefficient_of_variation: Floats, seed: Seed, hurst: float = 0.5
 ) -> Floats:
     """
     Return the noise (n,) with which each walker's stride period varies by this coefficient.
 
-    Found by pilot walks, in which the coefficient is nearly proportional to the noise. Of a walker
-    that falls in them the strides before the fall count; it may fall in the experiment too.
+    It is the standard deviation of the push-off stiffness over its mean. It is found by pilot
+    walks, in which the coefficient is nearly proportional to the noise. If a walker falls in them,
+    the strides before the fall count; it may fall in the experiment too.
     """
+    draws = step_noise(seed, 2 * _PILOT_STRIDES, population.size, hurst)
     noise = np.full(population.size, _PILOT_NOISE)
     for _ in range(_PILOT_ROUNDS):
-        walker = PopulationWalker(population, 2 * _PILOT_STRIDES, seed, noise, hurst)
-        periods = np.ma.masked_invalid(walker.walk(2 * _PILOT_STRIDES).stride_periods)
+        periods = np.ma.masked_invalid(population.walk(noise * draws).stride_periods)
         found = np.ma.filled(periods.std(axis=0, ddof=1) / periods.mean(axis=0), np.nan)
-        # One that fell before its third stride tells nothing new.
+        # A walker that fell before its third stride tells nothing new.
         noise = np.where(found > 0, noise * coefficient_of_variation / found, noise)
     return noise
 
