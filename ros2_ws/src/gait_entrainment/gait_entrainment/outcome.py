@@ -6,12 +6,12 @@
 import math
 import statistics
 from collections.abc import Sequence
-from dataclasses import asdict
-from typing import Any, Protocol
+from dataclasses import asdict, dataclass
+from typing import Any
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind
 from gait_entrainment.gait import Analysis, GaitEvent, Verdict
-from gait_entrainment.protocol import Protocol as ProtocolOfRun
+from gait_entrainment.protocol import Protocol
 from gait_entrainment.robot import PulseTiming
 from gait_entrainment.robot.timing import distribution
 
@@ -26,32 +26,21 @@ _MEANINGS = {
 }
 
 
-class Run(Protocol):
-    """What a simulated and a recorded run have in common."""
+@dataclass(frozen=True)
+class Run:
+    """What a simulated and a recorded run have in common; stamps are integer nanoseconds."""
 
-    @property
-    def protocol(self) -> ProtocolOfRun:
-        """What was conducted."""
-
-    @property
-    def events(self) -> tuple[GaitEvent, ...]:
-        """Gait events in the order in which they came."""
-
-    @property
-    def analysis(self) -> Analysis:
-        """Strides, pulse phases and verdicts."""
-
-    @property
-    def measured_period(self) -> float:
-        """Mean stride period over the baseline [s]; NaN without a plan."""
-
-    @property
-    def pulse_period(self) -> float:
-        """Period of the pulses as planned [s]; NaN without a plan."""
+    protocol: Protocol
+    events: tuple[GaitEvent, ...]  # in the order in which they came
+    onsets: tuple[int, ...]  # of the pulses
+    timings: tuple[PulseTiming, ...]  # commanded, sent and measured onset of each pulse
+    measured_period: float  # mean stride period over the baseline [s]; NaN without a plan
+    pulse_period: float  # as planned [s]; NaN without a plan
+    analysis: Analysis
 
 
 def outcome_of(run: Run) -> dict[str, Any]:
-    """Return what ``--json`` prints; times in seconds, None where something is not known."""
+    """Return what ``--json`` prints; times in seconds, None for what is not known."""
     protocol, analysis = run.protocol, run.analysis
     strides = [s for s in analysis.strides if s.number <= protocol.strides]
     start = strides[0].start if strides else 0
@@ -60,7 +49,6 @@ def outcome_of(run: Run) -> dict[str, Any]:
     entrained = verdict is Verdict.ENTRAINED
     placed = [p for p in analysis.pulses if p.toe_off is not None]  # the others have no lag
     lags = [p.phase_lag for p in placed[-FINAL_PULSES:]]
-    toe_off = placed[-1].toe_off if placed else None
     parameters = asdict(protocol)
     parameters["side"] = protocol.side.name.lower()
     parameters["pulses"]["torque"] = protocol.pulse_torque
@@ -81,7 +69,7 @@ def outcome_of(run: Run) -> dict[str, Any]:
             "entrained": entrained,
             "entrained_since_stride": last.entrained_since_stride if last and entrained else None,
             "final_phase_lag": statistics.median(lags) if lags else math.nan,
-            "double_stance": _double_stance(run.events, toe_off),
+            "double_stance": _double_stance(run.events, placed[-1].toe_off if placed else None),
             "parameters": parameters,
         }
     )
@@ -146,7 +134,7 @@ def _without_nan(value: Any) -> Any:
 
 
 def timing_outcome(timings: Sequence[PulseTiming], stride: float) -> dict[str, Any]:
-    """Return what ``--json`` prints of the pulses' timing; percentages are of a stride [s]."""
+    """Return what ``--json`` prints about the timing of the pulses; ``stride`` is a period [s]."""
     return {
         "sent": distribution(timings, "sent", stride),
         "measured": distribution(timings, "measured", stride),
@@ -157,7 +145,7 @@ def timing_outcome(timings: Sequence[PulseTiming], stride: float) -> dict[str, A
 
 
 def timing_summary(outcome: dict[str, Any]) -> list[str]:
-    """Return lines for people; none where every pulse came at its instant."""
+    """Return lines for people; none if every pulse came at its instant."""
     lines = []
     for kind in ("sent", "measured"):
         figures = outcome[kind]

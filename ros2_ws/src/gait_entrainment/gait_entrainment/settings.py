@@ -89,7 +89,7 @@ class Setting:
     def parse(self, name: str, text: str) -> Any:
         """Return the value that a text stands for; raises SettingError as ``check`` does."""
         kind: Any = self.kind
-        value = None
+        value: Any = None
         if kind is str:
             value = text
         elif kind is bool:

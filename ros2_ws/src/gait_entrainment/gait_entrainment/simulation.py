@@ -8,17 +8,16 @@ Conductor, ankle robot and walker are the objects that the nodes hold, driven in
 which a lock-step run drives them. So both give the same events to the nanosecond.
 """
 
-import math
 from dataclasses import dataclass
 
 from gait_entrainment.experiment import Conductor
-from gait_entrainment.gait import Analysis, GaitEvent, VerdictSettings, analyze
+from gait_entrainment.gait import GaitEvent, VerdictSettings, analyze
+from gait_entrainment.outcome import Run
 from gait_entrainment.protocol import Protocol
 from gait_entrainment.robot import (
     DeviceLimits,
     LimitError,
     MeasuredOnsets,
-    PulseTiming,
     PulseTrain,
     find_driver,
 )
@@ -26,22 +25,11 @@ from gait_entrainment.walker import Ending, WalkerRun
 
 
 @dataclass(frozen=True)
-class Simulation:
-    """What came of a simulated experiment; stamps are nanoseconds since its start."""
+class Simulation(Run):
+    """What came of a simulated experiment; stamps count from its start."""
 
-    protocol: Protocol
-    events: tuple[GaitEvent, ...]
-    onsets: tuple[int, ...]  # of the pulses that were delivered, as the analysis takes them
-    timings: tuple[PulseTiming, ...]  # commanded, sent and measured onset of each pulse
-    train: PulseTrain | None  # as planned; None where the walker did not come so far
-    measured_period: float  # mean stride period over the baseline [s]; NaN without a plan
-    ending: Ending | None  # fall or fly-off; None where every stride was walked
-    analysis: Analysis
-
-    @property
-    def pulse_period(self) -> float:
-        """Period of the pulses as planned [s]; NaN without a plan."""
-        return self.train.period if self.train is not None else math.nan
+    train: PulseTrain | None  # as planned; None if the walker did not come so far
+    ending: Ending | None  # fall or fly-off; None if every stride was walked
 
 
 def simulate(
@@ -55,15 +43,10 @@ def simulate(
     Conduct a protocol on the simulated walker.
 
     With ``measured_onsets`` the analysis takes the onset of each pulse from the torque that the
-    robot measured, where it shows one, instead of from the command.
+    robot measured, if that shows one, instead of from the command.
 
-    Raises
-    ------
-    LimitError
-        where the driver is unknown, or the pulses are outside the limits of the device.
-    ProtocolError
-        where the pulses would overlap at the measured period.
-
+    Raises LimitError if the driver is unknown or the pulses are outside the limits of the device,
+    ProtocolError if the pulses would overlap at the measured period.
     """
     driver = find_driver(protocol.driver)
     if not driver.simulated:
@@ -106,6 +89,7 @@ def simulate(
         timings=tuple(measured.timings),
         train=conductor.train,
         measured_period=conductor.measured_period,
+        pulse_period=conductor.pulse_period,
         ending=run.ending,
         analysis=analyze(events, onsets, protocol.side, settings),
     )

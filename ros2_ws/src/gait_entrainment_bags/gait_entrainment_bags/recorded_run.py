@@ -30,7 +30,7 @@ from gait_entrainment.gait import (
     published_values,
 )
 from gait_entrainment.gait.analyzer import Result
-from gait_entrainment.outcome import outcome_of, timing_outcome
+from gait_entrainment.outcome import Run, outcome_of, timing_outcome
 from gait_entrainment.protocol import Protocol, ProtocolError, read_protocol
 from gait_entrainment.robot import PulseTiming
 from gait_entrainment_bags import ENDED_EARLY, BagError, BagMessage, BagReader
@@ -62,7 +62,7 @@ class AnkleTorques:
 
 
 @dataclass(frozen=True)
-class RecordedRun:
+class RecordedRun(Run):
     """What a bag holds of one run; stamps are nanoseconds since 1970, as recorded."""
 
     protocol: Protocol

@@ -120,7 +120,7 @@ def walk_steps(
         model.stiffness = stiffness[0]
     start_walking(model, segment, 1, apex)
     while strikes < heel_strikes.size:
-        if segment.phase == SINGLE_STANCE and strikes + 1 < stiffness.size:
+        if segment.stance == SINGLE_STANCE and strikes + 1 < stiffness.size:
             model.stiffness = stiffness[strikes + 1]  # of the push-off that comes next
         outcome = proceed(model, work, segment, changes, torques, 1, cursors, FOREVER)
         if outcome != SWITCHED:

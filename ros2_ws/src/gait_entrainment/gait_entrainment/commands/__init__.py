@@ -6,7 +6,7 @@ The command line ``entrain``: a table of commands, each loaded only when it is a
 
 A package adds commands by the entry point ``gait_entrainment.commands``. It names a module with
 ``COMMANDS``, a mapping from name to what the command is for. The command itself is the module of
-that name beside it:
+that name in the same package:
 
     DESCRIPTION, EXAMPLES     what ``entrain NAME --help`` says
     add_options(parser)       adds the options
@@ -61,10 +61,13 @@ def make_parser(name: str = "") -> argparse.ArgumentParser:
     """Return the parser of the command line; only the command of this name is loaded."""
     parser = argparse.ArgumentParser(prog="entrain", description=_DESCRIPTION)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    for command, (package, purpose) in _find_commands().items():
-        options = commands.add_parser(command, help=purpose)
-        if command == name:
-            add_command(options, f"{package}.{command.replace('-', '_')}")
+    # A command of the core does not search the other packages: that takes longer than to run it.
+    packages = {__name__: COMMANDS} if name in COMMANDS else _find_packages()
+    for package, found in packages.items():
+        for command, purpose in found.items():
+            options = commands.add_parser(command, help=purpose)
+            if command == name:
+                add_command(options, f"{package}.{command.replace('-', '_')}")
     return parser
 
 
@@ -79,13 +82,7 @@ def add_command(parser: argparse.ArgumentParser, module_name: str) -> None:
         parser.set_defaults(run=module.run)
 
 
-def _find_commands() -> dict[str, tuple[str, str]]:
-    """Return package and purpose of every command, by its name."""
-    packages = {__name__: COMMANDS}
-    for point in sorted(entry_points(group=ENTRY_POINTS), key=lambda point: point.name):
-        packages[point.value] = point.load().COMMANDS
-    return {
-        command: (package, purpose)
-        for package, commands in packages.items()
-        for command, purpose in commands.items()
-    }
+def _find_packages() -> dict[str, dict[str, str]]:
+    """Return the commands with their purposes, by the package that they are in."""
+    points = sorted(entry_points(group=ENTRY_POINTS), key=lambda point: point.name)
+    return {__name__: COMMANDS} | {point.value: point.load().COMMANDS for point in points}

@@ -4,5 +4,3 @@
 """Conducting a protocol: when to perturb, how far ahead to promise, when to end."""
 
 from gait_entrainment.experiment.conductor import Conductor, Horizon, Phase
-
-__all__ = ["Conductor", "Horizon", "Phase"]

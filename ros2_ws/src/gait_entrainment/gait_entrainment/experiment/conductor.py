@@ -6,9 +6,9 @@ The conductor of an experiment: a pure function from received stamps to pulses a
 
 It is told which gait events happened and up to which instant all of them are known, and answers
 with a horizon, the promise to request no pulse that begins earlier. It plans the pulses one
-stride ahead, at the strike that starts the last baseline stride, so that a robot has its lead
-time, and so that a walker that never computes past the promises is never held back by the very
-event that is waited for.
+stride ahead, at the strike that starts the last baseline stride. So a robot has its lead time, and
+a walker that never computes past the promises is never held back by the very event that everybody
+is waiting for.
 """
 
 import enum
@@ -35,7 +35,7 @@ class Phase(enum.IntEnum):
 
 @dataclass(frozen=True)
 class Horizon:
-    """No new pulse begins before ``until`` [ns]; the run ends there where ``last`` is set."""
+    """No new pulse begins before ``until`` [ns]; the run ends there if ``last`` is set."""
 
     until: int
     last: bool
@@ -45,27 +45,14 @@ class Conductor:
     """
     Conducts one protocol.
 
-    Parameters
-    ----------
-    protocol
-        What to do.
-    longest_lookahead
-        Upper bound of the lookahead [s]. In lock-step it is a stride, which is where the speed
-        comes from; in real time a short one leaves more to be decided late.
-
-    Attributes
-    ----------
-    train
-        The planned pulses; None until the strike that starts the last baseline stride.
-    measured_period, measured_period_error
-        Mean stride period over the baseline [s] and its standard error; NaN while, or where, no
-        complete stride tells it.
-
+    ``longest_lookahead`` [s] bounds how far ahead it promises. In lock-step that is a stride,
+    which is where the speed comes from; in real time a short one leaves more to be decided late.
     """
 
     def __init__(self, protocol: Protocol, longest_lookahead: float = math.inf) -> None:
         self.protocol = protocol
-        self.train: PulseTrain | None = None
+        self.train: PulseTrain | None = None  # planned where the last baseline stride starts
+        # Mean stride period over the baseline [s] and its standard error; NaN if not measured.
         self.measured_period = math.nan
         self.measured_period_error = math.nan
         self._tracker = StrideTracker(protocol.side)
@@ -74,6 +61,11 @@ class Conductor:
         self._lookahead = min(_shortest_stride(protocol), longest_lookahead)
         self._longest_promise = self._lookahead
         self._closing_strike: int | None = None  # strike that closes the last stride [ns]
+
+    @property
+    def pulse_period(self) -> float:
+        """Period of the pulses as planned [s]; NaN without a plan."""
+        return math.nan if self.train is None else self.train.period
 
     @property
     def strides(self) -> int:
@@ -93,11 +85,7 @@ class Conductor:
         """
         Take one gait event; return the pulses to request, if this event lets them be planned.
 
-        Raises
-        ------
-        ProtocolError
-            where pulses at the period that follows from the measured one would overlap.
-
+        Raises ProtocolError if they would overlap at the resulting period.
         """
         stride = self._tracker.add(event)
         if event.side is not self.protocol.side or event.kind is not EventKind.HEEL_STRIKE:
@@ -122,7 +110,7 @@ class Conductor:
         The first onset lies (1 + P) measured periods after a strike that was not yet known when
         the promise before was made, and no lookahead is longer than the shortest stride that
         entered the measured period: so no promise ever covers an onset that is not yet planned.
-        The run ends at a fixed distance after its closing strike, one that no promise made before
+        The run ends at a fixed distance after its closing strike, which no promise made before
         that strike can have passed: the end does not depend on how the run was cut into grants.
         """
         if self._closing_strike is not None:
@@ -134,7 +122,7 @@ class Conductor:
         protocol, plan = self.protocol, self.protocol.pulses
         if self._periods:
             stride = self.measured_period = statistics.fmean(self._periods)
-        elif plan.period is not None:  # no complete stride was asked for: the best guess there is
+        elif plan.period is not None:  # the best guess if no complete stride was asked for
             stride = plan.period
         else:
             raise ProtocolError(
@@ -159,7 +147,7 @@ def _shortest_stride(protocol: Protocol) -> float:
     Return a period [s] that no stride undercuts, for promises made before one is measured.
 
     A foot stays on the ground only while the leg turns slower than sqrt(g / L), and a stride
-    turns it by 4 alpha. An absolute pulse period stands in where nothing will be measured.
+    turns it by 4 alpha. An absolute pulse period stands in if nothing will be measured.
     """
     walker = protocol.walker
     stride = 4 * walker.leg_angle * math.sqrt(walker.leg_length / walker.gravity)

@@ -14,21 +14,3 @@ from gait_entrainment.gait.published import published_values
 from gait_entrainment.gait.pulse_phase import PulsePhase
 from gait_entrainment.gait.strides import EventCounts, Stride, StrideTracker
 from gait_entrainment.gait.verdict import Entrainment, Verdict, VerdictSettings
-
-__all__ = [
-    "Analysis",
-    "Drift",
-    "Entrainment",
-    "EventCounts",
-    "GaitAnalyzer",
-    "GaitEvent",
-    "PulseCounts",
-    "PulsePhase",
-    "Stride",
-    "StrideTracker",
-    "Verdict",
-    "VerdictSettings",
-    "analyze",
-    "drift_of",
-    "published_values",
-]

@@ -59,7 +59,7 @@ class GaitAnalyzer:
 
     Two inputs, in any interleaving: gait events, and promises about pulses. A stride comes out
     with the heel strike that closes it. Its pulses come out, with the verdict at that stride,
-    once the promises reach that heel strike; where a pulse may be nearer to the next toe-off than
+    once the promises reach that heel strike; if a pulse may be nearer to the next toe-off than
     to its own, once the next stride is closed too. So the sequence of strides depends on the
     events alone, and the sequences of pulse phases and of verdicts on the events and the onsets,
     never on how events and promises interleave. (A stop is not bound by this: it happens when it
@@ -74,12 +74,12 @@ class GaitAnalyzer:
         self._test = EntrainmentTest(settings or VerdictSettings())
         self._lags = LagFollower()
         self._unperturbed = _UnperturbedPeriod()
-        self._strides: deque[Stride] = deque()  # closed, pulses not resolved yet
-        self._before: Stride | None = None  # the latest stride whose pulses are resolved
-        self._onsets: list[int] = []  # announced, not resolved yet; ascending
+        self._strides: deque[Stride] = deque()  # closed, pulses not placed yet
+        self._before: Stride | None = None  # the latest stride whose pulses are placed
+        self._onsets: list[int] = []  # announced, not placed yet; ascending
         self._promised = -math.inf  # no pulse before this instant will be added [ns]
         self._finished = False
-        self._number = 0  # of the latest pulse resolved
+        self._number = 0  # of the latest pulse placed
         self.pulse_counts = PulseCounts()
 
     @property
@@ -93,7 +93,7 @@ class GaitAnalyzer:
         if stride is None:
             return []
         self._strides.append(stride)
-        return [stride, *self._resolve()]
+        return [stride, *self._place()]
 
     def add_promise(self, onsets: Iterable[int], valid_until: int) -> list[Result]:
         """
@@ -110,10 +110,10 @@ class GaitAnalyzer:
             if self._onsets[place : place + 1] != [onset]:
                 self._onsets.insert(place, onset)
         self._promised = max(self._promised, valid_until)
-        return self._resolve()
+        return self._place()
 
     def stop(self, stamp: int) -> None:
-        """Take a stop [ns]: no announced pulse begins from it on, and no promise reaches on."""
+        """Take a stop [ns]: no announced pulse begins from it on, and no promise goes beyond."""
         kept = bisect_left(self._onsets, stamp)
         self.pulse_counts.withdrawn += len(self._onsets) - kept
         del self._onsets[kept:]
@@ -123,32 +123,28 @@ class GaitAnalyzer:
         """End the run: no more events or pulses. Returns the results that were waiting."""
         self._promised = math.inf
         self._finished = True
-        results = self._resolve()
+        results = self._place()
         self.pulse_counts.outside_strides += len(self._onsets)
         self._onsets.clear()
         return results
 
-    def _resolve(self) -> list[Result]:
-        """Resolve the pulses of closed strides, as far as events and promises allow."""
+    def _place(self) -> list[Result]:
+        """Place the pulses of closed strides, as far as events and promises allow."""
         results: list[Result] = []
         while self._strides and self._strides[0].end <= self._promised:
             stride = self._strides[0]
             onsets = self._onsets[: bisect_left(self._onsets, stride.end)]
             after = self._strides[1] if len(self._strides) > 1 else None
-            if (
-                onsets
-                and after is None
-                and not self._finished
-                and depends_on_next_toe_off(onsets[-1], stride)
-            ):
+            waiting = after is None and not self._finished
+            if waiting and onsets and depends_on_next_toe_off(onsets[-1], stride):
                 break
             self._strides.popleft()
             del self._onsets[: len(onsets)]
-            results += self._resolve_stride(stride, after, onsets)
+            results += self._place_in(stride, after, onsets)
             self._before = stride
         return results
 
-    def _resolve_stride(
+    def _place_in(
         self, stride: Stride, after: Stride | None, onsets: Sequence[int]
     ) -> list[Result]:
         """Place the pulses that began before the end of a stride; then ask for the verdict."""
@@ -198,9 +194,7 @@ def analyze(
     """
     analyzer = GaitAnalyzer(side, settings)
     results = [result for event in events for result in analyzer.add_event(event)]
-    known = sorted(onsets)
-    results += analyzer.add_promise(known, known[-1] if known else 0)
-    results += analyzer.finish()
+    results += analyzer.add_promise(onsets, 0) + analyzer.finish()
     return Analysis(
         strides=tuple(result for result in results if isinstance(result, Stride)),
         pulses=tuple(result for result in results if isinstance(result, PulsePhase)),

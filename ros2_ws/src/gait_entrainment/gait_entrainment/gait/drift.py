@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Slope of a phase lag per stride, with an interval that is aware of autocorrelation."""
+"""Slope of a phase lag per stride, with an interval that allows for autocorrelation."""
 
 import itertools
 import math

@@ -18,7 +18,7 @@ class PulsePhase:
     onset: int  # [ns]
     stride: int  # stride in which the pulse began
     phase: float  # (onset - heel strike) / stride period, in [0, 1)
-    phase_lag: float  # onset minus the nearest toe-off [s]; NaN where that toe-off is missing
+    phase_lag: float  # onset minus the nearest toe-off [s]; NaN if that toe-off is missing
     unwrapped_lag: float  # the same, followed across wraps from the first lag on [s]
     toe_off: int | None  # the toe-off that the lag refers to [ns]
 
@@ -37,38 +37,24 @@ def nearest_toe_off(
     onset: int, stride: Stride, before: Stride | None, after: Stride | None
 ) -> tuple[int, int] | None:
     """
-    Return the stamp [ns] of the toe-off nearest to an onset, and the stride that it is in.
+    Return the stamp [ns] of the toe-off nearest to an onset [ns], and the stride that it is in.
 
-    None where a toe-off that is missing might be the nearest: a lag to the next best one would
-    be wrong by up to a stride. Ties go to the earlier toe-off.
-
-    Parameters
-    ----------
-    onset
-        Onset of the pulse [ns], within the stride.
-    stride
-        Stride in which the pulse began.
-    before, after
-        Its neighbours; None where they are missing.
-
+    ``stride`` is the one in which the pulse began, ``before`` and ``after`` are its neighbours,
+    None if they are missing. Returns None if a missing toe-off might be the nearest: a lag to the
+    next best one would be wrong by up to a stride. Ties go to the earlier toe-off.
     """
     own = stride.toe_off
     if own is None:
         return None
-    if onset >= own:
-        if not depends_on_next_toe_off(onset, stride):
-            return own, stride.number
-        if after is None or after.toe_off is None:
-            return None
-        if onset - own <= after.toe_off - onset:
-            return own, stride.number
-        return after.toe_off, after.number
-    if before is None or before.toe_off is None:
+    if onset < own:
         # The toe-off before the stride lies before the heel strike that starts it.
-        return (own, stride.number) if own - onset <= onset - stride.start else None
-    if onset - before.toe_off <= own - onset:
-        return before.toe_off, before.number
-    return own, stride.number
+        other, settled = before, own - onset <= onset - stride.start
+    else:
+        other, settled = after, not depends_on_next_toe_off(onset, stride)
+    if other is None or other.toe_off is None:
+        return (own, stride.number) if settled else None
+    candidates = sorted([(own, stride.number), (other.toe_off, other.number)])
+    return min(candidates, key=lambda candidate: abs(onset - candidate[0]))
 
 
 class LagFollower:
@@ -77,8 +63,8 @@ class LagFollower:
 
     Pulse n is compared with the toe-off n strides after that of the first pulse. That toe-off
     may lie in the future, so its distance from the nearest one is counted in unperturbed strides
-    T: unwrapped lag = lag + (m - n) T, where m strides and n pulses have passed since the first
-    lag. It presumes one train with one pulse a stride (1:1 entrainment).
+    T: unwrapped lag = lag + (m - n) T if m strides and n pulses have passed since the first lag.
+    It presumes one train with one pulse a stride (1:1 entrainment).
     """
 
     def __init__(self) -> None:
@@ -103,6 +89,6 @@ class LagFollower:
         if self._first is None:
             self._first = toe_off_stride, number
         ahead = (toe_off_stride - self._first[0]) - (number - self._first[1])
-        # Without a wrap the lag stands as it is, even where T is unknown (NaN).
+        # Without a wrap the lag stands as it is, even if T is unknown (NaN).
         unwrapped = lag + ahead * unperturbed_period if ahead else lag
         return PulsePhase(number, onset, stride.number, phase, lag, unwrapped, toe_off)

@@ -10,7 +10,7 @@ from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
 from gait_entrainment.gait.event import GaitEvent
 
 # How many places of the gait are remembered, four strides: enough to tell an event that comes
-# twice from one that comes late, and a bound on memory where a leg's strikes stop coming.
+# twice from one that comes late, and a bound on memory if a leg's strikes stop coming.
 REMEMBERED_PLACES = 16
 
 
@@ -22,8 +22,8 @@ class Stride:
     side: Side
     start: int  # heel strike that starts it [ns]
     end: int  # heel strike that closes it [ns]
-    toe_off: int | None  # toe-off of the leg within it [ns]; None where it is missing
-    step_periods: tuple[float, float]  # [s], in order; NaN where the strike between is missing
+    toe_off: int | None  # toe-off of the leg within it [ns]; None if it is missing
+    step_periods: tuple[float, float]  # [s], in order; NaN if the strike between is missing
 
     @property
     def period(self) -> float:
@@ -33,7 +33,7 @@ class Stride:
 
 @dataclass(slots=True)
 class EventCounts:
-    """What became of the events received; for people who must judge the source."""
+    """What became of the events received, for people who must judge the source."""
 
     accepted: int = 0
     out_of_order: int = 0  # accepted after an event that is later in the gait
@@ -52,30 +52,14 @@ class StrideTracker:
     number. Out of order is fine as long as nothing that depends on the event has been decided: an
     event that is earlier in the gait than the leg's latest heel strike is late, since that strike
     has closed one stride and given up those that still lacked a bound. The side of step 0 is
-    taken from the first event. Where two events contradict each other the first to come is
-    believed.
-
-    Parameters
-    ----------
-    side
-        The leg whose strides are wanted.
-
-    Attributes
-    ----------
-    counts
-        What became of the events received so far.
-    latest_strike
-        Stamp of the leg's latest heel strike [ns]; None before the first.
-    stride_in_progress
-        Number of the stride which that strike started; 0 before the first.
-
+    taken from the first event. If two events contradict each other, the first to come is believed.
     """
 
     def __init__(self, side: Side) -> None:
-        self.side = side
-        self.counts = EventCounts()
-        self.latest_strike: int | None = None
-        self.stride_in_progress = 0
+        self.side = side  # the leg whose strides are wanted
+        self.counts = EventCounts()  # what became of the events received so far
+        self.stride_in_progress = 0  # the one that the leg's latest heel strike started
+        self.latest_strike: int | None = None  # its stamp [ns]
         self._first_step: int | None = None  # step that the leg's first heel strike closes
         self._stamps: dict[int, int] = {}  # remembered events: place -> stamp
         self._latest_place = -1
@@ -83,82 +67,60 @@ class StrideTracker:
 
     def add(self, event: GaitEvent) -> Stride | None:
         """Take one event; return the stride that it closes, if it closes one."""
-        if not self._accept(event):
+        fate = self._fate(event)
+        setattr(self.counts, fate, getattr(self.counts, fate) + 1)
+        if fate != "accepted":
             return None
-        if event.kind != EventKind.HEEL_STRIKE or event.side != self.side:
-            return None
-        return self._strike(event)
-
-    def _accept(self, event: GaitEvent) -> bool:
-        """Place the event and count it; False where it must be dropped."""
         place = event.place
-        if place < 0 or not self._side_fits(event):
-            self.counts.contradictory += 1
-            return False
         if place > self._latest_place:
-            if self._latest_place >= 0 and event.stamp <= self._stamps[self._latest_place]:
-                self.counts.contradictory += 1
-                return False
             self.counts.missing += place - self._latest_place - 1
             self._latest_place = place
         else:
-            if place in self._stamps:
-                if event.stamp == self._stamps[place]:
-                    self.counts.repeated += 1
-                else:
-                    self.counts.contradictory += 1
-                return False
-            if place < max(self._strike_place, self._latest_place - REMEMBERED_PLACES):
-                self.counts.late += 1
-                return False
-            if any(
-                (other < place) != (stamp < event.stamp) or stamp == event.stamp
-                for other, stamp in self._stamps.items()
-            ):
-                self.counts.contradictory += 1
-                return False
             self.counts.missing -= 1
             self.counts.out_of_order += 1
-        if self._first_step is None:
-            self._first_step = self._first_step_if(event)
+        self._first_step = self._first_step_if(event)
         self._stamps[place] = event.stamp
         if len(self._stamps) > 2 * REMEMBERED_PLACES:
             oldest = self._latest_place - REMEMBERED_PLACES
             self._stamps = {p: stamp for p, stamp in self._stamps.items() if p >= oldest}
-        self.counts.accepted += 1
-        return True
+        if event.kind != EventKind.HEEL_STRIKE or event.side != self.side:
+            return None
+        return self._strike(event, self._first_step)
+
+    def _fate(self, event: GaitEvent) -> str:
+        """Return "accepted", or as what the event must be dropped: a field of EventCounts."""
+        place, stamp = event.place, event.stamp
+        # Sides alternate with the steps.
+        if place < 0 or self._first_step not in (None, self._first_step_if(event)):
+            return "contradictory"
+        if place in self._stamps:
+            return "repeated" if stamp == self._stamps[place] else "contradictory"
+        if place < max(self._strike_place, self._latest_place - REMEMBERED_PLACES):
+            return "late"
+        for other, known in self._stamps.items():
+            if known == stamp or (other < place) != (known < stamp):
+                return "contradictory"
+        return "accepted"
 
     def _first_step_if(self, event: GaitEvent) -> int:
         """Return the step of the leg's first heel strike, 0 or 1, that the event implies."""
         return event.step % 2 if event.side == self.side else 1 - event.step % 2
 
-    def _side_fits(self, event: GaitEvent) -> bool:
-        """Sides alternate with the steps."""
-        return self._first_step is None or self._first_step == self._first_step_if(event)
-
-    def _strike(self, event: GaitEvent) -> Stride | None:
+    def _strike(self, event: GaitEvent, first_step: int) -> Stride | None:
         """Take a heel strike of the leg, the latest so far: close one stride or give some up."""
-        assert self._first_step is not None
         started, start = self.stride_in_progress, self.latest_strike
-        closed = (event.step - self._first_step) // 2  # number of the stride that ends here
+        closed = (event.step - first_step) // 2  # number of the stride that ends here
         self.stride_in_progress, self.latest_strike = closed + 1, event.stamp
         self._strike_place = event.place
         if start is None or closed != started:
             self.counts.missed_strides += closed - max(started - 1, 0)
             return None
         middle = self._stamps.get(event.place - 2)
-        if middle is None:
-            step_periods = (math.nan, math.nan)
-        else:
+        step_periods = (math.nan, math.nan)
+        if middle is not None:
             step_periods = (
                 (middle - start) / NANOSECONDS_PER_SECOND,
                 (event.stamp - middle) / NANOSECONDS_PER_SECOND,
             )
-        return Stride(
-            number=closed,
-            side=self.side,
-            start=start,
-            end=event.stamp,
-            toe_off=self._stamps.get(event.place - 1),
-            step_periods=step_periods,
-        )
+        toe_off = self._stamps.get(event.place - 1)
+        return Stride(closed, self.side, start, event.stamp, toe_off, step_periods)

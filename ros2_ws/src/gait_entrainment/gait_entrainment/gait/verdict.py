@@ -5,9 +5,9 @@
 The entrainment verdict: the gait is shown to follow the pulses, or shown not to, or neither.
 
 "The 95 % interval of the slope contains zero" is a failure to reject and calls noise entrained.
-The verdict is an equivalence test instead: entrained where drift and difference of periods are
-shown to be small against what an indifferent walker would show, drifting where the drift is
-shown not to be small, undecided where the data allow neither claim.
+The verdict is an equivalence test instead: entrained if drift and difference of periods are shown
+to be small compared with what an indifferent walker would show, drifting if the drift is shown
+not to be small, undecided if the data allow neither claim.
 """
 
 import cmath
@@ -20,7 +20,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
-from gait_entrainment.gait.drift import drift_of
+from gait_entrainment.gait.drift import Drift, drift_of
 from gait_entrainment.gait.pulse_phase import PulsePhase
 from gait_entrainment.gait.strides import Stride
 from gait_entrainment.settings import check_settings, setting
@@ -33,7 +33,7 @@ class Verdict(enum.IntEnum):
     ENTRAINED = 1  # drift and difference of periods shown to be small, for several strides
     DRIFTING = 2  # drift shown not to be small, never entrained before
     LOST = 3  # drift shown not to be small, entrained before
-    UNTESTABLE = 4  # pulse period too close to the unperturbed period, or that one unknown
+    UNTESTABLE = 4  # pulse period too close to the unperturbed period, or the latter unknown
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class VerdictSettings:
     )
     stretch_tolerance_deviations: float = setting(
         2.0,
-        "the same in standard deviations of the lag over the window, where larger",
+        "the same in standard deviations of the lag over the window, if that is more",
         "1",
         (0.0, 10.0),
     )
@@ -112,7 +112,7 @@ class Entrainment:
     autocorrelation: float  # lag 1, of the residuals, in [0, largest_autocorrelation]
     effective_pulses: float  # pulses in the window, discounted for autocorrelation
     phase_locking_value: float  # length of the mean phase vector, 0 to 1; reported, not used
-    entrained_since_stride: int | None  # start of the last stretch near the final lag
+    entrained_since_stride: int | None  # since when every lag has been near the final one
 
 
 class _Outliers:
@@ -135,7 +135,7 @@ class _Outliers:
         self._positions.append(position)
 
     def last_above(self, level: float) -> int:
-        """Return the position of the last value above ``level``, -1 where there is none."""
+        """Return the position of the last value above ``level``, -1 if there is none."""
         index = bisect_left(self._falling, -level)
         return self._positions[index - 1] if index else -1
 
@@ -166,51 +166,34 @@ class EntrainmentTest:
         unperturbed_period: float,
         unperturbed_period_error: float,
     ) -> Entrainment | None:
-        """Take one stride with its pulses; None where none of them has a lag."""
+        """Take one stride with its pulses; returns None if none of them has a lag."""
         placed = [pulse for pulse in pulses if pulse.toe_off is not None]
         if not placed:
             return None
-        for pulse in placed:
-            position = len(self._strides)
+        for position, pulse in enumerate(placed, start=len(self._strides)):
             self._strides.append(pulse.stride)
             self._above.add(pulse.unwrapped_lag, position)
             self._below.add(-pulse.unwrapped_lag, position)
             self._window.append((pulse, stride))
-        settings, window = self._settings, [pulse for pulse, _ in self._window]
+        window = [pulse for pulse, _ in self._window]
         lags = [pulse.unwrapped_lag for pulse in window]
         drift = drift_of(
             [pulse.stride + pulse.phase for pulse in window],
             lags,
-            settings.confidence,
-            settings.largest_autocorrelation,
+            self._settings.confidence,
+            self._settings.largest_autocorrelation,
         )
-        pulse_period = _mean_period(window[0].onset, window[-1].onset, _numbers(window))
+        first, last = window[0], window[-1]
         oldest = self._window[0][1]
+        pulse_period = _mean_period(first.onset, last.onset, last.number - first.number)
         mean_period = _mean_period(oldest.start, stride.end, stride.number - oldest.number + 1)
         difference = abs(pulse_period - unperturbed_period)
-        testable = (
-            difference >= settings.smallest_difference
-            and difference >= settings.smallest_difference_errors * unperturbed_period_error
+        verdict = self._judge(
+            drift, difference, unperturbed_period_error, abs(mean_period - pulse_period)
         )
-        full = len(window) == settings.window
-        margin = settings.drift_margin * difference
-        passes = (
-            full
-            and testable
-            and abs(drift.slope) + drift.half_width < margin
-            and abs(mean_period - pulse_period) < settings.period_margin * difference
-        )
-        self._passed = self._passed + 1 if passes else 0
-        verdict = Verdict.UNDECIDED
-        if len(window) > 1 and not testable:
-            verdict = Verdict.UNTESTABLE
-        elif self._passed >= settings.successive:
-            verdict = Verdict.ENTRAINED
-            self._was_entrained = True
-        elif full and abs(drift.slope) - drift.half_width > margin:
-            verdict = Verdict.LOST if self._was_entrained else Verdict.DRIFTING
         if verdict != self._verdict:
             self._verdict, self._since = verdict, stride.number
+        entrained = verdict == Verdict.ENTRAINED
         return Entrainment(
             verdict=verdict,
             stride=stride.number,
@@ -225,12 +208,42 @@ class EntrainmentTest:
             autocorrelation=drift.autocorrelation,
             effective_pulses=drift.effective_pulses,
             phase_locking_value=_phase_locking_value(window),
-            entrained_since_stride=(
-                self._start_of_stretch(lags) if verdict == Verdict.ENTRAINED else None
-            ),
+            entrained_since_stride=self._first_near(lags) if entrained else None,
         )
 
-    def _start_of_stretch(self, lags: Sequence[float]) -> int:
+    def _judge(
+        self, drift: Drift, difference: float, period_error: float, deviation: float
+    ) -> Verdict:
+        """
+        Return what can be claimed now.
+
+        ``difference`` is that of pulse period and unperturbed period [s], whose standard error is
+        ``period_error``; ``deviation`` that of pulse period and mean stride period [s].
+        """
+        settings, size = self._settings, len(self._window)
+        full = size == settings.window
+        testable = (
+            difference >= settings.smallest_difference
+            and difference >= settings.smallest_difference_errors * period_error
+        )
+        margin = settings.drift_margin * difference
+        passes = (
+            full
+            and testable
+            and abs(drift.slope) + drift.half_width < margin
+            and deviation < settings.period_margin * difference
+        )
+        self._passed = self._passed + 1 if passes else 0
+        if size > 1 and not testable:
+            return Verdict.UNTESTABLE
+        if self._passed >= settings.successive:
+            self._was_entrained = True
+            return Verdict.ENTRAINED
+        if full and abs(drift.slope) - drift.half_width > margin:
+            return Verdict.LOST if self._was_entrained else Verdict.DRIFTING
+        return Verdict.UNDECIDED
+
+    def _first_near(self, lags: Sequence[float]) -> int:
         """Return the stride since which every lag has been near the median of the window."""
         settings, final = self._settings, statistics.median(lags)
         tolerance = max(
@@ -240,13 +253,8 @@ class EntrainmentTest:
         last_outlier = max(
             self._above.last_above(final + tolerance), self._below.last_above(tolerance - final)
         )
-        # The latest pulse itself may be an outlier: then the stretch is empty and starts there.
+        # If the latest pulse itself is an outlier, the entrained strides start there.
         return self._strides[min(last_outlier + 1, len(self._strides) - 1)]
-
-
-def _numbers(window: Sequence[PulsePhase]) -> int:
-    """Pulse periods from the first to the last pulse of the window."""
-    return window[-1].number - window[0].number
 
 
 def _mean_period(start: int, end: int, count: int) -> float:

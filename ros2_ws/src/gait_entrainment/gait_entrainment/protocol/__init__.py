@@ -5,13 +5,3 @@
 
 from gait_entrainment.protocol.protocol import FIELDS, Protocol, ProtocolError, PulsePlan
 from gait_entrainment.protocol.reader import DEFAULT_PROTOCOL, read_protocol, write_protocol
-
-__all__ = [
-    "DEFAULT_PROTOCOL",
-    "FIELDS",
-    "Protocol",
-    "ProtocolError",
-    "PulsePlan",
-    "read_protocol",
-    "write_protocol",
-]

@@ -12,23 +12,3 @@ from gait_entrainment.robot.measured_onsets import MeasuredOnsets
 from gait_entrainment.robot.profile import ProfileError, TorqueProfile
 from gait_entrainment.robot.pulse_train import PulseTrain
 from gait_entrainment.robot.timing import PulseTiming, measured_onset
-
-__all__ = [
-    "AnkleRobot",
-    "Capabilities",
-    "DeviceError",
-    "DeviceLimits",
-    "Driver",
-    "Fault",
-    "GuardedRobot",
-    "LimitError",
-    "MeasuredOnsets",
-    "ProfileError",
-    "PulseTiming",
-    "PulseTrain",
-    "RobotState",
-    "TorqueProfile",
-    "driver_names",
-    "find_driver",
-    "measured_onset",
-]

@@ -18,11 +18,11 @@ from gait_entrainment.robot.pulse_train import PulseTrain
 class Capabilities:
     """What a device can do, known once its options are."""
 
-    peak_torque: float  # [N m]; inf where it has no limit of its own
+    peak_torque: float  # [N m]; inf if it has no limit of its own
     torque_rate: float  # steepest change of torque [N m/s]; inf for a jump
     measures_torque: bool  # what read() reports is measured; else it is computed
     simulated: bool  # lives in simulated time: promises ahead, touches no clock and no person
-    state_rate: float  # states per second [Hz]; 0 where there is one per change of torque
+    state_rate: float  # states per second [Hz]; 0 if there is one per change of torque
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,8 @@ class RobotState:
 
     stamp: int  # [ns], the clock of the run
     commanded: float  # torque that the device has been asked for [N m]
-    measured: float  # torque that it measured [N m]; NaN where it measures none
-    angle: float  # ankle angle that it measured [rad]; NaN where it measures none
+    measured: float  # torque that it measured [N m]; NaN if it measures none
+    angle: float  # ankle angle that it measured [rad]; NaN if it measures none
     faults: tuple[Fault, ...] = ()  # what is wrong; empty when all is well
 
 
@@ -41,9 +41,9 @@ class AnkleRobot(ABC):
     A driver of one ankle robot: every abstract method implemented, and this list kept.
 
     **Construction** ``(side, options, seed)``: keeps its arguments, sets ``capabilities``;
-    touches no hardware. Options are a frozen dataclass, ``Options``, whose fields have a default
-    and metadata ``meaning``, ``unit`` and, checked before construction, ``range`` (least, most)
-    or ``choices``; its ``__post_init__`` raises LimitError for what these cannot say.
+    touches no hardware. Options are a frozen dataclass, ``Options``, whose fields are made by
+    ``settings.setting`` and are checked before construction; its ``__post_init__`` raises
+    LimitError for what these cannot say.
 
     **Lifecycle**, mapped on the perturbator's lifecycle node::
 
@@ -52,15 +52,15 @@ class AnkleRobot(ABC):
     =============  ============  ===================================================  =============
     call           node's        must                                                 may raise
     =============  ============  ===================================================  =============
-    configure      configure     connect, see that the device answers and is the      DeviceError
+    configure      configure     connect, check that the device answers and is the    DeviceError
                                  right one; no torque is possible yet
     activate       activate      enable the device at zero torque                     DeviceError
     begin          first horizon start the account of a run: profiles adjoin from     DeviceError
                                  its first instant on
-    schedule       goal          take over a train; one that it cannot deliver it     DeviceError,
-                                 refuses, and nothing changes                         LimitError
+    schedule       goal          take over a train; refuse one that it cannot         DeviceError,
+                                 deliver, and then change nothing                     LimitError
     cancel         goal's cancel zero torque from now on, ready for another train     DeviceError
-    promise        horizon       tell the delivered torque                            DeviceError
+    promise        horizon       report the delivered torque                          DeviceError
     read           each promise  hand over the states since the last call             DeviceError
     stop           stop service  zero torque at once, from any state and thread       nothing
     deactivate     deactivate    zero torque **before** disabling                     DeviceError
@@ -71,28 +71,29 @@ class AnkleRobot(ABC):
     ``close`` may be called in any state, more than once. After ``stop`` no torque may come until
     ``close`` and ``configure``.
 
-    **Time** is integer nanoseconds of the run's clock: simulated where ``capabilities.simulated``
-    is set, otherwise the wall clock, ``time.time_ns()``. Take its offset to steady time once, in
+    **Time** is integer nanoseconds of the run's clock: simulated if ``capabilities.simulated`` is
+    set, otherwise the wall clock, ``time.time_ns()``. Take its offset to steady time once, in
     ``begin``: the wall clock may be set while you run.
 
     **Promise**: ``promise(until)`` returns the delivered torque from the end of the last promise
-    up to ``until``, or, where it is known only afterwards, up to the last measurement before
+    up to ``until``, or, if it is known only afterwards, up to the last measurement before
     ``until``. It is binding: piecewise constant, adjoining, ascending, finite, never taken back.
-    A stretch about which nothing is known yet has ``valid_until`` equal to its beginning.
+    If nothing is known yet, ``valid_until`` equals its beginning.
 
     **Faults** are values in ``RobotState.faults``, not exceptions: an exception says that a call
-    could not be done, a fault that something is wrong with the device. A driver brings the torque
-    to zero by itself on a fault, and reports the fault with every state until it is closed.
+    could not be done, a fault that something is wrong with the device. On a fault a driver brings
+    the torque to zero by itself, and reports the fault with every state until it is closed.
 
     **Threads**: the guard calls everything but ``stop`` from one thread. Calls return within
-    10 ms (configure, activate, deactivate and close within 2 s), so that nobody waits. Whoever
-    streams torque does it in a thread of its own: see host_loop.py, where that is done already.
+    10 ms (configure, activate, deactivate and close within 2 s), so that nobody waits. A driver
+    that streams torque does so in a thread of its own: host_loop.py of gait_entrainment_drivers
+    has one.
 
-    **Safety**: a driver is never called directly. The guard (guard.py) stands before it: it holds
+    **Safety**: a driver is never called directly. The guard (guard.py) stands before it: it checks
     every train against the limits, watches what is delivered, and ends in zero torque on every
-    path. A driver need not repeat that, except for what only it can know: a device that answers
-    no more, and a host loop that runs late. Whatever happens to the process, the **device** must
-    go to zero by itself when commands stop: software on the host cannot see to that.
+    way out. A driver need not repeat that, except for what only it can know: a device that no
+    longer answers, and a host loop that runs late. Whatever happens to the process, the
+    **device** must go to zero by itself when commands stop: software on the host cannot do that.
     """
 
     Options: ClassVar[type[Any]]

@@ -4,7 +4,7 @@
 """
 Ankle robot drivers by name, loaded only when chosen.
 
-A driver is named by a text, NAME or NAME:OPTION=VALUE,OPTION=VALUE, everywhere the same: in a
+A text names a driver, NAME or NAME:OPTION=VALUE,OPTION=VALUE, in the same way everywhere: in a
 protocol, on the command line, as a parameter of the perturbator. Drivers of other packages are
 found under the entry point ``gait_entrainment.drivers``.
 """
@@ -57,14 +57,8 @@ def find_driver(text: str) -> Driver:
     """
     Load the driver that a text names, and check its options.
 
-    Raises
-    ------
-    LimitError
-        where there is none of that name, with the names that there are; where an option is
-        unknown or out of range.
-    DeviceError
-        where the driver cannot be loaded.
-
+    Raises LimitError if there is none of that name, or an option is unknown or out of range;
+    DeviceError if the driver cannot be loaded.
     """
     name, _, options = text.partition(":")
     target = OWN_DRIVERS.get(name) or driver_names().get(name)

@@ -11,10 +11,10 @@ its torque rate; and holds it until the next tick. So the delivered torque is pi
 definition, and the walker integrates it exactly. The rise time (10 to 90 %) of a first-order lag
 is 0.35 / bandwidth.
 
-Random are: the time by which each pulse comes late (uniform, up to ``jitter``), the ticks whose
-command is lost (the last one holds), and the noise of the measured torque. Each has a generator
-of its own that is drawn from once a pulse or a tick: the same seed gives the same numbers,
-however a run is cut into promises.
+Three things are random: by how much each pulse comes late (uniform, up to ``jitter``), the ticks
+whose command is lost (the last one holds), and the noise of the measured torque. Each has a
+generator of its own that is drawn from once per pulse or tick: the same seed gives the same
+numbers, however a run is cut into promises.
 
 Not modelled: interaction with the leg (back-drivability, inertia, friction, a joint that moves
 against the torque), thermal limits, saturation by speed, cable stretch and backlash, drift of the
@@ -23,17 +23,17 @@ once. Noise is white.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.robot.contract import AnkleRobot, Capabilities, RobotState
-from gait_entrainment.robot.faults import DeviceError, LimitError
-from gait_entrainment.robot.profile import TorqueProfile
+from gait_entrainment.robot.contract import Capabilities, RobotState
+from gait_entrainment.robot.faults import LimitError
 from gait_entrainment.robot.pulse_train import PulseTrain
+from gait_entrainment.robot.simulated import SimulatedRobot
 from gait_entrainment.settings import check_settings, setting
 
 _TICK = 1_000_000  # of the device's torque loop [ns]
@@ -68,13 +68,13 @@ class EmulatedOptions:
             raise LimitError(f"state_rate: {self.state_rate:g} Hz; allowed: a divisor of 1000")
 
 
-class EmulatedAnkleRobot(AnkleRobot):
+class EmulatedAnkleRobot(SimulatedRobot):
     """See the module's docstring."""
 
     Options = EmulatedOptions
 
     def __init__(self, side: Side, options: EmulatedOptions, seed: int) -> None:
-        self._side = side
+        super().__init__(side, options, seed)
         self._options = options
         self._seed = seed
         self.capabilities = Capabilities(
@@ -88,84 +88,40 @@ class EmulatedAnkleRobot(AnkleRobot):
         self._follow = -math.expm1(-2 * math.pi * options.bandwidth * _TICK / 1e9)
         self._largest_step = options.torque_rate * _TICK / 1e9
         self._delay = round(options.delay * 1e9)
-        self._train: PulseTrain | None = None
-        self._late: list[int] = []  # by which each pulse of the train comes late [ns]
-        self._command = 0.0  # that the device holds [N m]
-        self._torque = 0.0  # that it delivers [N m]
-        self._halted = False
+        self._late: list[int] = []  # by how much each pulse of the train comes late [ns]
         self.begin(0)
-
-    def configure(self) -> None:
-        """Nothing to connect; a stop is over."""
-        self._halted = False
-
-    def activate(self) -> None:
-        """Nothing to enable."""
 
     def begin(self, start: int) -> None:
         """Start a run: its random numbers begin anew."""
+        super().begin(start)
         jitter, loss, noise = np.random.SeedSequence(self._seed).spawn(3)
         self._jitter = np.random.default_rng(jitter)
         self._loss = _Draws(np.random.default_rng(loss).random)
         self._noise = _Draws(np.random.default_rng(noise).standard_normal)
-        self._start = self._promised = start
+        self._start = start
         self._tick = 0  # the next one
-        self._states: list[RobotState] = []
-        self._drop()
 
     def schedule(self, train: PulseTrain) -> None:
         """Take over a train; how late each of its pulses will come is drawn here."""
-        if self._halted:
-            raise DeviceError("stopped: close and configure first")
-        self._train = train
+        super().schedule(train)
         late = self._jitter.random(train.count) * self._options.jitter
         self._late = [round(seconds * 1e9) for seconds in late]
 
     def cancel(self) -> None:
         """Drop the train; the torque is zero at once."""
-        self._drop()
+        super().cancel()
+        self._late = []
+        self._command = 0.0  # that the device holds [N m]
+        self._torque = 0.0  # that it delivers [N m]
 
-    def promise(self, until: int) -> TorqueProfile:
-        """Return the torque from the last promise up to ``until`` [ns]."""
-        begin, train = self._promised, self._train
-        times, torques = [begin], [self._torque]
-        last = self._torque
+    def _changes(self, begin: int, until: int) -> Iterator[tuple[int, float]]:
+        yield begin, self._torque
         while (instant := self._start + self._tick * _TICK) < until:
+            before = self._torque
             self._advance(instant)
-            torque = self._torque
-            if torque != last:
-                if instant <= times[-1]:
-                    torques[-1] = torque
-                else:
-                    times.append(instant)
-                    torques.append(torque)
-                last = torque
+            if self._torque != before:
+                yield instant, self._torque
             self._tick += 1
-        self._promised = until
-        onsets = train.onsets_within(begin, until) if train is not None else ()
-        return TorqueProfile(self._side, tuple(times), tuple(torques), onsets, until)
-
-    def read(self) -> Sequence[RobotState]:
-        """Return the states that were due."""
-        states, self._states = self._states, []
-        return states
-
-    def stop(self) -> None:
-        """Drop the train, and take no other; the torque is zero at once."""
-        self._halted = True
-        self._drop()
-
-    def deactivate(self) -> None:
-        """Drop the train; the torque is zero at once."""
-        self._drop()
-
-    def close(self) -> None:
-        """Drop the train; the torque is zero at once."""
-        self._drop()
-
-    def _drop(self) -> None:
-        self._train, self._late = None, []
-        self._command = self._torque = 0.0
 
     def _advance(self, instant: int) -> None:
         """Run the device's torque loop once, at a tick [ns]."""

@@ -4,13 +4,13 @@
 """
 The safety envelope: the one way to an ankle robot, whatever its driver.
 
-Nothing else holds the driver. Every train is held against the limits before the driver sees it,
-every delivered torque afterwards, and every path out, an exception included, brings the torque to
+Nothing else holds the driver. Every train is checked against the limits before the driver sees it,
+every delivered torque afterwards, and every way out, an exception included, brings the torque to
 zero before the device is disabled. Any fault latches: torque stays at zero until ``close`` and
 ``configure``.
 
-What this cannot do, since it is software beside others on a system that is not real time: see
-docs/safety.md.
+What this cannot do, being software next to other software on a system that is not real time, is
+said in docs/safety.md.
 """
 
 import atexit
@@ -41,34 +41,21 @@ from gait_entrainment.robot.pulse_train import PulseTrain
 
 # How often the watchdog looks whether the experiment has fallen silent [s].
 _WATCH_PERIOD = 0.01
-_INACTIVE = "the device is not active; configure and activate it first"
 
 _T = TypeVar("_T")
 
 
 class GuardedRobot:
-    """
-    An ankle robot behind the safety envelope; nobody else may keep the driver.
-
-    Attributes
-    ----------
-    train, delivered
-        The pulses scheduled last, and how many of them have begun in what was promised.
-    promised_until
-        Everything before this instant is promised [ns].
-    faults
-        What latched the torque at zero, in the order in which it was found.
-
-    """
+    """An ankle robot behind the safety envelope; nobody else may keep the driver."""
 
     def __init__(self, robot: AnkleRobot, side: Side, limits: DeviceLimits | None = None) -> None:
         self._robot = robot
         self.side = side
         self.limits = limits or DeviceLimits()
-        self.train: PulseTrain | None = None
-        self.delivered = 0
-        self.promised_until = 0
-        self.faults: tuple[Fault, ...] = ()
+        self.train: PulseTrain | None = None  # scheduled last
+        self.delivered = 0  # pulses of it that have begun in what was promised
+        self.promised_until = 0  # everything before this instant is promised [ns]
+        self.faults: tuple[Fault, ...] = ()  # what latched the torque at zero, in order
         self._configured = self._active = self._armed = self._begun = False
         self._delivered_torque = _DeliveredTorque(self.limits)
         self._last_heard = math.inf  # steady time [s]
@@ -81,7 +68,7 @@ class GuardedRobot:
 
     @property
     def enabled(self) -> bool:
-        """Whether the device has been activated, be it latched or not."""
+        """Whether the device has been activated, latched or not."""
         return self._active
 
     @property
@@ -95,18 +82,10 @@ class GuardedRobot:
         train = self.train
         return train is not None and train.end(train.count - 1) > self.promised_until
 
-    # Lifecycle
+    # Lifecycle. Each step raises DeviceError if it is not its turn or the driver fails.
 
     def configure(self) -> None:
-        """
-        Connect to the device; releases what was latched.
-
-        Raises
-        ------
-        DeviceError
-            where it does not answer, is another one than it should be, or is configured already.
-
-        """
+        """Connect to the device; releases what was latched."""
         if self._configured:
             raise DeviceError("the device is configured already; close it first")
         self.faults = ()
@@ -119,15 +98,7 @@ class GuardedRobot:
         self._configured = True
 
     def activate(self) -> None:
-        """
-        Enable the device at zero torque.
-
-        Raises
-        ------
-        DeviceError
-            where it is not configured, is latched, is active already, or cannot be enabled.
-
-        """
+        """Enable the device at zero torque."""
         if not self._configured:
             raise DeviceError("the device is not configured; configure it first")
         self._refuse_latched()
@@ -143,33 +114,18 @@ class GuardedRobot:
             threading.Thread(target=self._watch, name="experiment watchdog", daemon=True).start()
 
     def arm(self) -> None:
-        """
-        Allow torque: the step that a person takes, who has seen that all is well.
-
-        Raises
-        ------
-        DeviceError
-            where the device is not active, or is latched.
-
-        """
+        """Allow torque: the step taken by a person who has seen that all is well."""
         self._refuse_latched()
-        if not self._active:
-            raise DeviceError("the device is not active; activate it before arming")
+        self._refuse_inactive()
         self._armed = True
 
     def begin(self, start: int) -> None:
         """
-        Start the account of a run at an instant [ns]; a train of the run before is dropped.
+        Start the account of a run at an instant [ns]; the train of an earlier run is dropped.
 
-        Raises
-        ------
-        DeviceError
-            where the device is not active, or the driver fails. A latched one may begin: there
-            will be no torque.
-
+        A latched device may begin too: there will be no torque.
         """
-        if not self._active:
-            raise DeviceError(_INACTIVE)
+        self._refuse_inactive()
         self._call(lambda: self._robot.begin(start))
         self.train, self.delivered, self.promised_until = None, 0, start
         self._delivered_torque = _DeliveredTorque(self.limits)
@@ -213,18 +169,13 @@ class GuardedRobot:
         """
         Accept a train of pulses.
 
-        Raises
-        ------
-        LimitError
-            where the train is outside the limits, is for the other ankle, begins before what was
-            already promised, or where another train is still under way. Nothing changes then.
-        DeviceError
-            where the device is not active, not armed, latched, or cannot take the train.
-
+        Raises LimitError, and nothing changes, if the train is outside the limits, is for the
+        other ankle, begins before what was already promised, or comes before another one is over;
+        DeviceError if the device is not active, not armed, latched, or cannot take the train.
         """
+        self._refuse_latched()
         self._refuse_inactive()
-        if not self._begun:
-            raise DeviceError("no run is under way; begin one first")
+        self._refuse_before_begin()
         if not self._armed:
             raise DeviceError("the device is not armed; see that all is well, then arm it")
         self.limits.check(train)
@@ -273,21 +224,15 @@ class GuardedRobot:
         Return the delivered torque from the last promise up to ``until`` [ns] at most.
 
         It becomes binding. Delivered torque or impulse beyond the limits latches a fault; what
-        was delivered is told all the same.
+        was delivered is reported all the same.
 
-        Raises
-        ------
-        ValueError
-            where ``until`` lies before the last promise.
-        DeviceError
-            where no run is under way, the driver fails, or breaks its contract.
-
+        Raises ValueError if ``until`` lies before the last promise, DeviceError if no run is under
+        way, or if the driver fails or breaks its contract.
         """
         begin = self.promised_until
         if until < begin:
             raise ValueError(f"a promise up to {until} ns would take back one up to {begin} ns")
-        if not self._begun:
-            raise DeviceError("no run is under way; begin one first")
+        self._refuse_before_begin()
         profile = self._call(lambda: self._robot.promise(until))
         try:
             profile.check(begin, until)
@@ -322,9 +267,12 @@ class GuardedRobot:
             raise DeviceError(f"torque is latched at zero ({names}): clean up and configure first")
 
     def _refuse_inactive(self) -> None:
-        self._refuse_latched()
         if not self._active:
-            raise DeviceError(_INACTIVE)
+            raise DeviceError("the device is not active; configure and activate it first")
+
+    def _refuse_before_begin(self) -> None:
+        if not self._begun:
+            raise DeviceError("no run is under way; begin one first")
 
     def _call(self, function: Callable[[], _T]) -> _T:
         """Call the driver; whatever it raises, the torque goes to zero first."""
@@ -347,7 +295,7 @@ class GuardedRobot:
             self.stop(DRIVER_FAILED)
 
     def _watch(self) -> None:
-        """Stop the torque where the experiment falls silent while torque may come."""
+        """Stop the torque if the experiment falls silent while torque may come."""
         while self._watching.is_set():
             silence = time.monotonic() - self._last_heard
             if self.train is not None and silence > self.limits.silence:
@@ -357,7 +305,7 @@ class GuardedRobot:
 
 
 class _DeliveredTorque:
-    """Watches the delivered torque, and its impulse within any stretch as long as a stride."""
+    """Watches the delivered torque, and its impulse within any time as long as a stride."""
 
     def __init__(self, limits: DeviceLimits) -> None:
         margin = 1 + limits.overshoot
@@ -368,7 +316,7 @@ class _DeliveredTorque:
         self._sum = 0.0  # impulse of these pieces [N m s]
 
     def add(self, profile: TorqueProfile) -> Fault | None:
-        """Account for a profile; return a fault where it exceeds a limit."""
+        """Account for a profile; return a fault if it exceeds a limit."""
         found = None
         for begin, end, torque in profile.pieces:
             if torque == 0:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Limits that every pulse train is held against before a robot sees it."""
+"""Limits that every pulse train is checked against before a robot sees it."""
 
 import math
 from dataclasses import dataclass, replace
@@ -18,7 +18,7 @@ class DeviceLimits:
 
     The default torque lies above the 13.3 N m of the paper's pulse and near the 23 N m of the
     MIT Anklebot; it is a limit for the wearer, whatever the motor could do. The default impulse
-    is that of one pulse at both of its limits.
+    is that of one pulse at both limits.
     """
 
     torque: float = setting(30.0, "largest magnitude of a pulse", "N m", (0.0, 200.0))
@@ -50,9 +50,9 @@ class DeviceLimits:
 
     def check_pulse(self, torque: float, duration: float) -> None:
         """
-        Raise LimitError where a pulse of this height [N m] and width [s] must not be delivered.
+        Raise LimitError if a pulse of this height [N m] and width [s] must not be delivered.
 
-        A protocol can be held against this before anything is measured or moved.
+        A protocol can be checked with this before anything is measured or moved.
         """
         if not math.isfinite(torque) or abs(torque) > self.torque:
             raise LimitError(
@@ -72,7 +72,7 @@ class DeviceLimits:
             )
 
     def check(self, train: PulseTrain) -> None:
-        """Raise LimitError where a train must not be delivered."""
+        """Raise LimitError if a train must not be delivered."""
         self.check_pulse(train.torque, train.duration)
         if train.count < 1:
             raise LimitError(f"count: {train.count}; allowed: at least 1")

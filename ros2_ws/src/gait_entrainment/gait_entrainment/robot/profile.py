@@ -5,6 +5,7 @@
 
 import itertools
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from gait_entrainment.conventions import Side
@@ -30,6 +31,30 @@ class TorqueProfile:
     torques: tuple[float, ...]
     onsets: tuple[int, ...]  # of the pulses that begin in this profile [ns]
     valid_until: int
+
+    @classmethod
+    def from_changes(
+        cls,
+        side: Side,
+        begin: int,
+        until: int,
+        changes: Iterable[tuple[int, float]],
+        onsets: Sequence[int],
+    ) -> "TorqueProfile":
+        """
+        Return a profile of [begin, until) from changes of torque, (instant [ns], torque [N m]).
+
+        The last change up to ``begin`` gives the torque that it begins with, zero without one;
+        changes from ``until`` on are left out.
+        """
+        times, torques = [begin], [0.0]
+        for instant, torque in changes:
+            if instant <= begin:
+                torques[0] = torque
+            elif instant < until:
+                times.append(instant)
+                torques.append(torque)
+        return cls(side, tuple(times), tuple(torques), tuple(onsets), until)
 
     @property
     def pieces(self) -> tuple[tuple[int, int, float], ...]:

@@ -4,9 +4,9 @@
 """
 When a pulse really came: commanded, sent and measured onset, from the device's own states.
 
-The commanded onset is the one that was planned. The sent onset is the stamp of the first state in
-which the device has been asked for the pulse. The measured onset is the instant at which the
-measured torque crosses a fraction of the pulse's height, interpolated between two states.
+The commanded onset was planned. The sent onset is the stamp of the first state in which the device
+has been asked for the pulse. The measured onset is the instant at which the measured torque
+crosses a fraction of the pulse's height, interpolated between two states.
 """
 
 import math
@@ -28,24 +28,12 @@ def measured_onset(
     """
     Find where a torque first rises through a fraction of a pulse's height.
 
-    Parameters
-    ----------
-    stamps
-        Instants [ns], ascending, from before the pulse on.
-    torques
-        Measured torque at them [N m]; NaN where there is none.
-    height
-        Of the pulse [N m]; a negative one is crossed downwards.
-    fraction
-        Of the height, in (0, 1).
+    ``stamps`` [ns] ascend from before the pulse on, ``torques`` [N m] are measured at them, NaN if
+    none was. A negative ``height`` [N m] is crossed downwards; ``fraction`` is in (0, 1).
 
-    Returns
-    -------
-    (int, int) or None
-        Index of the first state past the crossing, and the instant of the crossing [ns],
-        interpolated linearly between two states; None where the torque never gets there. A
-        torque that is over the threshold from the first state on has no onset in view.
-
+    Returns the index of the first state past the crossing, and the instant of the crossing [ns],
+    interpolated linearly between two states; None if the torque never gets there, or is over the
+    threshold from the first state on.
     """
     before: tuple[int, float] | None = None
     for index, (stamp, torque) in enumerate(zip(stamps, torques, strict=True)):
@@ -64,7 +52,7 @@ def measured_onset(
 
 @dataclass(frozen=True)
 class PulseTiming:
-    """Onsets of one pulse [ns]; None where the states do not show it."""
+    """Onsets of one pulse [ns]; None if the states do not show it."""
 
     commanded: int
     sent: int | None
@@ -90,23 +78,20 @@ def distribution(
     timings: Sequence[PulseTiming], kind: str, stride: float
 ) -> dict[str, Any] | None:
     """
-    Return how late pulses came against their commanded onsets; None where no pulse shows it.
+    Return how late the "sent" or "measured" onsets came; None if no pulse shows one.
 
-    The kind of onset is "sent" or "measured"; percentages are of a stride [s], None where that is
-    NaN: unknown.
+    Percentages are of a stride [s], None if that is NaN: unknown.
     """
     late = lateness_ms(timings, kind)
     if not late:
         return None
     figures = {"median": quantile(late, 0.5), "p99": quantile(late, 0.99), "worst": late[-1]}
+    unknown = math.isnan(stride)
     return {
         "pulses": len(late),
         "missing": len(timings) - len(late),
-        **{f"{name}_ms": value for name, value in figures.items()},
-        **{
-            f"{name}_percent": None if math.isnan(stride) else value / stride / 10
-            for name, value in figures.items()
-        },
+        **{f"{name}_ms": ms for name, ms in figures.items()},
+        **{f"{n}_percent": None if unknown else ms / stride / 10 for n, ms in figures.items()},
     }
 
 

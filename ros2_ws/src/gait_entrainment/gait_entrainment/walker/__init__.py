@@ -13,25 +13,10 @@ The exact walker (docs/model.md).
     sampling        posture, torques, forces at any instant
     promise         the torque promised by the ankle robot
     walker          all of it in time
-    batch           the step-to-step function
     run             one run of it, with the account that a node must report
 """
 
-from gait_entrainment.walker.batch import Step, step_to_step
 from gait_entrainment.walker.run import Stretch, WalkerRun
 from gait_entrainment.walker.sampling import Samples
-from gait_entrainment.walker.segment import Phase
+from gait_entrainment.walker.segment import Stance
 from gait_entrainment.walker.walker import Ending, EndingKind, Transition, Walker
-
-__all__ = [
-    "Ending",
-    "EndingKind",
-    "Phase",
-    "Samples",
-    "Step",
-    "Stretch",
-    "Transition",
-    "Walker",
-    "WalkerRun",
-    "step_to_step",
-]

@@ -10,7 +10,10 @@ into a stall yields infinity or NaN and is refused there) instead of raising, wh
 lets loops run in vector registers.
 """
 
+import contextlib
 import hashlib
+import os
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -20,22 +23,47 @@ import numba
 from gait_entrainment import geometry
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+config: Any = numba.config
 
 
-_WALKER = hashlib.sha256()
-for _file in (Path(geometry.__file__), *sorted(Path(__file__).parent.glob("*.py"))):
-    _WALKER.update(_file.read_bytes())
+def _cache_folder() -> str:
+    """
+    Return the folder for the machine code of these very sources; an empty text if there is none.
+
+    Numba drops a kept function only if that function's own file changes. Ours are inlined into one
+    another across files, so each state of all the sources has a folder of its own: where
+    NUMBA_CACHE_DIR says, beside the sources, or in the user's cache.
+    """
+    here = Path(__file__).parent
+    digest = hashlib.sha256()
+    for file in (Path(geometry.__file__), *sorted(here.glob("*.py"))):
+        digest.update(file.read_bytes())
+    places = [Path(config.CACHE_DIR) if config.CACHE_DIR else here / "__pycache__"]
+    if "HOME" in os.environ:
+        places.append(Path.home() / ".cache" / "gait_entrainment")
+    for place in places:
+        folder = place / f"walker-{digest.hexdigest()[:16]}"
+        with contextlib.suppress(OSError):
+            folder.mkdir(parents=True, exist_ok=True)
+        if os.access(folder, os.W_OK):
+            return str(folder)
+    warnings.warn(
+        "The walker is compiled anew in every process, since its machine code cannot be kept: set"
+        " NUMBA_CACHE_DIR to a folder that can be written.",
+        stacklevel=2,
+    )
+    return ""
+
+
+CACHE_FOLDER = _cache_folder()
 
 
 def compiled(function: Function) -> Function:
-    """
-    Compile at the first call, and keep the machine code on disk for the next process.
-
-    Numba drops a kept function when that function's own file changes. Ours are inlined into one
-    another across files, so each is kept under a stamp of the walker's files and its own.
-    """
-    stamp = _WALKER.copy()
-    stamp.update(Path(function.__code__.co_filename).read_bytes())
-    dispatcher: Any = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
-    dispatcher._cache._cache_file._source_stamp = stamp.hexdigest(), 0
+    """Compile at the first call, and keep the machine code on disk for the next process."""
+    before, config.CACHE_DIR = config.CACHE_DIR, CACHE_FOLDER
+    try:
+        kept = CACHE_FOLDER != ""
+        dispatcher: Any = numba.njit(cache=kept, nogil=True, error_model="numpy")(function)
+    finally:
+        config.CACHE_DIR = before
     return cast(Function, dispatcher)

@@ -42,7 +42,7 @@ def travel_time_onward(
     model: Model, work: Floats, segment: Segment, start: float, end: float
 ) -> float:
     """Time [s] from one position of the segment to a later one."""
-    if segment.phase == SINGLE_STANCE:
+    if segment.stance == SINGLE_STANCE:
         return pendulum_time(model.per_drop, segment.apex, start, end)
     return double_stance_time(model, work, segment, start, end)
 
@@ -77,7 +77,7 @@ def position_at(model: Model, work: Floats, segment: Segment, elapsed: float) ->
     guess = quintic(
         segment.duration, elapsed, motion(model, segment, low), motion(model, segment, high)
     )
-    position = position_of(model, segment.phase, guess)
+    position = position_of(model, segment.stance, guess)
     if not low < position < high:
         position = 0.5 * (low + high)
     left = elapsed - travel_time(model, work, segment, low, position)
@@ -88,7 +88,7 @@ def position_at(model: Model, work: Floats, segment: Segment, elapsed: float) ->
             high = position
         value, velocity, acceleration = motion(model, segment, position)
         value += left * (velocity + 0.5 * acceleration * left)
-        target = position_of(model, segment.phase, value)
+        target = position_of(model, segment.stance, value)
         inside = low <= target <= high
         if abs(left) < LAST_STEP and inside:
             return target

@@ -218,7 +218,7 @@ def make_model(p: WalkerParameters, slope: float = 0.0) -> Model:
     weight = p.mass * p.gravity
     pulse = BOUNDED_PULSE * p.peak_torque
 
-    # Whole phases, at the nodes of a fixed quadrature.
+    # Whole stances, at the nodes of a fixed quadrature.
     rule = _gauss_legendre(PANEL_NODES)
     half = 0.5 * (end - start)
     psi = start + half + half * rule[NODES]

@@ -15,7 +15,7 @@ at alpha, with rate zero.
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,21 +43,9 @@ from gait_entrainment.walker.segment import (
 from gait_entrainment.walker.trajectory import Stamps
 from gait_entrainment.walker.transitions import NANO
 
-# Rows of the table that `fill_samples` writes; each pair is left, right.
+# Places in an array of joints: hip or ankle, plus the side.
 HIP: Final = 0
 ANKLE: Final = 2
-HIP_RATE: Final = 4
-ANKLE_RATE: Final = 6
-INTRINSIC: Final = 8
-DELIVERED: Final = 10
-EFFECTIVE: Final = 12
-FORCE: Final = 14
-FORCE_X: Final = 16
-FORCE_Z: Final = 18
-PHASE: Final = 20
-LEADING: Final = 21
-UNLOADED: Final = 22
-ROWS: Final = 23
 
 
 @dataclass(frozen=True)
@@ -93,27 +81,29 @@ class Samples:
     """(n,) whether a negative pulse keeps the trailing foot unloaded in double stance."""
 
 
-def samples_from_table(table: Floats) -> Samples:
-    """Name the rows of a table that `fill_samples` wrote."""
+# One sample: what the compiled functions fill in of Samples.
+SAMPLE = np.dtype(
+    [
+        ("position", np.float64, (4,)),
+        ("velocity", np.float64, (4,)),
+        ("intrinsic_torque", np.float64, (2,)),
+        ("delivered_torque", np.float64, (2,)),
+        ("effective_torque", np.float64, (2,)),
+        ("ground_reaction", np.float64, (2, 2)),
+        ("force", np.float64, (2,)),
+        ("double_stance", np.bool_),
+        ("leading", np.int64),
+        ("unloaded", np.bool_),
+    ]
+)
 
-    def columns(row: int, width: int = 2) -> Floats:
-        return np.ascontiguousarray(table[row : row + width].T)
 
-    effort = np.zeros((table.shape[1], 4))
-    effort[:, 2:] = columns(INTRINSIC) + columns(EFFECTIVE)
-    return Samples(
-        position=columns(HIP, 4),
-        velocity=columns(HIP_RATE, 4),
-        effort=effort,
-        intrinsic_torque=columns(INTRINSIC),
-        delivered_torque=columns(DELIVERED),
-        effective_torque=columns(EFFECTIVE),
-        ground_reaction=np.stack([columns(FORCE_X), columns(FORCE_Z)], axis=-1),
-        force=columns(FORCE),
-        double_stance=table[PHASE] == DOUBLE_STANCE,
-        leading=table[LEADING].astype(np.int64),
-        unloaded=table[UNLOADED] != 0.0,
-    )
+def samples_from(table: Any) -> Samples:
+    """Return samples from a filled array of SAMPLE."""
+    columns = {name: np.ascontiguousarray(table[name]) for name in SAMPLE.names or ()}
+    effort = np.zeros((table.size, 4))
+    effort[:, ANKLE:] = columns["intrinsic_torque"] + columns["effective_torque"]
+    return Samples(effort=effort, **columns)
 
 
 @compiled
@@ -124,48 +114,48 @@ def fill_samples(
     changes: Stamps,
     torques: Floats,
     right: int,
-    table: Floats,
+    table: Any,
 ) -> None:
-    """Fill the columns of `table` (ROWS, n), zero before, with the walker at `times` [ns]."""
+    """Fill in `table` (n,) of SAMPLE, zero before, with the walker at `times` [ns]."""
     work = np.empty(WORK_SHAPE)
-    after = log["after"]
-    rows = np.searchsorted(after, times)
-    for i, change in enumerate(np.searchsorted(changes[:right], times)):
-        table[DELIVERED, i] = torques[change - 1]
-    for i, change in enumerate(np.searchsorted(changes[right:], times)):
-        table[DELIVERED + 1, i] = torques[right + change - 1]
+    rows = np.searchsorted(log["after"], times)
+    left_changes = np.searchsorted(changes[:right], times)
+    right_changes = np.searchsorted(changes[right:], times)
     for i in range(times.size):
+        row = table[i]
+        row.delivered_torque[0] = torques[left_changes[i] - 1]
+        row.delivered_torque[1] = torques[right + right_changes[i] - 1]
         segment = log[rows[i] - 1]
         elapsed = (times[i] - segment.stamp) / NANO - segment.rest
         position = position_at(model, work, segment, elapsed)
-        table[PHASE, i] = segment.phase
-        table[LEADING, i] = segment.leading
-        if segment.phase == DOUBLE_STANCE:
-            fill_double_stance(model, segment, position, table[:, i])
+        row.double_stance = segment.stance == DOUBLE_STANCE
+        row.leading = segment.leading
+        if segment.stance == DOUBLE_STANCE:
+            fill_double_stance(model, segment, position, row)
         else:
-            fill_single_stance(model, segment, position, table[:, i])
+            fill_single_stance(model, segment, position, row)
 
 
 @compiled
 def fill_leading_leg(
-    model: Model, segment: Segment, position: float, sine: float, rate: float, row: Floats
+    model: Model, segment: Segment, position: float, sine: float, rate: float, row: Any
 ) -> None:
     """Leading leg, its foot flat: hip and ankle turn together; the force is along the leg."""
     leading = segment.leading
     lean = math.asin(sine)
     force = leading_force(model, segment, position)
-    row[HIP + leading], row[ANKLE + leading] = lean, lean
-    row[HIP_RATE + leading], row[ANKLE_RATE + leading] = rate, rate
-    row[FORCE + leading] = force
-    row[FORCE_X + leading] = -force * sine
-    row[FORCE_Z + leading] = force * math.sqrt(1.0 - sine * sine)
+    row.position[HIP + leading], row.position[ANKLE + leading] = lean, lean
+    row.velocity[HIP + leading], row.velocity[ANKLE + leading] = rate, rate
+    row.force[leading] = force
+    row.ground_reaction[leading, 0] = -force * sine
+    row.ground_reaction[leading, 1] = force * math.sqrt(1.0 - sine * sine)
 
 
 @compiled
-def fill_double_stance(model: Model, segment: Segment, position: float, row: Floats) -> None:
+def fill_double_stance(model: Model, segment: Segment, position: float, row: Any) -> None:
     """Both legs on the ground, the linkage closed."""
     trailing = 1 - segment.leading
-    sine = leg_sine_at(model, segment.phase, position)
+    sine = leg_sine_at(model, segment.stance, position)
     cosine = math.sqrt(1.0 - sine * sine)
     sin_ankle = math.sin(position)
     slope = leg_per_ankle(sin_ankle, cosine, model.foot_length, model.separation)
@@ -174,31 +164,28 @@ def fill_double_stance(model: Model, segment: Segment, position: float, row: Flo
     velocity = rate / slope
     fill_leading_leg(model, segment, position, sine, -rate, row)
 
-    row[HIP + trailing] = trailing_leg_angle(
+    row.position[HIP + trailing] = trailing_leg_angle(
         position, sine, model.leg_length, model.foot_length, model.separation
     )
-    row[HIP_RATE + trailing] = velocity * trailing_leg_per_ankle(
+    row.velocity[HIP + trailing] = velocity * trailing_leg_per_ankle(
         position, sine, slope, reach, model.leg_length, model.foot_length, model.separation
     )
-    row[ANKLE + trailing] = position - 0.5 * math.pi
-    row[ANKLE_RATE + trailing] = velocity
+    row.position[ANKLE + trailing] = position - 0.5 * math.pi
+    row.velocity[ANKLE + trailing] = velocity
 
     torque = max(0.0, effective_torque(segment, position))
     intrinsic = model.stiffness * (model.max_plantarflexion - position)
-    row[INTRINSIC + trailing] = intrinsic
-    if segment.stiffness > 0.0:
-        row[EFFECTIVE + trailing] = segment.perturbation
-    else:
-        row[EFFECTIVE + trailing] = -intrinsic
-        row[UNLOADED] = 1.0
+    row.intrinsic_torque[trailing] = intrinsic
+    row.unloaded = segment.stiffness == 0.0
+    row.effective_torque[trailing] = -intrinsic if row.unloaded else segment.perturbation
     force = trailing_force(torque, sin_ankle, reach, model.leg_length, model.foot_length)
-    row[FORCE + trailing] = force
-    row[FORCE_X + trailing] = force * (model.separation - model.leg_length * sine) / reach
-    row[FORCE_Z + trailing] = force * model.leg_length * cosine / reach
+    row.force[trailing] = force
+    row.ground_reaction[trailing, 0] = force * (model.separation - model.leg_length * sine) / reach
+    row.ground_reaction[trailing, 1] = force * model.leg_length * cosine / reach
 
 
 @compiled
-def fill_single_stance(model: Model, segment: Segment, position: float, row: Floats) -> None:
+def fill_single_stance(model: Model, segment: Segment, position: float, row: Any) -> None:
     """Stance leg as an inverted pendulum, swing leg on its path for display."""
     swing = 1 - segment.leading
     rate = math.sqrt(max(0.0, squared_rate(model, segment, position)))
@@ -210,14 +197,14 @@ def fill_single_stance(model: Model, segment: Segment, position: float, row: Flo
     angle, slope = swing_path(
         progress, model.swing_hip, model.swing_hip_slope, model.strike_position
     )
-    row[HIP + swing], row[HIP_RATE + swing] = angle, slope * pace
+    row.position[HIP + swing], row.velocity[HIP + swing] = angle, slope * pace
     angle, slope = swing_path(
         progress,
         model.max_plantarflexion - 0.5 * math.pi,
         model.swing_ankle_slope,
         model.strike_position,
     )
-    row[ANKLE + swing], row[ANKLE_RATE + swing] = angle, slope * pace
+    row.position[ANKLE + swing], row.velocity[ANKLE + swing] = angle, slope * pace
 
 
 @compiled

@@ -45,11 +45,11 @@ DOUBLE_STANCE: Final = 0
 SINGLE_STANCE: Final = 1
 
 
-class Phase(IntEnum):
-    """What the walker stands on."""
+class Stance(IntEnum):
+    """What the walker stands on: both feet, or one."""
 
-    DOUBLE_STANCE = DOUBLE_STANCE
-    SINGLE_STANCE = SINGLE_STANCE
+    DOUBLE = DOUBLE_STANCE
+    SINGLE = SINGLE_STANCE
 
 
 HEEL_STRIKE: Final = 0
@@ -73,7 +73,7 @@ class Segment(Protocol):
     """The switch that began it."""
     ends: int
     """The switch that ends it if the perturbation stays as it is."""
-    phase: int
+    stance: int
     leading: int
     """Side of the leading leg, in single stance the stance leg."""
     step: int
@@ -134,9 +134,9 @@ def gained_apex(model: Model, segment: Segment, position: float) -> float:
 
 
 @compiled
-def leg_sine_at(model: Model, phase: int, position: float) -> float:
+def leg_sine_at(model: Model, stance: int, position: float) -> float:
     """sin(theta) of the leading leg."""
-    if phase == SINGLE_STANCE:
+    if stance == SINGLE_STANCE:
         return -math.sin(position)
     return leg_sine(math.cos(position), model.leg_length, model.foot_length, model.separation)
 
@@ -149,11 +149,11 @@ def leaned(model: Model, sine: float, cosine: float) -> tuple[float, float]:
 
 
 @compiled
-def lean_at(model: Model, phase: int, position: float) -> tuple[float, float]:
+def lean_at(model: Model, stance: int, position: float) -> tuple[float, float]:
     """Sine and cosine of the leading leg's angle from the vertical."""
-    sine = leg_sine_at(model, phase, position)
+    sine = leg_sine_at(model, stance, position)
     cosine = math.sqrt(1.0 - sine * sine)
-    if phase == SINGLE_STANCE:
+    if stance == SINGLE_STANCE:
         return sine, cosine
     return leaned(model, sine, cosine)
 
@@ -161,7 +161,7 @@ def lean_at(model: Model, phase: int, position: float) -> tuple[float, float]:
 @compiled
 def squared_rate(model: Model, segment: Segment, position: float) -> float:
     """theta_dot^2 at a position of the segment, from energy; negative beyond a stall."""
-    sine, cosine = lean_at(model, segment.phase, position)
+    sine, cosine = lean_at(model, segment.stance, position)
     return gained_apex(model, segment, position) + model.per_drop * drop(sine, cosine)
 
 
@@ -169,14 +169,14 @@ def squared_rate(model: Model, segment: Segment, position: float) -> float:
 def leading_force(model: Model, segment: Segment, position: float) -> float:
     """Ground reaction F_B [N] of the leading leg, along the leg; negative where it would pull."""
     force = pendulum_force(
-        lean_at(model, segment.phase, position)[1],
+        lean_at(model, segment.stance, position)[1],
         squared_rate(model, segment, position),
         model.mass,
         model.gravity,
         model.leg_length,
     )
-    if segment.phase == DOUBLE_STANCE:
-        sine = leg_sine_at(model, segment.phase, position)
+    if segment.stance == DOUBLE_STANCE:
+        sine = leg_sine_at(model, segment.stance, position)
         arm = unloading_arm(
             math.sin(position), sine, model.leg_length, model.foot_length, model.separation
         )
@@ -192,7 +192,7 @@ def motion(model: Model, segment: Segment, position: float) -> tuple[float, floa
     In single stance the position, in double stance sin(theta): psi itself speeds up twentyfold.
     theta_ddot is half the derivative of theta_dot^2 by theta.
     """
-    if segment.phase == SINGLE_STANCE:
+    if segment.stance == SINGLE_STANCE:
         rate = math.sqrt(max(0.0, squared_rate(model, segment, position)))
         return position, rate, 0.5 * model.per_drop * math.sin(position)
     cos_ankle = math.cos(position)
@@ -207,9 +207,9 @@ def motion(model: Model, segment: Segment, position: float) -> tuple[float, floa
 
 
 @compiled
-def position_of(model: Model, phase: int, coordinate: float) -> float:
+def position_of(model: Model, stance: int, coordinate: float) -> float:
     """Position where the coordinate of `motion` has this value."""
-    if phase == SINGLE_STANCE:
+    if stance == SINGLE_STANCE:
         return coordinate
     cosine = ankle_cosine(coordinate, model.leg_length, model.foot_length, model.separation)
     return math.acos(max(-1.0, min(1.0, cosine)))

@@ -87,7 +87,7 @@ def proceed(
     terminal = segment.ends == FALL or segment.ends == FLY_OFF
     due = end + 1 if terminal else end
     trailing = 1 - segment.leading
-    if segment.phase == DOUBLE_STANCE:
+    if segment.stance == DOUBLE_STANCE:
         ahead = skip_changes(changes, right, cursors, trailing, segment.after)
         index = cursors[trailing]
         if ahead and changes[index] < due:

@@ -71,7 +71,7 @@ def collide(model: Model, segment: Segment, perturbation: float, work: Floats) -
 @compiled
 def enter_double_stance(model: Model, segment: Segment, perturbation: float, work: Floats) -> None:
     """Begin double stance right after the collision, with `apex` as it is."""
-    segment.phase = DOUBLE_STANCE
+    segment.stance = DOUBLE_STANCE
     segment.position = model.double_stance_start
     segment.perturbation = perturbation
     load(model, segment)
@@ -82,7 +82,7 @@ def enter_double_stance(model: Model, segment: Segment, perturbation: float, wor
 def leave_double_stance(model: Model, segment: Segment, work: Floats) -> None:
     """Toe-off: the ankle torque ends, also where a pulse is still on."""
     segment.apex = gained_apex(model, segment, segment.end)
-    segment.phase = SINGLE_STANCE
+    segment.stance = SINGLE_STANCE
     segment.position = model.toe_off_position
     segment.perturbation = 0.0
     segment.torque = 0.0
@@ -177,7 +177,7 @@ def look_ahead_double_stance(model: Model, segment: Segment, work: Floats) -> No
 
 @compiled
 def whole_time(whole: Floats, work: Floats, apex: float) -> float:
-    """Duration [s] of a whole phase: one quadrature whose geometry was made once."""
+    """Duration [s] of a whole stance: one quadrature whose geometry was made once."""
     gain, weights, time = whole[0], whole[1], work[TIME]
     for i in range(gain.size):
         time[i] = weights[i] / math.sqrt(apex + gain[i])

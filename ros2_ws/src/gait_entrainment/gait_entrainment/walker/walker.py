@@ -20,14 +20,14 @@ from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.walker.model import Floats, make_model, start_apex
 from gait_entrainment.walker.promise import PromisedTorque
-from gait_entrainment.walker.sampling import ROWS, Samples, fill_samples, samples_from_table
+from gait_entrainment.walker.sampling import SAMPLE, Samples, fill_samples, samples_from
 from gait_entrainment.walker.segment import (
     FALL,
     HEEL_STRIKE,
     SEGMENT,
     TOE_OFF,
     Log,
-    Phase,
+    Stance,
     leg_sine_at,
 )
 from gait_entrainment.walker.trajectory import ENDED, SWITCHED, Stamps, advance, start_walking
@@ -68,7 +68,7 @@ class Ending:
     """
 
     kind: EndingKind
-    phase: Phase
+    stance: Stance
     side: Side
     step: int
     time: float
@@ -79,7 +79,7 @@ class Ending:
     @property
     def message(self) -> str:
         """One sentence for people."""
-        where = f"in {self.phase.name.lower().replace('_', ' ')} of step {self.step}"
+        where = f"in {self.stance.name.lower()} stance of step {self.step}"
         when = f"at {self.time:.6f} s, leg angle {self.angle:.4f} rad"
         if self.kind == EndingKind.FALL:
             return f"The walker fell {where} {when}: {self.missing:.3g} J were missing."
@@ -195,9 +195,9 @@ class Walker:
                 f"samples from {times.min()} to {times.max()} ns are not all within the last"
                 f" stretch, {self._sampled_from} to {self.time_reached} ns"
             )
-        table = np.zeros((ROWS, times.size))
+        table = np.zeros(times.size, SAMPLE)
         fill_samples(self._model, self._log[: self._count], times, *self._perturbation(), table)
-        return samples_from_table(table)
+        return samples_from(table)
 
     def _perturbation(self) -> tuple[Stamps, Floats, int]:
         """Torque changes of both ankles, as `trajectory` wants them."""
@@ -218,10 +218,10 @@ class Walker:
 
     def _describe_ending(self, last: Any) -> Ending:
         stamp, rest = clock(last["stamp"], last["rest"], last["duration"])
-        sine = leg_sine_at(self._model, last["phase"], last["end"])
+        sine = leg_sine_at(self._model, last["stance"], last["end"])
         return Ending(
             kind=EndingKind.FALL if last["ends"] == FALL else EndingKind.FLY_OFF,
-            phase=Phase(last["phase"]),
+            stance=Stance(last["stance"]),
             side=Side(last["leading"]),
             step=int(last["step"]),
             time=seconds(stamp, rest),

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from driving import LATE_TOE_OFF, SECOND, TABLE_1, heel_strikes, leg_angle, toe_offs, walked
 from scipy.integrate import quad
+from step_to_step import step_to_step
 
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment.walker import EndingKind, Phase, Walker, segment, step_to_step
+from gait_entrainment.walker import EndingKind, Stance, Walker, segment
 
 PERIOD = float(heel_strikes(walked()[1])[1])
 TOE_OFF = float(toe_offs(walked()[1])[0])
@@ -154,9 +155,9 @@ def test_fall_in_single_stance():
     assert square < 0
     walker, events = walked(seconds=60.0, initial_speed=rate)
     ending = walker.ending
-    assert (ending.kind, ending.phase, ending.side) == (
+    assert (ending.kind, ending.stance, ending.side) == (
         EndingKind.FALL,
-        Phase.SINGLE_STANCE,
+        Stance.SINGLE,
         Side.RIGHT,
     )
     assert ending.step == 1
@@ -180,7 +181,7 @@ def test_fall_in_double_stance_by_a_negative_pulse():
     rate = TABLE_1.speed_after_collision
     walker, events = walked((((0, SECOND, -1000.0),), ()), 5.0)
     ending = walker.ending
-    assert (ending.kind, ending.phase) == (EndingKind.FALL, Phase.DOUBLE_STANCE)
+    assert (ending.kind, ending.stance) == (EndingKind.FALL, Stance.DOUBLE)
     assert len(events) == 1
     height = rate**2 / (2 * 9.81)
     angle = math.acos(math.cos(TABLE_1.leg_angle) + height)
@@ -193,7 +194,7 @@ def test_fall_in_double_stance_by_a_negative_pulse():
 def test_fly_off_at_once_by_a_large_pulse():
     walker, _ = walked((((ns(0.1), ns(0.2), 120.0),), ()), 5.0)
     ending = walker.ending
-    assert (ending.kind, ending.phase) == (EndingKind.FLY_OFF, Phase.DOUBLE_STANCE)
+    assert (ending.kind, ending.stance) == (EndingKind.FLY_OFF, Stance.DOUBLE)
     assert ending.time == pytest.approx(0.1, abs=1e-12)
     assert ending.side == Side.RIGHT
     # Right before the pulse the leg still carries what the pulse takes off it.
@@ -232,7 +233,7 @@ def test_fly_off_in_between_by_a_pulse_that_is_just_too_large():
     assert force.min() == pytest.approx(0, abs=1e-4)
     assert onset + MILLISECOND < instant < events[1].stamp - MILLISECOND
     ending = attempt(high)[0].ending
-    assert (ending.kind, ending.phase) == (EndingKind.FLY_OFF, Phase.DOUBLE_STANCE)
+    assert (ending.kind, ending.stance) == (EndingKind.FLY_OFF, Stance.DOUBLE)
     assert ending.time * SECOND == pytest.approx(instant, abs=MILLISECOND)
     assert 0 <= ending.missing < 1e-6
 
@@ -258,7 +259,7 @@ def test_fly_off_in_single_stance_where_gravity_no_longer_holds():
     p = TABLE_1
     walker, events = walked((((0, ns(0.09), -1000.0),), ()), 2.0, initial_speed=math.sqrt(8.4))
     ending = walker.ending
-    assert (ending.kind, ending.phase) == (EndingKind.FLY_OFF, Phase.SINGLE_STANCE)
+    assert (ending.kind, ending.stance) == (EndingKind.FLY_OFF, Stance.SINGLE)
     assert [event.kind for event in events] == [EventKind.HEEL_STRIKE, EventKind.TOE_OFF]
     theta, rate = leg_angle(walker.sample(np.array([events[1].stamp])))
     apex = rate[0] ** 2 - 2 * 9.81 * (1 - math.cos(theta[0]))
@@ -281,7 +282,7 @@ def test_a_walk_that_ended_tells_no_more_events():
 
 def test_slow_start_with_late_toe_off_falls_in_double_stance():
     walker, events = walked(seconds=20.0, parameters=LATE_TOE_OFF, initial_speed=0.05)
-    assert walker.ending.phase == Phase.DOUBLE_STANCE
+    assert walker.ending.stance == Stance.DOUBLE
     assert walker.ending.angle > 0
     assert len(events) == 1
 

@@ -21,9 +21,9 @@ from driving import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from paper_equations import walk
+from step_to_step import step_to_step
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.walker import step_to_step
 
 STEPS = 5
 EVENT_TOLERANCE = 1e-9

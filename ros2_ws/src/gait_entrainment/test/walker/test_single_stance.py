@@ -81,7 +81,7 @@ def test_whole_single_stance_is_the_pendulums_time_from_its_least_apex_on():
 def test_slow_single_stance_takes_the_closed_form():
     work, segment = np.empty(WORK_SHAPE), np.zeros(1, SEGMENT)[0]
     apex = 0.01
-    segment["phase"], segment["position"], segment["apex"] = 1, MODEL["toe_off_position"], apex
+    segment["stance"], segment["position"], segment["apex"] = 1, MODEL["toe_off_position"], apex
     look_ahead_single_stance(MODEL, segment, work)
     start, end = float(MODEL["toe_off_position"]), float(MODEL["strike_position"])
     expected = pendulum_time(PER_DROP, apex, start, end)

@@ -3,11 +3,11 @@
 
 import numpy as np
 import pytest
+from step_to_step import step_to_step
 
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.protocol import Protocol, PulsePlan
 from gait_entrainment.simulation import simulate
-from gait_entrainment.walker import step_to_step
 from gait_entrainment_studies.locking.branches import (
     Border,
     locked_gaits,

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from step_to_step import step_to_step
 
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment.walker import step_to_step
 from gait_entrainment_studies.locking.walked import walk_under_pulses
 from gait_entrainment_studies.variability.noise import step_noise
 from gait_entrainment_studies.variability.population import (

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The step-to-step function, by the very transitions that `Walker` runs."""
+"""The step-to-step function, by the walker's own transitions, in exact instants."""
 
 from typing import NamedTuple
 
@@ -22,9 +22,7 @@ from gait_entrainment.walker.segment import (
     Log,
     Segment,
 )
-from gait_entrainment.walker.trajectory import (
-    start_walking,
-)
+from gait_entrainment.walker.trajectory import start_walking
 from gait_entrainment.walker.transitions import (
     change_torque,
     collide,
@@ -88,7 +86,7 @@ def one_step(
     elapsed = 0.0
     if onset <= 0.0 < end:
         enter_double_stance(model, segment, torque, work)
-    while segment.phase == DOUBLE_STANCE:
+    while segment.stance == DOUBLE_STANCE:
         edge = onset if onset > elapsed else end
         if elapsed < edge < elapsed + segment.duration:
             position = position_at(model, work, segment, edge - elapsed)
