@@ -19,18 +19,18 @@ from gait_entrainment.conventions import EventKind, Side, nanoseconds
 from gait_entrainment.errors import UsageError
 from gait_entrainment.gait import GaitEvent, Verdict, analyze
 from gait_entrainment.settings import check_settings, setting
-from gait_entrainment_studies.cohort.subjects import Subjects
-from gait_entrainment_studies.locking.branches import basin_of, locked_gaits, pieces_of
-from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
-from gait_entrainment_studies.locking.roots import Floats
-from gait_entrainment_studies.variability.noise import step_noise
-from gait_entrainment_studies.variability.population import (
+from gait_entrainment_studies.cohort.population import (
     Population,
     PopulationWalk,
     PulseTrains,
     locked_runs,
     noise_for,
+    step_noise,
 )
+from gait_entrainment_studies.cohort.subjects import Subjects
+from gait_entrainment_studies.locking.branches import basin_of, locked_gaits, pieces_of
+from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
+from gait_entrainment_studies.locking.roots import Floats
 
 # Streams of noise beside the one that draws the subjects. That of a trial depends on its pulse
 # period alone: it is the same trial, whatever other periods are asked for.
@@ -201,10 +201,9 @@ def verdicts(study: Study, offset: float) -> dict[str, int]:
 
 def measured_basin_percent(study: Study) -> Floats:
     """Each subject's furthest period off its own at which it was found entrained [%]."""
-    widest: dict[int, float] = {}
+    widest = np.zeros(1 + max(trial.subject for trial in study.trials))
     for trial in study.trials:
-        reached = abs(trial.period_offset) / trial.measured_period
-        entrained = trial.verdict == "entrained"
-        widest[trial.subject] = max(widest.get(trial.subject, 0.0), reached if entrained else 0.0)
-    percent: Floats = 100 * np.array([widest[subject] for subject in sorted(widest)])
-    return percent
+        if trial.verdict == "entrained":
+            reached = abs(trial.period_offset) / trial.measured_period
+            widest[trial.subject] = max(widest[trial.subject], reached)
+    return 100 * widest

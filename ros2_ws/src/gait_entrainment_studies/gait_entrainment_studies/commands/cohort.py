@@ -5,15 +5,15 @@
 
 import argparse
 import csv
-import math
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Iterable
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.stats import binomtest
 
-from gait_entrainment.settings import Setting, setting
+from gait_entrainment.settings import Setting
 from gait_entrainment_studies.cohort.figures import draw_cohort
 from gait_entrainment_studies.cohort.study import (
     Study,
@@ -23,13 +23,8 @@ from gait_entrainment_studies.cohort.study import (
     verdicts,
 )
 from gait_entrainment_studies.cohort.subjects import SubjectDistributions, Subjects, draw_subjects
-from gait_entrainment_studies.commands.options import (
-    add_output_options,
-    add_setting,
-    add_settings,
-    answer,
-    chosen,
-)
+from gait_entrainment_studies.commands import question
+from gait_entrainment_studies.locking.roots import Floats
 
 DESCRIPTION = (
     "Draw subjects, give each its own stride-to-stride variability, conduct the experiment on "
@@ -42,38 +37,32 @@ EXAMPLES = """examples:
   entrain cohort --slope -0.02 --period-offset -0.05
 """
 
+_SUBJECTS = Setting("number of subjects", int, least=2)
 _PERIOD_OFFSET = Setting("pulse period minus measured stride period", unit="s")
 _OFFSETS = ("-0.12", "-0.1", "-0.08", "-0.06", "-0.05", "-0.04", "-0.02", "0.02", "0.05")
 _HEADLINE = -0.05
 
 
-@dataclass(frozen=True)
-class CohortOptions:
-    """How many are asked."""
-
-    subjects: int = setting(19, "number of subjects", within=(2, math.inf))
-
-
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     experiment = parser.add_argument_group("experiment")
-    add_settings(experiment, CohortOptions)
-    add_settings(experiment, StudyPlan)
-    offsets = f"{' '.join(_OFFSETS)}; may be given again"
-    add_setting(experiment, "period_offset", _PERIOD_OFFSET, offsets, action="append")
+    question.add_setting(experiment, "subjects", _SUBJECTS, "19")
+    question.add_settings(experiment, StudyPlan)
+    shown = f"{' '.join(_OFFSETS)}; may be given again"
+    told = _PERIOD_OFFSET
+    question.add_setting(experiment, "period_offset", told, shown=shown, action="append")
     drawn = parser.add_argument_group("distributions of the subjects")
     for item in fields(SubjectDistributions):
-        default = getattr(SubjectDistributions, item.name)
-        text = f"{item.metadata['meaning']} [{item.metadata['unit']}]"
+        mean, deviation = getattr(SubjectDistributions, item.name)
         drawn.add_argument(
             "--" + item.name.replace("_", "-"),
             nargs=2,
             type=float,
-            default=default,
+            default=(mean, deviation),
             metavar=("MEAN", "SD"),
-            help=f"{text}; default {default[0]:g} {default[1]:g}",
+            help=f"{item.metadata['meaning']}; default {mean:g} {deviation:g}",
         )
-    add_output_options(parser, "write figure and trials.csv")
+    question.add_output_options(parser, "write figure and trials.csv")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -82,8 +71,8 @@ def run(options: argparse.Namespace) -> int:
     distributions = SubjectDistributions(*(tuple(getattr(options, name)) for name in names))
     texts = options.period_offset or _OFFSETS
     offsets = [_PERIOD_OFFSET.parse("period_offset", text) for text in texts]
-    plan = chosen(options, StudyPlan, period_offsets=tuple(dict.fromkeys(offsets)))
-    count = chosen(options, CohortOptions).subjects
+    plan = question.chosen(options, StudyPlan, period_offsets=tuple(dict.fromkeys(offsets)))
+    count = _SUBJECTS.parse("subjects", options.subjects)
     subjects = draw_subjects(distributions, count, plan.seed)
     study = run_study(subjects, plan)
 
@@ -96,28 +85,27 @@ def run(options: argparse.Namespace) -> int:
         return paths
 
     outcome = _outcome(study, subjects, plan, asdict(distributions))
-    return answer(options, outcome, _summary(outcome), write, "written          ")
+    return question.answer(options, outcome, _summary(outcome), write, "written          ")
 
 
 def _outcome(
     study: Study, subjects: Subjects, plan: StudyPlan, distributions: dict[str, Any]
 ) -> dict[str, Any]:
-    def mean(values: list[float]) -> float | None:
+    def mean(values: Iterable[float]) -> float | None:
         finite = [value for value in values if np.isfinite(value)]
         return float(np.mean(finite)) if finite else None
 
     periods = []
     for offset in plan.period_offsets:
         trials = [trial for trial in study.trials if trial.period_offset == offset]
+        entrained = (trial for trial in trials if trial.verdict == "entrained")
         periods.append(
             {
                 "period_offset": offset,
                 "verdicts": verdicts(study, offset),
-                "fraction_locked": mean([trial.fraction_locked for trial in trials]),
-                "mean_run": mean([trial.mean_run for trial in trials]),
-                "lag_of_entrained": mean(
-                    [trial.median_lag for trial in trials if trial.verdict == "entrained"]
-                ),
+                "fraction_locked": mean(trial.fraction_locked for trial in trials),
+                "mean_run": mean(trial.mean_run for trial in trials),
+                "lag_of_entrained": mean(trial.median_lag for trial in entrained),
             }
         )
     anywhere = {trial.subject for trial in study.trials if trial.verdict == "entrained"}
@@ -127,15 +115,17 @@ def _outcome(
         "redrawn_for_want_of_a_gait": subjects.redrawn,
         "distributions": distributions,
         "plan": asdict(plan),
-        "mean_stride_period": mean([trial.measured_period for trial in study.trials]),
+        "mean_stride_period": mean(trial.measured_period for trial in study.trials),
         "periods": periods,
         "entrained_at_some_period": len(anywhere),
-        "basin_solved_percent": (
-            [float(solved.mean()), float(solved.std(ddof=1))] if solved.size else None
-        ),
+        "basin_solved_percent": _spread(solved) if solved.size else None,
         "basin_ends_percent": study.basins.mean(axis=0).tolist() if solved.size else None,
-        "basin_measured_percent": [float(measured.mean()), float(measured.std(ddof=1))],
+        "basin_measured_percent": _spread(measured),
     }
+
+
+def _spread(values: Floats) -> list[float]:
+    return [float(values.mean()), float(values.std(ddof=1))]
 
 
 def _of(found: int, count: int) -> str:

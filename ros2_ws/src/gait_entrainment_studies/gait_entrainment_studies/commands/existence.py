@@ -4,18 +4,11 @@
 """entrain existence: for which stiffness and leg angle there is a gait."""
 
 import argparse
-import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment.settings import setting
-from gait_entrainment_studies.commands.options import (
-    add_output_options,
-    add_settings,
-    add_walker_options,
-    answer,
-    chosen,
-)
+from gait_entrainment.settings import Setting
+from gait_entrainment_studies.commands import question
 from gait_entrainment_studies.existence.figures import draw_existence
 from gait_entrainment_studies.existence.stiffness_range import existence_map, stiffness_range
 
@@ -23,25 +16,21 @@ DESCRIPTION = "Range of stiffness between falling and flying off, along the leg 
 EXAMPLES = "examples:\n  entrain existence --out figures\n  entrain existence --json"
 
 
-@dataclass(frozen=True)
-class ExistenceOptions:
-    """How fine the map is."""
-
-    points: int = setting(120, "leg angles", within=(2, math.inf))
+_POINTS = Setting("leg angles", int, least=2)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    add_settings(parser, ExistenceOptions)
-    add_walker_options(parser)
-    add_output_options(parser, "draw the map into a folder")
+    question.add_setting(parser, "points", _POINTS, "120")
+    question.add_walker_options(parser)
+    question.add_output_options(parser, "draw the map into a folder")
 
 
 def run(options: argparse.Namespace) -> int:
     """Print the range of the walker, and the map in JSON."""
-    walker = chosen(options, WalkerParameters)
+    walker = question.chosen(options, WalkerParameters)
     own = stiffness_range(walker)
-    ranges = existence_map(walker, chosen(options, ExistenceOptions).points)
+    ranges = existence_map(walker, _POINTS.parse("points", options.points))
     text = (
         f"leg angle        {own.leg_angle:.6f} rad\n"
         f"just vaults over {own.just_vault_over:.6f} N m/rad, felt at: {own.falls_at.value}\n"
@@ -50,4 +39,4 @@ def run(options: argparse.Namespace) -> int:
         f" {sum(r.exists for r in ranges)} with a gait"
     )
     outcome = {"walker": asdict(own), "map": [asdict(r) for r in ranges]}
-    return answer(options, outcome, text, lambda out: draw_existence(ranges, walker, out))
+    return question.answer(options, outcome, text, lambda out: draw_existence(ranges, walker, out))

@@ -4,22 +4,12 @@
 """entrain lock: all phase-locked gaits under one kind of pulse, solved."""
 
 import argparse
-import math
 from collections import Counter
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
-from gait_entrainment.settings import setting
-from gait_entrainment_studies.commands.options import (
-    PERIOD_OFFSET,
-    add_gait_options,
-    add_output_options,
-    add_settings,
-    answer,
-    check_period_offset,
-    chosen,
-    chosen_gait,
-)
+from gait_entrainment.settings import Setting
+from gait_entrainment_studies.commands import question
 from gait_entrainment_studies.locking.branches import Piece, locked_gaits, pieces_of
 from gait_entrainment_studies.locking.figures import draw_branches
 from gait_entrainment_studies.locking.walked import shares_of
@@ -36,29 +26,25 @@ EXAMPLES = """examples:
 """
 
 
-@dataclass(frozen=True)
-class LockOptions:
-    """What is asked of the locks."""
-
-    period_offset: float = setting(-0.05, PERIOD_OFFSET.meaning, PERIOD_OFFSET.unit)
-    phases: int = setting(32, "initial phases walked from", within=(1, math.inf))
+_PHASES = Setting("initial phases walked from", int, least=1)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    add_settings(parser, LockOptions)
-    add_gait_options(parser)
-    add_output_options(parser, "draw the branches into a folder")
+    question.add_setting(parser, "period_offset", question.PERIOD_OFFSET, "-0.05")
+    question.add_setting(parser, "phases", _PHASES, "32")
+    question.add_gait_options(parser)
+    question.add_output_options(parser, "draw the branches into a folder")
 
 
 def run(options: argparse.Namespace) -> int:
     """Solve, walk, print."""
-    gait, asked = chosen_gait(options), chosen(options, LockOptions)
-    check_period_offset(asked.period_offset, gait)
-    period = gait.unperturbed_period + asked.period_offset
+    gait = question.chosen_gait(options)
+    period = gait.unperturbed_period + question.chosen_offset(options.period_offset, gait)
+    phases = _PHASES.parse("phases", options.phases)
     pieces = pieces_of(gait)
     locks = locked_gaits(gait, period, pieces)
-    shares = shares_of(gait, period, locks, asked.phases)
+    shares = shares_of(gait, period, locks, phases)
     outcome = {
         "unperturbed_stride_period": gait.unperturbed_period,
         "pulse_period": period,
@@ -75,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
         ],
         "walked": {kind.value: count for kind, count in Counter(shares.outcomes).items()},
     }
-    return answer(
+    return question.answer(
         options,
         outcome,
         _summary(outcome),

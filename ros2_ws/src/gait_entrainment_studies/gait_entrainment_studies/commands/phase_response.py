@@ -4,25 +4,13 @@
 """entrain phase-response: what a single pulse does, and the lock that it predicts."""
 
 import argparse
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from gait_entrainment.settings import setting
-from gait_entrainment_studies.commands.options import (
-    PERIOD_OFFSET,
-    add_gait_options,
-    add_output_options,
-    add_setting,
-    add_settings,
-    answer,
-    check_period_offset,
-    chosen,
-    chosen_gait,
-)
+from gait_entrainment.settings import Setting
+from gait_entrainment_studies.commands import question
 from gait_entrainment_studies.phase_response.figures import draw_response
 from gait_entrainment_studies.phase_response.response import (
     PhaseResponse,
@@ -45,32 +33,25 @@ _COLUMNS = ("phase", "onset", "lag", "shift", "first_stride_shift")
 _HEADER = "phase [1],onset [s],lag [s],shift [s],first_stride_shift [s]"
 
 
-@dataclass(frozen=True)
-class ResponseOptions:
-    """How fine the curve is."""
-
-    points: int = setting(201, "points on each branch", within=(2, math.inf))
+_POINTS = Setting("points on each branch", int, least=2)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    add_setting(
-        parser, "period_offset", PERIOD_OFFSET, "-0.05, may be given again", action="append"
-    )
-    add_settings(parser, ResponseOptions)
-    add_gait_options(parser)
-    add_output_options(parser, "write curve and CSV to a folder")
+    told, shown = question.PERIOD_OFFSET, "-0.05; may be given again"
+    question.add_setting(parser, "period_offset", told, shown=shown, action="append")
+    question.add_setting(parser, "points", _POINTS, "201")
+    question.add_gait_options(parser)
+    question.add_output_options(parser, "write curve and CSV to a folder")
 
 
 def run(options: argparse.Namespace) -> int:
     """Solve and print; the curve itself goes to JSON and CSV."""
-    gait = chosen_gait(options)
+    gait = question.chosen_gait(options)
     texts = options.period_offset or ["-0.05"]
-    offsets = np.array([PERIOD_OFFSET.parse("period_offset", text) for text in texts])
-    for offset in offsets:
-        check_period_offset(offset, gait)
+    offsets = np.array([question.chosen_offset(text, gait) for text in texts])
     pulse = gait.parameters, gait.torque, gait.width
-    response = phase_response(*pulse, chosen(options, ResponseOptions).points)
+    response = phase_response(*pulse, _POINTS.parse("points", options.points))
     found = predictions(*pulse, offsets)
     curve = np.column_stack([getattr(response, name) for name in _COLUMNS])
     locks = [
@@ -90,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
         return paths
 
     outcome = {"columns": _COLUMNS, "curve": rows, "locks": locks}
-    return answer(options, outcome, _summary(response, found), write, "written          ")
+    return question.answer(options, outcome, _summary(response, found), write, "written          ")
 
 
 def _summary(response: PhaseResponse, found: Sequence[Prediction]) -> str:

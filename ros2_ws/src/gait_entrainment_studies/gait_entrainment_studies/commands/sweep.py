@@ -4,10 +4,8 @@
 """entrain sweep: the Arnold tongue."""
 
 import argparse
-import math
 import re
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +13,8 @@ import numpy as np
 from tqdm import tqdm
 
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment.settings import setting
-from gait_entrainment_studies.commands.options import (
-    add_output_options,
-    add_settings,
-    add_walker_options,
-    answer,
-    chosen,
-)
-from gait_entrainment_studies.sweep.borders import exact_borders
+from gait_entrainment.settings import Setting
+from gait_entrainment_studies.commands import question
 from gait_entrainment_studies.sweep.engine import (
     available_cores,
     rows_by_dask,
@@ -31,6 +22,7 @@ from gait_entrainment_studies.sweep.engine import (
 )
 from gait_entrainment_studies.sweep.figures import draw_locked_lags, draw_tongue
 from gait_entrainment_studies.sweep.plan import Axis, SweepPlan
+from gait_entrainment_studies.sweep.row import exact_borders
 from gait_entrainment_studies.sweep.store import SweepStore, read_sweep
 
 # The exact borders are drawn at this many torques or more: those of a coarse sweep are smooth too.
@@ -49,13 +41,7 @@ EXAMPLES = """examples:
 """
 
 
-@dataclass(frozen=True)
-class Workers:
-    """Who makes the rows."""
-
-    jobs: int | None = setting(
-        None, "processes; default: all cores", within=(1, math.inf), kind=int, optional=True
-    )
+_JOBS = Setting("processes; default: all cores", int, least=1)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -72,26 +58,26 @@ def add_options(parser: argparse.ArgumentParser) -> None:
             metavar=("MIN", "MAX", "COUNT"),
             help=f"{text}; default {' '.join(map(str, default))}",
         )
-    add_settings(parser, SweepPlan)
-    add_settings(parser, Workers)
+    question.add_settings(parser, SweepPlan)
+    question.add_setting(parser, "jobs", _JOBS)
     parser.add_argument("--scheduler", metavar="ADDRESS", help="use a Dask cluster instead")
-    add_walker_options(parser)
-    add_output_options(parser, _OUT, Path("sweep"))
+    question.add_walker_options(parser)
+    question.add_output_options(parser, _OUT, Path("sweep"))
 
 
 def run(options: argparse.Namespace) -> int:
     """Sweep what is missing, join, draw."""
-    workers = chosen(options, Workers)
-    plan = chosen(
+    jobs = _JOBS.parse("jobs", options.jobs) if options.jobs else available_cores()
+    plan = question.chosen(
         options,
         SweepPlan,
-        walker=chosen(options, WalkerParameters),
+        walker=question.chosen(options, WalkerParameters),
         period_offsets=Axis(*options.period_offsets),
         torque_fractions=Axis(*options.torque_fractions),
     )
     store = SweepStore(options.out, plan)
     try:
-        _fill(plan, store, workers.jobs or available_cores(), options.scheduler)
+        _fill(plan, store, jobs, options.scheduler)
     except KeyboardInterrupt:
         count = plan.torque_fractions.count
         print(
@@ -133,7 +119,7 @@ def _report(plan: SweepPlan, store: SweepStore, options: argparse.Namespace) -> 
         return [store.table_path, *tongue, *draw_locked_lags(plan, table, folder)]
 
     outcome = {re.sub(r"\W", "_", name): count for name, count in counts.items()}
-    return answer(
+    return question.answer(
         options,
         {**outcome, "borders": [vars(one) for one in borders]},
         "\n".join(f"{name:25} {count}" for name, count in counts.items()),

@@ -12,8 +12,8 @@ import numpy as np
 
 from gait_entrainment import drawing
 from gait_entrainment_studies.locking.figures import COLOURS
-from gait_entrainment_studies.sweep.borders import StableInterval
 from gait_entrainment_studies.sweep.plan import SweepPlan
+from gait_entrainment_studies.sweep.row import StableInterval
 
 _PERIOD = r"pulse period $\tau_p - 2\tau_0$ [ms]"
 _TORQUE = "torque of the pulse / peak ankle torque"

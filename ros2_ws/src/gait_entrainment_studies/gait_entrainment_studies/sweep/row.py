@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One row of the tongue: all pulse periods at one torque, solved and walked."""
+"""What is solved and walked at one torque: the cells of a row, and the exact borders."""
 
 from dataclasses import dataclass, fields
 from typing import Any
@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment_studies.locking.branches import pieces_of, stable_intervals
 from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
+from gait_entrainment_studies.locking.roots import Floats
 from gait_entrainment_studies.locking.walked import Outcome, walk_under_pulses
 from gait_entrainment_studies.sweep.plan import SweepPlan
 
@@ -86,3 +88,41 @@ def _walked(plan: SweepPlan, torque: float, period: float) -> dict[str, float]:
     pairs = zip(walks, outcomes, strict=True)
     lags = [walk.last_lag for walk, outcome in pairs if outcome is Outcome.LOCKED]
     return {**shares, "median_lag": float(np.median(lags)) if lags else np.nan}
+
+
+@dataclass(frozen=True)
+class StableInterval:
+    """Pulse periods with a stable lock at one torque, off the unperturbed stride period [s]."""
+
+    torque_fraction: float
+    place: str
+    shortest: float
+    longest: float
+    shortest_border: str
+    longest_border: str
+    lag_at_shortest: float
+    lag_at_longest: float
+
+
+def exact_borders(
+    walker: WalkerParameters, torque_fractions: Floats, width: float
+) -> list[StableInterval]:
+    """Solve for the borders at each torque, given as a fraction of the peak ankle torque."""
+    found = []
+    for fraction in torque_fractions[np.abs(torque_fractions) > 0]:
+        gait = PulsedGait(walker, float(fraction) * walker.peak_torque, width)
+        for piece in stable_intervals(pieces_of(gait)):
+            low, high = piece.least_period, piece.greatest_period
+            found.append(
+                StableInterval(
+                    float(fraction),
+                    piece.place.value,
+                    low.period - gait.unperturbed_period,
+                    high.period - gait.unperturbed_period,
+                    low.border.value,
+                    high.border.value,
+                    low.lag,
+                    high.lag,
+                )
+            )
+    return found

@@ -108,7 +108,7 @@ def test_command_counts_every_subject_in_its_denominators(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--mass", "10", "6"], "mass: 10 +/- 6 kg; allowed: a mean above twice"),
+        (["--mass", "10", "6"], "mass: 10 +/- 6; allowed: a mean above twice"),
         (["--slope", "0.7"], "slope: 0.7 rad; allowed: within the leg angle"),
         (["--period-offset", "-1.5"], "period_offset: -1.5 s; allowed: within"),
         (["--period-offset", "-0.5", "--width", "0.7"], "period_offset: -0.5 s; allowed: within"),

@@ -20,10 +20,9 @@ from gait_entrainment.errors import UsageError
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment_studies.locking.walked import Outcome, walk_under_pulses
 from gait_entrainment_studies.sweep import engine
-from gait_entrainment_studies.sweep.borders import exact_borders
 from gait_entrainment_studies.sweep.engine import rows_by_dask, rows_by_processes
 from gait_entrainment_studies.sweep.plan import Axis, SweepError, SweepPlan
-from gait_entrainment_studies.sweep.row import sweep_row
+from gait_entrainment_studies.sweep.row import exact_borders, sweep_row
 from gait_entrainment_studies.sweep.store import SweepStore, read_sweep
 
 TABLE_1 = WalkerParameters()

@@ -27,14 +27,17 @@ from gait_entrainment.geometry import torque_work
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.walker import EndingKind
 from gait_entrainment.walker.model import Floats, make_model
-from gait_entrainment_studies.variability.noise import Seed, step_noise
 from gait_entrainment_studies.walks import Pulses, walk
+
+Seed = int | tuple[int, ...]
 
 # Strides of the pilot walk that finds the noise for a coefficient of variation, and its rounds.
 _PILOT_STRIDES = 400
 _PILOT_ROUNDS = 2
 _PILOT_NOISE = 0.02
 
+# Noise is cut off at this many standard deviations: no step has an absurd push-off.
+_TRUNCATION = 3.0
 # What noise leaves at least of a push-off's stiffness.
 _LEAST = 0.01
 
@@ -149,6 +152,30 @@ def _made_for_noise(walker: WalkerParameters, slope: float) -> Any:
     model["whole_double_stance_apex"] = np.inf
     model["least_gain"] = -np.inf
     return model
+
+
+def step_noise(seed: Seed, steps: int, size: int, hurst: float = 0.5) -> Floats:
+    """
+    Return fractional Gaussian noise (steps, size) of unit variance, truncated.
+
+    With `hurst` 0.5 it is white; above, up to 1, neighbours resemble each other over long
+    stretches (strides of adults: about 0.75). By circulant embedding (Davies and Harte 1987),
+    which is exact.
+
+    Raises UsageError for a Hurst exponent out of range.
+    """
+    if not 0.5 <= hurst < 1:
+        raise UsageError(f"hurst: {hurst:g}; allowed: at least 0.5, which is white, and below 1")
+    generator, lags = np.random.default_rng(seed), np.arange(steps + 1.0)
+    power = 2 * hurst
+    covariance = 0.5 * (np.abs(lags + 1) ** power - 2 * lags**power + np.abs(lags - 1) ** power)
+    circulant = np.concatenate([covariance, covariance[-2:0:-1]])
+    spectrum = np.clip(np.fft.fft(circulant).real, 0.0, None)
+    shape = size, circulant.size
+    white = generator.standard_normal(shape) + 1j * generator.standard_normal(shape)
+    noise = np.fft.fft(white * np.sqrt(spectrum / circulant.size)).real[:, :steps]
+    truncated: Floats = np.clip(noise.T, -_TRUNCATION, _TRUNCATION)
+    return truncated
 
 
 def noise_for(

@@ -1,11 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the commands share: options made from settings, and the forms in which they answer."""
+"""What the questions share: options made from settings, and the forms of an answer."""
 
 import argparse
 import json
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,30 +33,44 @@ class PulseOptions:
     width: float = setting(0.1, "duration", "s")
 
 
-def add_setting(group: Group, name: str, told: Setting, default: str, **more: Any) -> None:
-    """Add the option for one setting; the rest are arguments of argparse."""
+def add_setting(
+    group: Group,
+    name: str,
+    told: Setting,
+    default: str | None = None,
+    shown: str | None = None,
+    **more: Any,
+) -> None:
+    """Add the option for a setting, whose value is text; ``shown`` is its default in words."""
     unit = f" [{told.unit}]" if told.unit else ""
-    text = f"{told.meaning}{unit}" + (f"; default {default}" if default else "")
-    option = "--" + name.replace("_", "-")
-    group.add_argument(option, metavar=told.kind.__name__.upper(), help=text, **more)
+    text = f"; default {shown or default}" if shown or default else ""
+    group.add_argument(
+        "--" + name.replace("_", "-"),
+        default=default,
+        metavar=told.kind.__name__.upper(),
+        help=told.meaning + unit + text,
+        **more,
+    )
 
 
 def add_settings(group: Group, owner: type) -> None:
     """Add an option for each setting of a dataclass."""
     for name, told in settings_of(owner).items():
         default = getattr(owner, name)
-        add_setting(group, name, told, "" if default is None else f"{default:g}")
+        add_setting(group, name, told, shown=None if default is None else f"{default:g}")
 
 
 def chosen(options: argparse.Namespace, owner: type[Chosen], **rest: Any) -> Chosen:
     """Return the dataclass that the options describe; raises SettingError."""
-    texts = {name: getattr(options, name) for name in settings_of(owner)}
-    given = {
-        name: told.parse(name, texts[name])
-        for name, told in settings_of(owner).items()
-        if texts[name] is not None
-    }
-    return owner(**given, **rest)
+    texts = vars(options)
+    return owner(
+        **{
+            name: told.parse(name, texts[name])
+            for name, told in settings_of(owner).items()
+            if texts[name] is not None
+        },
+        **rest,
+    )
 
 
 def add_walker_options(parser: argparse.ArgumentParser) -> None:
@@ -82,16 +95,18 @@ def chosen_gait(options: argparse.Namespace) -> PulsedGait:
     return PulsedGait(walker, torque, pulse.width)
 
 
-def check_period_offset(offset: float, gait: PulsedGait) -> None:
-    """Raise UsageError if pulses would overlap, or stay in place without a lock."""
+def chosen_offset(text: str, gait: PulsedGait) -> float:
+    """Return a PERIOD_OFFSET; raises UsageError if pulses would overlap or never lock."""
+    offset: float = PERIOD_OFFSET.parse("period_offset", text)
     least = gait.width - gait.unperturbed_period
-    if not least < offset < math.inf:
+    if not offset > least:
         raise UsageError(f"period_offset: {offset:g} s; allowed: above {least:.4g} s")
     if abs(offset) <= CREEP:
         raise UsageError(
             f"period_offset: {offset:g} s is the stride period itself, at which a pulse in swing"
             f" stays without a lock; allowed: more than {CREEP:g} s off it"
         )
+    return offset
 
 
 def add_output_options(
