@@ -9,16 +9,17 @@ from typing import Any
 import numpy as np
 
 from gait_entrainment import drawing
+from gait_entrainment.drawing import BLUE, GREEN, GREY, ORANGE, PINK, SKY, YELLOW
 from gait_entrainment_studies.cohort.study import Study, verdicts
 
 _COLOURS = {
-    "entrained": drawing.GREEN,
-    "undecided": drawing.GREY,
-    "untestable": drawing.SKY,
-    "drifting": drawing.ORANGE,
-    "lost": drawing.YELLOW,
-    "fell": drawing.BLUE,
-    "flew off": drawing.PINK,
+    "entrained": GREEN,
+    "undecided": GREY,
+    "untestable": SKY,
+    "drifting": ORANGE,
+    "lost": YELLOW,
+    "fell": BLUE,
+    "flew off": PINK,
 }
 
 
@@ -51,13 +52,9 @@ def _draw_verdicts(study: Study, axes: Any) -> None:
 
 def _draw_basins(study: Study, axes: Any) -> None:
     percent = np.sort(study.basin_widths)
-    axes.plot(percent, np.arange(1, percent.size + 1), "o", color=drawing.BLUE, ms=4)
-    axes.axvline(
-        percent.mean(), color=drawing.BLUE, ls="--", lw=1, label=f"mean {percent.mean():.2f} %"
-    )
-    axes.axvspan(
-        6.7 - 3.6, 6.7 + 3.6, color=drawing.ORANGE, alpha=0.15, lw=0, label="human 6.7 ± 3.6 %"
-    )
-    axes.axvline(6.7, color=drawing.ORANGE, lw=1)
+    axes.plot(percent, np.arange(1, percent.size + 1), "o", color=BLUE, ms=4)
+    axes.axvline(percent.mean(), color=BLUE, ls="--", lw=1, label=f"mean {percent.mean():.2f} %")
+    axes.axvspan(6.7 - 3.6, 6.7 + 3.6, color=ORANGE, alpha=0.15, lw=0, label="human 6.7 ± 3.6 %")
+    axes.axvline(6.7, color=ORANGE, lw=1)
     axes.set(xlabel="basin of entrainment [% of the stride]", ylabel="subjects, sorted", xlim=0)
     axes.set_title("basins without noise, solved", fontsize=10)

@@ -6,6 +6,7 @@
 import argparse
 import re
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +16,7 @@ from tqdm import tqdm
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.settings import Setting
 from gait_entrainment_studies.commands import question
-from gait_entrainment_studies.sweep.engine import (
-    available_cores,
-    rows_by_dask,
-    rows_by_processes,
-)
+from gait_entrainment_studies.sweep.engine import available_cores, rows_by_dask, rows_by_processes
 from gait_entrainment_studies.sweep.figures import draw_locked_lags, draw_tongue
 from gait_entrainment_studies.sweep.plan import Axis, SweepPlan
 from gait_entrainment_studies.sweep.row import exact_borders
@@ -42,21 +39,23 @@ EXAMPLES = """examples:
 
 
 _JOBS = Setting("processes; default: all cores", int, least=1)
+_OFFSET = Setting("pulse period minus stride period", unit="s")
+_FRACTION = Setting("torque over the peak ankle torque", unit="1")
+_COUNT = Setting("number of values", int, least=1)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    for option, default, text in (
-        ("--period-offsets", (-0.12, 0.02, 100), "pulse period minus stride period [s]"),
-        ("--torque-fractions", (0.005, 0.25, 50), "torque over the peak ankle torque"),
+    for name, told, *default in (
+        ("period_offsets", _OFFSET, "-0.12", "0.02", "100"),
+        ("torque_fractions", _FRACTION, "0.005", "0.25", "50"),
     ):
         parser.add_argument(
-            option,
+            "--" + name.replace("_", "-"),
             nargs=3,
-            type=float,
             default=default,
             metavar=("MIN", "MAX", "COUNT"),
-            help=f"{text}; default {' '.join(map(str, default))}",
+            help=f"{told.meaning} [{told.unit}]; default {' '.join(default)}",
         )
     question.add_settings(parser, SweepPlan)
     question.add_setting(parser, "jobs", _JOBS)
@@ -72,8 +71,8 @@ def run(options: argparse.Namespace) -> int:
         options,
         SweepPlan,
         walker=question.chosen(options, WalkerParameters),
-        period_offsets=Axis(*options.period_offsets),
-        torque_fractions=Axis(*options.torque_fractions),
+        period_offsets=_axis("period_offsets", _OFFSET, options.period_offsets),
+        torque_fractions=_axis("torque_fractions", _FRACTION, options.torque_fractions),
     )
     store = SweepStore(options.out, plan)
     try:
@@ -87,6 +86,11 @@ def run(options: argparse.Namespace) -> int:
         )
         return 1
     return _report(plan, store, options)
+
+
+def _axis(name: str, told: Setting, texts: Sequence[str]) -> Axis:
+    least, most = (told.parse(name, text) for text in texts[:2])
+    return Axis(least, most, _COUNT.parse(name, texts[2]))
 
 
 def _fill(plan: SweepPlan, store: SweepStore, jobs: int, scheduler: str | None) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from gait_entrainment import drawing
+from gait_entrainment.drawing import BLUE, GREY, ORANGE, SKY
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment_studies.existence.stiffness_range import StiffnessRange
 
@@ -21,23 +22,16 @@ def draw_existence(
     angles = np.degrees([r.leg_angle for r in ranges])
     least = np.array([r.just_vault_over for r in ranges])
     most = np.array([r.just_fly_off for r in ranges])
-    axes.fill_between(angles, least, most, where=least < most, color=drawing.SKY, alpha=0.35, lw=0)
-    axes.plot(angles, least, color=drawing.BLUE, lw=1.8, label="just vaults over: below it, falls")
-    axes.plot(
-        angles,
-        most,
-        color=drawing.ORANGE,
-        ls="--",
-        lw=1.8,
-        label="just flies off: above it, lifts",
-    )
+    axes.fill_between(angles, least, most, where=least < most, color=SKY, alpha=0.35, lw=0)
+    axes.plot(angles, least, color=BLUE, lw=1.8, label="just vaults over: below it, falls")
+    axes.plot(angles, most, color=ORANGE, ls="--", lw=1.8, label="just flies off: above it, lifts")
     here = np.degrees(walker.leg_angle)
     axes.plot([here], [walker.ankle_stiffness], "*", color="black", ms=11, label="this walker")
     for index in range(1, len(ranges)):
         before, after = ranges[index - 1], ranges[index]
         if before.falls_at is not after.falls_at or before.flies_off_at is not after.flies_off_at:
-            axes.axvline(angles[index], color=drawing.GREY, ls=":", lw=0.8)
-    axes.plot([], [], color=drawing.GREY, ls=":", lw=0.8, label="another instant decides")
+            axes.axvline(angles[index], color=GREY, ls=":", lw=0.8)
+    axes.plot([], [], color=GREY, ls=":", lw=0.8, label="another instant decides")
     axes.set(xlabel="leg angle at heel strike [deg]", ylabel="ankle stiffness [N m/rad]", ylim=0)
     axes.set_title("Where a period-one gait exists", fontsize=11)
     drawing.add_legend(axes, loc="upper left")

@@ -13,6 +13,7 @@ corner or a fold, and both are solved for, not searched for by simulation.
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 
 import numpy as np
 
@@ -99,7 +100,7 @@ def pieces_of(gait: PulsedGait) -> list[Piece]:
     """Return all pieces of all branches, in the order of the pulse onset."""
     return [
         piece
-        for place, first, last, borders in _branches(gait)
+        for place, first, last, borders in branches_of(gait)
         for piece in _split(gait, place, first, last, borders)
     ]
 
@@ -118,12 +119,24 @@ def locked_gaits(
         low, high = piece.least_period.period, piece.greatest_period.period
         if not piece.feasible or not low <= period <= high:
             continue
-        along = gait.along(piece.place)
+        along = partial(gait.gaits, piece.place)
         angles = piece.first.angle, piece.last.angle
         angle = solve(lambda x, along=along: along(x).period - period, *angles)  # type: ignore[misc]
-        solution = along(np.array([angle]))
-        if solution.end[0] > solution.start[0]:
-            found.append(_locked(gait, piece.place, solution))
+        one = along(np.array([angle])).at(0)
+        if one.end > one.start:
+            first, second = one.multipliers.tolist()
+            found.append(
+                LockedGait(
+                    place=piece.place,
+                    period=float(one.period),
+                    onset=float(one.onset),
+                    lag=float(one.lag),
+                    phase=float(one.phase),
+                    speed=gait.speed(float(one.apex)),
+                    multipliers=(first, second),
+                    stable=bool(one.stable),
+                )
+            )
     return found
 
 
@@ -141,8 +154,8 @@ def basin_of(gait: PulsedGait, pieces: list[Piece]) -> tuple[float, float]:
     )
 
 
-def _branches(gait: PulsedGait) -> Iterator[tuple[Place, float, float, tuple[Border, Border]]]:
-    """Yield each branch: place, range of the ankle angle along it, and its corners."""
+def branches_of(gait: PulsedGait) -> Iterator[tuple[Place, float, float, tuple[Border, Border]]]:
+    """Yield each branch: place, first and last ankle angle along it, and its corners."""
     struck, off = gait.heel_strike, gait.toe_off
     first_end, last_start = gait.first_end, gait.last_start
     if last_start > struck:
@@ -160,7 +173,7 @@ def _split(
     gait: PulsedGait, place: Place, first: float, last: float, corners: tuple[Border, Border]
 ) -> Iterator[Piece]:
     """Cut a branch wherever the slope of the period or the stability changes."""
-    along = gait.along(place)
+    along = partial(gait.gaits, place)
     angles = first + (last - first) * _SCAN
     marks = _marks(along(angles))
     begin, mark = _end(corners[0], first, along), marks[0]
@@ -224,18 +237,3 @@ def _turn(
 def _end(border: Border, angle: float, along: Callable[[Floats], Gaits]) -> End:
     gait = along(np.array([angle])).at(0)
     return End(border, angle, float(gait.period), float(gait.onset), float(gait.lag))
-
-
-def _locked(gait: PulsedGait, place: Place, solution: Gaits) -> LockedGait:
-    one = solution.at(0)
-    first, second = one.multipliers
-    return LockedGait(
-        place=place,
-        period=float(one.period),
-        onset=float(one.onset),
-        lag=float(one.lag),
-        phase=float(one.phase),
-        speed=gait.speed(float(one.apex)),
-        multipliers=(complex(first), complex(second)),
-        stable=bool(one.stable),
-    )

@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from gait_entrainment import drawing
+from gait_entrainment.drawing import BESIDE, BLACK, BLUE, GREEN, GREY, ORANGE
 from gait_entrainment_studies.locking.branches import Border, LockedGait, Piece
 from gait_entrainment_studies.locking.pulsed_gait import Place, PulsedGait
 
-COLOURS = {Place.EARLY: drawing.ORANGE, Place.INSIDE: drawing.BLUE, Place.LATE: drawing.GREEN}
+PLACE_COLOURS = {Place.EARLY: ORANGE, Place.INSIDE: BLUE, Place.LATE: GREEN}
 
 
 def draw_branches(
@@ -21,33 +22,32 @@ def draw_branches(
     """Draw all branches, stable or not, their borders, and the locked gaits at one period."""
     figure, axes = drawing.new_figure()
     for piece in (one for one in pieces if one.feasible):
-        gaits = gait.along(piece.place)(np.linspace(piece.first.angle, piece.last.angle, 80))
+        gaits = gait.gaits(piece.place, np.linspace(piece.first.angle, piece.last.angle, 80))
         dash, width = ("-", 2.2) if piece.stable else ((0, (2, 2)), 1.2)
-        style = {"color": COLOURS[piece.place], "ls": dash, "lw": width}
+        style = {"color": PLACE_COLOURS[piece.place], "ls": dash, "lw": width}
         offsets = (gaits.period - gait.unperturbed_period) * 1e3
         axes.plot(offsets, gaits.lag, **style, label=piece.place.value)
         for end in (piece.first, piece.last):
             name = end.border.value.partition(":")[0]
             mark = "o" if name == "corner" else "D"
-            face = "white" if end.border is not Border.NO_GAIT else drawing.BLACK
+            face = "white" if end.border is not Border.NO_GAIT else BLACK
             offset = (end.period - gait.unperturbed_period) * 1e3
-            style = {"ms": 5, "mec": drawing.BLACK, "mfc": face, "label": name}
+            style = {"ms": 5, "mec": BLACK, "mfc": face, "label": name}
             axes.plot([offset], [end.lag], mark, **style)
     for lock in locks:
         offset = (lock.period - gait.unperturbed_period) * 1e3
         mark, text = ("*", "stable lock") if lock.stable else ("x", "unstable lock")
-        style = {"color": drawing.BLACK, "ms": 9, "ls": "none"}
+        style = {"color": BLACK, "ms": 9, "ls": "none"}
         axes.plot([offset], [lock.lag], mark, **style, label=f"{text} at {offset:+g} ms")
-    axes.axhline(0, color=drawing.GREY, ls=":", lw=1.0)
-    axes.annotate("toe-off", (0, 0), xytext=(4, 3), textcoords="offset points", color=drawing.GREY)
-    axes.plot([], [], color=drawing.GREY, lw=2.2, label="stable")
-    axes.plot([], [], color=drawing.GREY, lw=1.2, ls=(0, (2, 2)), label="unstable")
+    axes.axhline(0, color=GREY, ls=":", lw=1.0)
+    axes.annotate("toe-off", (0, 0), xytext=(4, 3), textcoords="offset points", color=GREY)
+    axes.plot([], [], color=GREY, lw=2.2, label="stable")
+    axes.plot([], [], color=GREY, lw=1.2, ls=(0, (2, 2)), label="unstable")
     axes.set(
-        xlabel=r"pulse period $\tau_p - 2\tau_0$ [ms]",
-        ylabel="pulse onset after toe-off [s]",
+        xlabel=r"pulse period $\tau_p - 2\tau_0$ [ms]", ylabel="pulse onset after toe-off [s]"
     )
     axes.set_title(
         f"Locked gaits: pulses of {gait.torque:.2f} N m for {gait.width:g} s", fontsize=11
     )
-    drawing.add_legend(axes, **drawing.BESIDE)
+    drawing.add_legend(axes, **BESIDE)
     return drawing.save_figure(figure, folder, "locked_gaits")

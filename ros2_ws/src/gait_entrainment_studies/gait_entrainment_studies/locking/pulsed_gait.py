@@ -27,7 +27,6 @@ gaits below whose period R is tau_p. The Jacobian does not depend on tau_p and i
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, fields
 from enum import Enum
 from functools import cached_property
@@ -198,21 +197,13 @@ class PulsedGait:
 
     # Branches: where the pulse begins and ends.
 
-    def early(self, end: Floats) -> Gaits:
-        """Pulses that begin before double stance and end in it, at these ankle angles."""
-        return self._gaits(np.full_like(end, self.heel_strike), end, Place.EARLY)
-
-    def inside(self, start: Floats) -> Gaits:
-        """Pulses that begin in double stance, at these ankle angles, and end in it."""
-        return self._gaits(start, self._end_of_pulse(start), Place.INSIDE)
-
-    def late(self, start: Floats) -> Gaits:
-        """Pulses that begin in double stance, at these ankle angles, and outlast it."""
-        return self._gaits(start, np.full_like(start, self.toe_off), Place.LATE)
-
-    def along(self, place: Place) -> Callable[[Floats], Gaits]:
-        """Return the branch of this place: its gaits by the ankle angle along it."""
-        return {Place.EARLY: self.early, Place.INSIDE: self.inside, Place.LATE: self.late}[place]
+    def gaits(self, place: Place, angle: Floats) -> Gaits:
+        """Return gaits of a branch by the ankle angle where the pulse ends (EARLY) or begins."""
+        if place is Place.EARLY:
+            return self._gaits(np.full_like(angle, self.heel_strike), angle, place)
+        if place is Place.INSIDE:
+            return self._gaits(angle, self._end_of_pulse(angle), place)
+        return self._gaits(angle, np.full_like(angle, self.toe_off), place)
 
     @cached_property
     def first_end(self) -> float:

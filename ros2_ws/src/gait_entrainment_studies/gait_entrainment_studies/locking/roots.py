@@ -25,10 +25,7 @@ _MOST_SCANS = 8
 
 
 def newton(
-    function: Callable[[Floats], tuple[Floats, Floats]],
-    guess: Floats,
-    least: Floats,
-    most: float,
+    function: Callable[[Floats], tuple[Floats, Floats]], guess: Floats, least: Floats, most: float
 ) -> Floats:
     """
     Return the roots of a growing function, element by element, between `least` and `most`.

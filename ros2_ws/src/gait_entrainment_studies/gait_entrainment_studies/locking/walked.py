@@ -96,13 +96,6 @@ class PulsedWalk:
         lags[onsets < self.toe_offs[0] - self.stride_periods[0] / 2] = np.nan
         return lags
 
-    @property
-    def last_lag(self) -> float:
-        """Onset of the last pulse minus the nearest toe-off that has been walked."""
-        onset = self.onsets[self.onsets <= self.toe_offs[-1]][-1]
-        differences = onset - self.toe_offs[-2:]
-        return float(differences[np.argmin(np.abs(differences))])
-
     def outcome(self, creep: float = CREEP) -> Outcome:
         """What became of the walk; locked if its lag creeps by less than `creep` [s] a stride."""
         if self.ending is not None:

@@ -4,6 +4,7 @@
 """The paper's numerical experiments, repeated with the walker in time."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 
@@ -19,6 +20,8 @@ TORQUE_FRACTION = 0.1
 
 # This long before a collision [ns] the walker is certainly in single stance.
 _BEFORE_STRIKE = 10**6
+# No step from a speed near that of the gait takes longer [ns].
+_LONGEST_STEP = 4 * 10**9
 
 
 def paper_pulses(parameters: WalkerParameters, steps_per_pulse: int = 2) -> PulsedGait:
@@ -47,13 +50,8 @@ def speeds_after_collisions(
     """
     p = parameters
     walker = Walker(p, Side.RIGHT, initial_speed)
-    strikes: list[int] = []
-    seconds = 1
-    while len(strikes) < steps and walker.ending is None:
-        walker = Walker(p, Side.RIGHT, initial_speed)
-        seconds *= 2
-        events = walker.advance(seconds * 10**9)
-        strikes = [e.stamp for e in events if e.kind is EventKind.HEEL_STRIKE and e.step > 0]
+    events = walker.advance(steps * _LONGEST_STEP)
+    strikes = [e.stamp for e in events if e.kind is EventKind.HEEL_STRIKE and e.step > 0]
     samples = walker.sample(np.array(strikes[:steps], np.int64) - _BEFORE_STRIKE)
     index = np.arange(samples.leading.size)
     rate = samples.velocity[index, samples.leading]
@@ -129,7 +127,7 @@ def torque_profiles(
     walker.extend_torque(Side.LEFT, [], [], 2 * end)
     walker.advance(end)
     strides = []
-    for begin, stop in zip(walk.heel_strikes[:-1], walk.heel_strikes[1:], strict=True):
+    for begin, stop in pairwise(walk.heel_strikes):
         stamps = np.linspace(begin * 1e9, stop * 1e9, points).astype(np.int64)
         strides.append(((stamps - stamps[0]) * 1e-9, walker.sample(np.minimum(stamps, end))))
     return strides

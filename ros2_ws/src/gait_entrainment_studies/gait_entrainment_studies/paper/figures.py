@@ -10,9 +10,10 @@ import numpy as np
 
 from gait_entrainment import drawing
 from gait_entrainment.conventions import Side
+from gait_entrainment.drawing import BESIDE, BLACK, COLOURS, DASHES, GREY, ORANGE
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment_studies.locking.figures import COLOURS
-from gait_entrainment_studies.locking.pulsed_gait import Place
+from gait_entrainment_studies.locking.branches import branches_of
+from gait_entrainment_studies.locking.figures import PLACE_COLOURS
 from gait_entrainment_studies.paper.experiments import (
     paper_pulses,
     paper_walk,
@@ -44,15 +45,13 @@ def _convergence(p: WalkerParameters) -> Any:
     """Fig. 4: errors of the angular velocity after the collisions."""
     figure, axes = drawing.new_figure()
     fixed, steps = p.speed_after_collision, 6
-    for factor, colour, dash in zip(
-        (1.2, 1.1, 1.05, 0.95, 0.9), drawing.COLOURS, drawing.DASHES, strict=False
-    ):
+    for factor, colour, dash in zip((1.2, 1.1, 1.05, 0.95, 0.9), COLOURS, DASHES, strict=False):
         speeds = speeds_after_collisions(p, factor * fixed, steps)
         errors = (np.array([factor * fixed, *speeds]) - fixed) / p.leg_length
         # Walking on, the angle theta falls: the angular velocity is negative.
         label = f"initial error {-errors[0]:+.3f} rad/s"
         axes.plot(range(errors.size), -errors, "o", ls=dash, color=colour, ms=4, label=label)
-    axes.axhline(0, color=drawing.GREY, lw=0.8)
+    axes.axhline(0, color=GREY, lw=0.8)
     axes.set(xlabel="step", ylabel="error of angular velocity [rad/s]")
     axes.set_title("Fig. 4: asymptotic stability of the period-one gait", fontsize=11)
     drawing.add_legend(axes, fontsize=10)
@@ -65,16 +64,16 @@ def _entrainment(p: WalkerParameters) -> Any:
     period = paper_pulses(p).unperturbed_period
     titles = ("(a) entrained", "(b) not entrained")
     for axes, offsets, title in zip(panels, (_ENTRAINED, _NOT_ENTRAINED), titles, strict=True):
-        axes.axhline(period, color=drawing.GREY, lw=0.8, ls="--")
-        for offset, colour, dash in zip(offsets, drawing.COLOURS, drawing.DASHES, strict=False):
+        axes.axhline(period, color=GREY, lw=0.8, ls="--")
+        for offset, colour, dash in zip(offsets, COLOURS, DASHES, strict=False):
             strides = paper_walk(p, offset * 1e-3, 0.9, 110).stride_periods[:100]
             label = rf"$\tau_p = 2\tau_0 {offset:+d}$ ms"
             number = np.arange(1, strides.size + 1)
             axes.plot(number, strides, color=colour, ls=dash, lw=1.3, label=label)
         axes.set(ylabel="stride period [s]", title=title)
-        drawing.add_legend(axes, **drawing.BESIDE)
+        drawing.add_legend(axes, **BESIDE)
     panels[0].annotate(
-        r"$2\tau_0$", (100, period), textcoords="offset points", xytext=(2, 3), color=drawing.GREY
+        r"$2\tau_0$", (100, period), textcoords="offset points", xytext=(2, 3), color=GREY
     )
     panels[1].set_xlabel("stride")
     figure.suptitle("Fig. 5: entrainment with a finite basin", fontsize=11)
@@ -84,20 +83,13 @@ def _entrainment(p: WalkerParameters) -> Any:
 def _phase_locking(p: WalkerParameters) -> Any:
     """Fig. 6b: pulse onset after toe-off, from many initial phases."""
     figure, axes = drawing.new_figure()
-    axes.axhline(0, color=drawing.GREY, ls="--", lw=1.0)
-    axes.annotate(
-        "toe-off", (60, 0), textcoords="offset points", xytext=(-40, 4), color=drawing.GREY
-    )
+    axes.axhline(0, color=GREY, ls="--", lw=1.0)
+    axes.annotate("toe-off", (60, 0), textcoords="offset points", xytext=(-40, 4), color=GREY)
     for i, phase in enumerate(np.arange(16) / 16):
         lags = paper_walk(p, -0.05, float(phase), 62).lags[:61]
         # Break the line where the lag wraps by a stride.
         lags = np.where(np.abs(np.diff(lags, prepend=lags[0])) > 1, np.nan, lags)
-        axes.plot(
-            lags,
-            color=drawing.COLOURS[i % len(drawing.COLOURS)],
-            ls=drawing.DASHES[i // 6],
-            lw=1.1,
-        )
+        axes.plot(lags, color=COLOURS[i % len(COLOURS)], ls=DASHES[i // 6], lw=1.1)
     axes.set(xlabel="stride", ylabel="pulse onset after toe-off [s]")
     axes.set_title(
         r"Fig. 6b: phase locking at $\tau_p = 2\tau_0 - 50$ ms, 16 initial phases", fontsize=11
@@ -117,16 +109,11 @@ def _torque_profiles(p: WalkerParameters) -> Any:
         delivered = samples.delivered_torque[:, Side.RIGHT]
         idle = np.where((delivered != 0) & (ankle == 0), base + delivered, np.nan)
         intrinsic = samples.intrinsic_torque[:, Side.RIGHT]
-        axes.plot(time, base + ankle, color=drawing.BLACK, lw=0.9)
+        axes.plot(time, base + ankle, color=BLACK, lw=0.9)
         axes.fill_between(
-            time,
-            base + intrinsic,
-            base + ankle,
-            where=ankle > intrinsic,
-            color=drawing.ORANGE,
-            lw=0,
+            time, base + intrinsic, base + ankle, where=ankle > intrinsic, color=ORANGE, lw=0
         )
-        axes.plot(time, idle, color=drawing.ORANGE, lw=1.2, ls=":")
+        axes.plot(time, idle, color=ORANGE, lw=1.2, ls=":")
         axes.annotate(
             f"{walk.stride_periods[number - 1]:.4f}",
             (2.02, base),
@@ -137,11 +124,11 @@ def _torque_profiles(p: WalkerParameters) -> Any:
     axes.set(xlabel="time since heel strike of the perturbed leg [s]", ylabel="stride")
     axes.set_yticks([-n * spacing for n in range(1, count + 1)], range(1, count + 1), fontsize=8)
     axes.set_xlim(0, 2.2)
-    axes.plot([0.02, 0.02], [0.2 * spacing, 0.2 * spacing + 100], color=drawing.BLACK, lw=2)
+    axes.plot([0.02, 0.02], [0.2 * spacing, 0.2 * spacing + 100], color=BLACK, lw=2)
     axes.annotate("100 N m", (0.05, 0.2 * spacing + 50), va="center", fontsize=8)
     axes.annotate("stride period [s]", (1.9, 0.2 * spacing), color="#C00000", fontsize=8)
-    axes.plot([], [], color=drawing.ORANGE, lw=6, label="pulse, acting")
-    axes.plot([], [], color=drawing.ORANGE, ls=":", label="pulse, without effect")
+    axes.plot([], [], color=ORANGE, lw=6, label="pulse, acting")
+    axes.plot([], [], color=ORANGE, ls=":", label="pulse, without effect")
     drawing.add_legend(axes, loc="upper center", ncols=2)
     title = rf"Fig. 7: ankle torque under pulses every {walk.period:.4f} s ($2\tau_0 - 50$ ms)"
     axes.set_title(title, fontsize=11)
@@ -154,21 +141,17 @@ def _speed_curve(p: WalkerParameters) -> Any:
     for steps, dash, every in ((2, "-", "stride"), (1, "--", "step")):
         gait = paper_pulses(p, steps)
         slowest = steps * p.step_length / gait.unperturbed_period
-        for place, ends in (
-            (Place.EARLY, (gait.heel_strike, gait.first_end)),
-            (Place.INSIDE, (gait.heel_strike, gait.last_start)),
-            (Place.LATE, (gait.last_start, gait.toe_off)),
-        ):
-            gaits = gait.along(place)(np.linspace(*ends, 100))
+        for place, first, last, _ in branches_of(gait):
+            gaits = gait.gaits(place, np.linspace(first, last, 100))
             speed = steps * p.step_length / gaits.period
-            axes.plot(gaits.onset, speed, color=COLOURS[place], ls=dash, lw=1.8)
-        axes.plot([], [], color=drawing.BLACK, ls=dash, label=f"pulse in every {every}")
+            axes.plot(gaits.onset, speed, color=PLACE_COLOURS[place], ls=dash, lw=1.8)
+        axes.plot([], [], color=BLACK, ls=dash, label=f"pulse in every {every}")
     toe_off = float(gaits.double_stance[-1])
-    axes.plot([-0.25, -0.1], [slowest] * 2, color=drawing.GREY, lw=1.8)
-    axes.plot([toe_off, 0.5], [slowest] * 2, color=drawing.GREY, lw=1.8)
-    for place, colour in COLOURS.items():
+    axes.plot([-0.25, -0.1], [slowest] * 2, color=GREY, lw=1.8)
+    axes.plot([toe_off, 0.5], [slowest] * 2, color=GREY, lw=1.8)
+    for place, colour in PLACE_COLOURS.items():
         axes.plot([], [], color=colour, lw=3, label=place.value)
-    axes.plot([], [], color=drawing.GREY, lw=3, label="pulse in swing")
+    axes.plot([], [], color=GREY, lw=3, label="pulse in swing")
     drawing.mark_instant(axes, 0.0, "start of double stance", 1.027, 0)
     drawing.mark_instant(axes, toe_off, "toe-off", 1.027, 0)
     axes.set(

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from gait_entrainment import drawing
+from gait_entrainment.drawing import BLACK, BLUE, GREY, ORANGE
 from gait_entrainment_studies.phase_response.response import PhaseResponse, Prediction
 
 
@@ -15,11 +16,11 @@ def draw_response(
 ) -> list[Path]:
     """Draw shift against phase, and for each prediction the shift that locking asks for."""
     figure, axes = drawing.new_figure()
-    axes.plot(response.phase, response.shift * 1e3, color=drawing.BLUE, lw=2, label="in the end")
+    axes.plot(response.phase, response.shift * 1e3, color=BLUE, lw=2, label="in the end")
     axes.plot(
         response.phase,
         response.first_stride_shift * 1e3,
-        color=drawing.ORANGE,
+        color=ORANGE,
         ls="--",
         lw=1.5,
         label="at the end of the stride",
@@ -27,11 +28,11 @@ def draw_response(
     stride = response.stride_period
     for one in predictions:
         wanted = -one.period_offset * 1e3
-        axes.axhline(wanted, color=drawing.GREY, ls=":", lw=0.8)
+        axes.axhline(wanted, color=GREY, ls=":", lw=0.8)
         phases = [0.5 + lock.onset / stride for lock in (one.predicted, one.exact)]
-        style = {"mfc": "white", "mec": drawing.BLACK, "label": "lock predicted"}
+        style = {"mfc": "white", "mec": BLACK, "label": "lock predicted"}
         axes.plot(phases[:1], [wanted], "o", **style)
-        axes.plot(phases[1:], [wanted], "x", color=drawing.BLACK, label="lock, exact")
+        axes.plot(phases[1:], [wanted], "x", color=BLACK, label="lock, exact")
     drawing.mark_instant(axes, 0.5, "other leg's\nheel strike")
     # Toe-off is an unperturbed double stance later.
     drawing.mark_instant(

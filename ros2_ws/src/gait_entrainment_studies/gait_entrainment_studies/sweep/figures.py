@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 
 from gait_entrainment import drawing
-from gait_entrainment_studies.locking.figures import COLOURS
+from gait_entrainment.drawing import BELOW, BLACK, GREY, ORANGE
+from gait_entrainment_studies.locking.figures import PLACE_COLOURS
 from gait_entrainment_studies.sweep.plan import SweepPlan
 from gait_entrainment_studies.sweep.row import StableInterval
 
 _PERIOD = r"pulse period $\tau_p - 2\tau_0$ [ms]"
 _TORQUE = "torque of the pulse / peak ankle torque"
-_COLOURS = {place.value: colour for place, colour in COLOURS.items()}
+_COLOURS = {place.value: colour for place, colour in PLACE_COLOURS.items()}
 
 
 def draw_tongue(
@@ -31,7 +32,7 @@ def draw_tongue(
             low, high = [one.shortest * 1e3 for one in pair], [one.longest * 1e3 for one in pair]
             heights = [one.torque_fraction for one in pair]
             left.fill_betweenx(heights, low, high, color=colour, alpha=0.35, lw=0)
-            for axes, line in ((left, drawing.BLACK), (right, "white")):
+            for axes, line in ((left, BLACK), (right, "white")):
                 axes.plot(low, heights, color=line, lw=0.8)
                 axes.plot(high, heights, color=line, lw=0.8)
         left.fill_between([], [], [], color=colour, alpha=0.35, label=f"stable: {place}")
@@ -49,21 +50,21 @@ def draw_tongue(
                 offsets[periods],
                 fractions[torques],
                 marker,
-                color=drawing.ORANGE,
+                color=ORANGE,
                 ms=3,
                 mew=0,
                 label=label,
             )
     if np.isnan(share).any():
-        right.fill_between([], [], [], fc="white", ec=drawing.GREY, lw=0.6, label="not asked")
-    drawing.add_legend(right, **drawing.BELOW, ncols=3)
-    left.axvline(0, color=drawing.GREY, lw=0.6, ls=":")
+        right.fill_between([], [], [], fc="white", ec=GREY, lw=0.6, label="not asked")
+    drawing.add_legend(right, **BELOW, ncols=3)
+    left.axvline(0, color=GREY, lw=0.6, ls=":")
     extent = _extent(plan)
     left.set(xlabel=_PERIOD, ylabel=_TORQUE, xlim=extent[:2], ylim=extent[2:])
     right.set(ylabel="", xlim=extent[:2], ylim=extent[2:])
     left.set_title("a stable 1:1 lock exists (solved)", fontsize=10)
     right.set_title(f"locked by stride {plan.strides} (walked)", fontsize=10)
-    drawing.add_legend(left, **drawing.BELOW, ncols=1)
+    drawing.add_legend(left, **BELOW, ncols=1)
     return drawing.save_figure(figure, folder, "tongue")
 
 
@@ -80,7 +81,7 @@ def _draw_map(plan: SweepPlan, axes: Any, cells: Any, label: str, **style: Any) 
     """Draw a number for each cell in colours."""
     image = axes.imshow(cells, origin="lower", extent=_extent(plan), aspect="auto", **style)
     axes.figure.colorbar(image, ax=axes, label=label)
-    axes.axvline(0, color=drawing.GREY, lw=0.6, ls=":")
+    axes.axvline(0, color=GREY, lw=0.6, ls=":")
     axes.set(xlabel=_PERIOD, ylabel=_TORQUE)
 
 

@@ -33,18 +33,6 @@ class Axis:
     most: float
     count: int
 
-    def __post_init__(self) -> None:
-        """Take a whole number in any form for the count."""
-        if float(self.count).is_integer():
-            object.__setattr__(self, "count", int(self.count))
-
-    def check(self, name: str) -> None:
-        """Raise UsageError if there are no such values."""
-        if not -math.inf < self.least <= self.most < math.inf:
-            raise UsageError(f"{name}: {self.least:g} to {self.most:g}; allowed: ascending")
-        if not isinstance(self.count, int) or self.count < 1:
-            raise UsageError(f"{name}: {self.count:g} values; allowed: a whole number at least 1")
-
     @property
     def values(self) -> Floats:
         """The values, ascending."""
@@ -72,7 +60,9 @@ class SweepPlan:
         """Check each field."""
         check_settings(self)
         for name in ("period_offsets", "torque_fractions"):
-            getattr(self, name).check(name)
+            axis = getattr(self, name)
+            if not axis.least <= axis.most:
+                raise UsageError(f"{name}: {axis.least:g} to {axis.most:g}; allowed: ascending")
         PulsedGait(self.walker, 0.0, self.width)
 
     def provenance(self) -> dict[str, Any]:

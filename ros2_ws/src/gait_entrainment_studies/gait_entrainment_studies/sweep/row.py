@@ -86,7 +86,7 @@ def _walked(plan: SweepPlan, torque: float, period: float) -> dict[str, float]:
         for outcome in Outcome
     }
     pairs = zip(walks, outcomes, strict=True)
-    lags = [walk.last_lag for walk, outcome in pairs if outcome is Outcome.LOCKED]
+    lags = [float(walk.lags[-1]) for walk, outcome in pairs if outcome is Outcome.LOCKED]
     return {**shares, "median_lag": float(np.median(lags)) if lags else np.nan}
 
 
@@ -97,10 +97,10 @@ class StableInterval:
     torque_fraction: float
     place: str
     shortest: float
-    longest: float
     shortest_border: str
-    longest_border: str
     lag_at_shortest: float
+    longest: float
+    longest_border: str
     lag_at_longest: float
 
 
@@ -109,20 +109,12 @@ def exact_borders(
 ) -> list[StableInterval]:
     """Solve for the borders at each torque, given as a fraction of the peak ankle torque."""
     found = []
-    for fraction in torque_fractions[np.abs(torque_fractions) > 0]:
-        gait = PulsedGait(walker, float(fraction) * walker.peak_torque, width)
+    for fraction in torque_fractions[np.abs(torque_fractions) > 0].tolist():
+        gait = PulsedGait(walker, fraction * walker.peak_torque, width)
         for piece in stable_intervals(pieces_of(gait)):
-            low, high = piece.least_period, piece.greatest_period
-            found.append(
-                StableInterval(
-                    float(fraction),
-                    piece.place.value,
-                    low.period - gait.unperturbed_period,
-                    high.period - gait.unperturbed_period,
-                    low.border.value,
-                    high.border.value,
-                    low.lag,
-                    high.lag,
-                )
+            shortest, longest = (
+                (end.period - gait.unperturbed_period, end.border.value, end.lag)
+                for end in (piece.least_period, piece.greatest_period)
             )
+            found.append(StableInterval(fraction, piece.place.value, *shortest, *longest))
     return found
