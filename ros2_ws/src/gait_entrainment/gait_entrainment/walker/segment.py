@@ -116,20 +116,36 @@ def leg_sine_at(model: Model, stance: int, position: float) -> float:
 
 
 @compiled
+def leaned(model: Model, sine: float, cosine: float) -> tuple[float, float]:
+    """Sine and cosine of an angle from the vertical, from those off the ground's normal."""
+    up, along = model.slope_cosine, model.slope_sine
+    return sine * up + cosine * along, cosine * up - sine * along
+
+
+@compiled
+def lean_at(model: Model, stance: int, position: float) -> tuple[float, float]:
+    """Sine and cosine of the leading leg's angle from the vertical."""
+    sine = leg_sine_at(model, stance, position)
+    cosine = math.sqrt(1.0 - sine * sine)
+    if stance == Stance.SINGLE:
+        return sine, cosine
+    return leaned(model, sine, cosine)
+
+
+@compiled
 def squared_rate(model: Model, segment: Segment, position: float) -> float:
     """theta_dot^2 at a position of the segment, from energy; negative beyond a stall."""
-    sine = leg_sine_at(model, segment.stance, position)
-    fall = linkage.drop(sine, math.sqrt(1.0 - sine * sine))
+    fall = linkage.drop(*lean_at(model, segment.stance, position))
     return gained_apex(model, segment, position) + model.per_drop * fall
 
 
 @compiled
 def leading_force(model: Model, segment: Segment, position: float) -> float:
     """Ground reaction F_B [N] of the leading leg, along the leg; negative if it would pull."""
-    sine = leg_sine_at(model, segment.stance, position)
     square = squared_rate(model, segment, position)
-    force = linkage.pendulum_force(model, math.sqrt(1.0 - sine * sine), square)
+    force = linkage.pendulum_force(model, lean_at(model, segment.stance, position)[1], square)
     if segment.stance == Stance.DOUBLE:
+        sine = leg_sine_at(model, segment.stance, position)
         arm = linkage.unloading_arm(model, math.sin(position), sine)
         force -= arm * effective_torque(segment, position)
     return force
@@ -151,10 +167,9 @@ def motion(model: Model, segment: Segment, position: float) -> tuple[float, floa
     cosine = math.sqrt(1.0 - sine * sine)
     sin_ankle = math.sqrt(1.0 - cos_ankle * cos_ankle)
     slope = linkage.leg_per_ankle(model, sin_ankle, cosine)
-    square = gained_apex(model, segment, position) + model.per_drop * linkage.drop(sine, cosine)
-    square = max(0.0, square)
+    square = max(0.0, squared_rate(model, segment, position))
     push = model.per_energy * effective_torque(segment, position) / slope
-    acceleration = 0.5 * (model.per_drop * sine - push)
+    acceleration = 0.5 * (model.per_drop * leaned(model, sine, cosine)[0] - push)
     return sine, -cosine * math.sqrt(square), cosine * acceleration - sine * square
 
 
@@ -189,9 +204,8 @@ def panel(
         sine = linkage.leg_sine(model, cos_ankle)
         cosine = math.sqrt(1.0 - sine * sine)
         gain = linkage.torque_work(rotation + x, segment.torque, segment.stiffness)
-        square = (
-            segment.apex + model.per_energy * gain + model.per_drop * linkage.drop(sine, cosine)
-        )
+        fall = linkage.drop(*leaned(model, sine, cosine))
+        square = segment.apex + model.per_energy * gain + model.per_drop * fall
         slope = linkage.leg_per_ankle(model, sin_ankle, cosine)
         work[i] = slope / math.sqrt(square)
     return weighed(model, work, half)
@@ -218,9 +232,11 @@ def stall_panel(
         sine = leg_sine_at(model, Stance.DOUBLE, position)
         cosine = math.sqrt(1.0 - sine * sine)
         rise = 2.0 * math.sin(segment.end - 0.5 * back) * math.sin(0.5 * back)
+        ahead = model.per_drop * model.slope_sine * model.foot_length / model.toe_separation * rise
         rise *= model.foot_length / model.toe_separation * (sine + stall_sine)
+        level = model.per_drop * rise / (cosine + stall_cosine)
         gain = linkage.torque_work(-back, stall_torque, segment.stiffness)
-        square = model.per_energy * gain + model.per_drop * rise / (cosine + stall_cosine)
+        square = model.per_energy * gain + model.slope_cosine * level + ahead
         slope = linkage.leg_per_ankle(model, math.sin(position), cosine)
         work[i] = -2.0 * u * slope / math.sqrt(square)
     return weighed(model, work, half)

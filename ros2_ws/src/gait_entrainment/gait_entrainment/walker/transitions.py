@@ -50,7 +50,7 @@ SEARCH_POINTS: Final = 128
 def collide(model: Model, segment: Segment, perturbation: float, work: Floats) -> None:
     """Heel strike: the speed falls by cos(2 alpha), the legs change roles, the push-off begins."""
     square = segment.apex + model.strike_gain
-    segment.apex = model.restitution * square - model.strike_gain
+    segment.apex = model.restitution * square - model.start_gain
     segment.leading = 1 - segment.leading
     segment.step += 1
     segment.began = Switch.HEEL_STRIKE

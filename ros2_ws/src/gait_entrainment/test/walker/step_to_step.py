@@ -61,10 +61,10 @@ def map_steps(model: Model, log: Log, rows: Floats, result: Floats) -> None:
     segment = log[0]
     for i in range(rows.shape[1]):
         rate = rows[0, i] / model.leg_length
-        start_walking(model, segment, 1, rate * rate - model.strike_gain)
+        start_walking(model, segment, 1, rate * rate - model.start_gain)
         onset, torque = rows[1, i], rows[3, i]
         duration = one_step(model, work, segment, onset, onset + rows[2, i], torque)
-        square = segment.apex + model.strike_gain
+        square = segment.apex + model.start_gain
         result[0, i] = model.leg_length * np.sqrt(square) if duration > 0.0 else np.nan
         result[1, i] = duration
 

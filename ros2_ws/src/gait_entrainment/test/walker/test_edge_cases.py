@@ -14,10 +14,10 @@ from step_to_step import step_to_step
 
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment.walker import EndingKind, Stance, Walker, segment, walk
+from gait_entrainment.walker import EndingKind, Stance, Walker, segment
 
-PERIOD = float(walk(TABLE_1, 1).heel_strikes[1])
-TOE_OFF = float(walk(TABLE_1, 1).toe_offs[0])
+PERIOD = float(heel_strikes(walked()[1])[1])
+TOE_OFF = float(toe_offs(walked()[1])[0])
 MILLISECOND = SECOND // 1000
 
 
