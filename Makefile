@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
 # Two commands suffice: `make demo` runs the main job, `make test` every test. Each first sets up
 # and builds what is missing. The work is done in scripts/; a particular Python is chosen by
 # `make PYTHON=python3.12 ...`.
@@ -7,7 +10,7 @@ export PYTHON
 
 in_env = source ./env.bash &&
 
-.PHONY: help demo test lint format bench setup build lock clean distclean
+.PHONY: help demo test lint format bench docs setup build lock clean distclean
 
 help: ## list the targets
 	@grep -E '^[a-z]+:.*##' Makefile | sed -E 's/^([a-z]+):.*## /\1\t/' | expand -t 12
@@ -27,6 +30,9 @@ format: setup ## let ruff rewrite the sources
 bench: build ## measure the speeds in the README, each beside its baseline
 	@$(in_env) pytest -s -m benchmark tests/benchmarks
 
+docs: build ## HTML of the public names: docs/api/index.html
+	@$(in_env) python scripts/make_api_pages.py
+
 setup: ## ROS 2 Jazzy and pinned Python packages in .venv
 	@scripts/setup.sh
 
@@ -37,7 +43,7 @@ lock: ## resolve requirements/*.in again (needs uv)
 	@scripts/lock.sh
 
 clean: ## remove what was built
-	rm -rf ros2_ws/build ros2_ws/install ros2_ws/log
+	rm -rf ros2_ws/build ros2_ws/install ros2_ws/log docs/api
 	find . -path ./.venv -prune -o -name __pycache__ -type d -exec rm -rf {} +
 
 distclean: clean ## remove the environment too

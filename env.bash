@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
 # Sourced by bash, from any directory: puts `entrain`, the nodes, rclpy and the messages on the
 # path.
 #

@@ -1,4 +1,7 @@
 #!/usr/bin/env bash
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
 # Build the workspace with colcon where something that needs building has changed.
 #
 # Python modules are linked, not copied, so editing one needs no build; a changed message, launch

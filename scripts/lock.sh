@@ -1,4 +1,7 @@
 #!/usr/bin/env bash
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
 # Resolve requirements/*.in into requirements/lock.txt: every version, for Python 3.10 to 3.14.
 # Needs `uv` (pip install uv). Only for those who change the requirements; setting up needs no uv.
 set -euo pipefail

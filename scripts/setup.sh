@@ -1,4 +1,7 @@
 #!/usr/bin/env bash
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
 # Bring .venv up to date: Python packages and, unless a full one is sourced, ROS 2 Jazzy itself.
 #
 #   scripts/setup.sh                   the first suitable Python on PATH
@@ -118,7 +121,7 @@ for name in ("numpy", "empy"):
     print(name, metadata.version(name), sep="==")' >> .venv/constraints.txt ||
         fail "the Python of the sourced ROS 2 lacks numpy or empy: apt install python3-numpy python3-empy"
     install -r requirements/build.in -r requirements/runtime.in -r requirements/test.in \
-        -r requirements/lint.in
+        -r requirements/lint.in -r requirements/docs.in
 fi
 echo "$PYTHON" > .venv/base-python
 echo "$ros" > .venv/ros

@@ -1,4 +1,7 @@
 #!/usr/bin/env bash
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
 # Every test. Most of the packages' share the processors. Those of ankle robots, which run in real
 # time, and of the whole system, five processes each, have them alone. Arguments go to pytest both
 # times.

@@ -1,3 +1,6 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
 # Sourced by env.bash and by the scripts, with `root` set: puts .venv, and with it ROS 2, on the
 # path. Where a full ROS 2 is sourced, .venv only adds to it.
 

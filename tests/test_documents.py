@@ -1,14 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The tables of topics in docs/architecture.md say what topics.py says."""
+"""docs/architecture.md says what topics.py says, and names files and packages that exist."""
 
 import re
 from pathlib import Path
 
 from gait_entrainment_nodes.messaging import topics
 
-PAGE = (Path(__file__).parents[1] / "docs/architecture.md").read_text()
+ROOT = Path(__file__).parents[1]
+SOURCES = ROOT / "ros2_ws/src"
+PAGE = (ROOT / "docs/architecture.md").read_text()
 QUALITIES = {
     "every message": topics.EVERY_MESSAGE,
     "latest state": topics.LATEST_STATE,
@@ -50,3 +52,26 @@ def test_qualities_are_what_the_page_says():
         durability = "volatile" if words[2] == "system_default" else words[2]
         assert said.pop(name) == f"{words[0]} {words[1]} {durability}".replace("_", " ")
     assert said == {}
+
+
+def test_packages_are_those_of_the_workspace():
+    assert {row[0] for row in rows("package")} == {
+        p.parent.name for p in SOURCES.glob("*/package.xml")
+    }
+
+
+def test_files_to_look_into_exist():
+    paths = re.findall(r"gait_entrainment\w*/[\w/.]*", str(rows("question")))
+    assert len(paths) > 15
+    for path in paths:
+        # A Python package is the folder of its own name in the ROS package.
+        package = path.partition("/")[0]
+        places = (SOURCES / package / path, SOURCES / package / f"{path}.py", SOURCES / path)
+        assert any(place.exists() for place in places), path
+
+
+def test_links_lead_to_files():
+    pages = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *ROOT.glob("examples/*/*.md")]
+    for page in pages:
+        for link in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text()):
+            assert (page.parent / link).exists(), f"{page.name}: {link}"

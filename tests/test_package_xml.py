@@ -42,7 +42,7 @@ NOT_IMPORTED = {
     "std_msgs": "message definitions for the tests of bags",
     "ros2launch": "what starts the launch files",
     "python3-pytest": "what runs the tests",
-    "ament_copyright": "test_linters.py",
+    "gait_entrainment_drivers": "the plugin of pytest that checks an example's driver",
     "ament_flake8": "test_linters.py",
     "ament_pep257": "test_linters.py",
     "ament_xmllint": "test_linters.py",

@@ -32,7 +32,7 @@ import sys, time
 import rclpy
 from sensor_msgs.msg import JointState
 from gait_entrainment_msgs.msg import PublishedCounts
-from gait_entrainment_nodes.nodes.node import CountedPublisher
+from gait_entrainment_nodes.messaging.publisher import CountedPublisher
 from gait_entrainment_nodes.messaging.raw_messages import serialize
 from gait_entrainment_nodes.messaging.stamps import header
 from gait_entrainment_nodes.messaging.topics import PUBLISHED_COUNTS, Topic

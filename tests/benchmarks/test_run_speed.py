@@ -14,8 +14,8 @@ import rclpy
 from rclpy.context import Context
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
-from std_srvs.srv import Trigger
 
+from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 from gait_entrainment_nodes.messaging.topics import JOINT_STATES
 
@@ -25,14 +25,13 @@ MESSAGES = 100_000
 _PUBLISHER = """
 import sys
 import rclpy
-from rclpy.node import Node
 from sensor_msgs.msg import JointState
-from gait_entrainment_nodes.nodes.node import Participant
+from gait_entrainment_nodes.nodes.participant import Participant
 from gait_entrainment_nodes.messaging.raw_messages import serialize
 from gait_entrainment_nodes.messaging.topics import JOINT_STATES
 
 
-class Source(Participant, Node):
+class Source(Participant):
     def __init__(self):
         super().__init__("source")
         self.begin_participation()
@@ -40,7 +39,7 @@ class Source(Participant, Node):
 
 rclpy.init()
 node = Source()
-publisher = node.publisher(JOINT_STATES)
+publisher = node.offer(JOINT_STATES)
 names = ["l_hip", "r_hip", "l_ankle", "r_ankle"]
 data = serialize(JointState(name=names, position=[0.0] * 4, velocity=[0.0] * 4, effort=[0.0] * 4))
 while not publisher.matched:
@@ -69,16 +68,6 @@ def entrain(tmp_path, name, *options):
         "entrain", "run", "--json", "--no-figures", "--out", str(tmp_path / name), *options
     )
     return seconds, json.loads(text)
-
-
-def test_whole_command_entrain_simulate():
-    run("entrain", "simulate", "--json")  # loads what the operating system has not cached
-    simulate, _ = run("entrain", "simulate", "--json")
-    start, _ = run(sys.executable, "-c", "import numpy")
-    print(
-        f"\nentrain simulate, default protocol, whole command: {simulate:.2f} s"
-        f" (target: under 1 s; a Python that imports numpy alone: {start:.2f} s)"
-    )
 
 
 def test_lock_step_with_everything_recorded(tmp_path):
@@ -155,7 +144,7 @@ def service_call_ms():
     times = []
     with claimed_domain() as domain:
         listener = Listener(domain)
-        client = listener.node.create_client(Trigger, "gait_analyzer/ready")
+        client = listener.node.create_client(Ready, "gait_analyzer/ready")
         with subprocess.Popen(
             ["gait_analyzer"], env={**os.environ, "ROS_DOMAIN_ID": str(domain)}
         ) as other:
@@ -163,7 +152,7 @@ def service_call_ms():
             time.sleep(1.0)  # until the other has discovered who asks
             for _ in range(500):
                 begin = time.perf_counter()
-                listener.spin_until(client.call_async(Trigger.Request()).done)
+                listener.spin_until(client.call_async(Ready.Request()).done)
                 times.append(time.perf_counter() - begin)
             other.terminate()
         listener.close()

@@ -208,10 +208,10 @@ def test_fall_is_reported_with_its_bag(tmp_path):
 
 # Node, arguments, what the one line must name.
 WRONG_PARAMETERS = [
-    ("walker_sim", ["-p", "mass:=-1.0"], ["mass", "-1.0", "0 to 10000 kg"]),
+    ("walker_sim", ["-p", "mass:=-1.0"], ["mass", "-1.0", "above 0 and at most 10000 kg"]),
     ("walker_sim", ["-p", "mass:=80"], ["mass", "80", "80.0"]),
-    ("walker_sim", ["-p", "mass:=heavy"], ["mass", "heavy", "0 to 10000 kg"]),
-    ("walker_sim", ["-p", "mass:=0.0"], ["mass", "0.0", "positive"]),
+    ("walker_sim", ["-p", "mass:=heavy"], ["mass", "heavy", "above 0 and at most 10000 kg"]),
+    ("walker_sim", ["-p", "mass:=0.0"], ["mass", "0.0", "above 0"]),
     ("walker_sim", ["-p", "mass:=.nan"], ["mass", "nan"]),
     ("walker_sim", ["-p", "sample_rate:=1001.0"], ["sample_rate", "1001.0", "0 to 1000 Hz"]),
     ("walker_sim", ["-p", "masss:=80.0"], ["masss", "unknown", "mass,"]),

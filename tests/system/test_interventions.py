@@ -12,7 +12,7 @@ from std_srvs.srv import Trigger
 from gait_entrainment_bags import BagReader
 from gait_entrainment_msgs.action import DeliverPulseTrain, RunProtocol
 from gait_entrainment_msgs.msg import Horizon, Progress
-from gait_entrainment_msgs.srv import StartRun
+from gait_entrainment_msgs.srv import Ready, StartRun
 from gait_entrainment_nodes.messaging.topics import (
     ANKLE_TORQUE,
     HORIZON,
@@ -163,12 +163,16 @@ def test_walker_that_counts_events_which_nobody_receives_ends_the_run(tmp_path):
             WALKER_PROGRESS.type, WALKER_PROGRESS.name, WALKER_PROGRESS.qos
         )
 
-        def answer(_, response):
+        def start(_, response):
             response.success = True
             return response
 
-        probe.node.create_service(StartRun, "walker_sim/start", answer)
-        probe.node.create_service(Trigger, "walker_sim/ready", answer)
+        def ready(_, response):
+            response.ready = True
+            return response
+
+        probe.node.create_service(StartRun, "walker_sim/start", start)
+        probe.node.create_service(Ready, "walker_sim/ready", ready)
         profiles = probe.listen(TORQUE_PROFILE)
         handle = nodes.conduct()
         probe.until(lambda: profiles, "a promise")

@@ -4,7 +4,6 @@
 
 """The launch files with the real launch: exit codes, namespaces, remapping, replay, a device."""
 
-import json
 import os
 import signal
 import sys
@@ -18,20 +17,21 @@ from ament_index_python.packages import get_package_share_directory
 from harness import Started, alive, probe, stamp_of
 from lifecycle_msgs.msg import State
 from lifecycle_msgs.srv import GetState
-from std_srvs.srv import Trigger
 
 from gait_entrainment.protocol import read_protocol
 from gait_entrainment.simulation import simulate
 from gait_entrainment_bags import BagReader
 from gait_entrainment_bags.recorded_run import read_run
+from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.domain import claimed_domain
+from gait_entrainment_nodes.messaging.player_services import srv
 from gait_entrainment_nodes.messaging.topics import GAIT_EVENTS, STRIDES, Topic
 
 pytestmark = pytest.mark.skipif(
     find_spec("ros2launch") is None, reason="needs ros2 launch, which the wheels do not bring"
 )
 
-FILES = Path(get_package_share_directory("gait_entrainment_nodes")) / "launch"
+FILES = Path(get_package_share_directory("gait_entrainment_bringup")) / "launch"
 BAG = Path(__file__).parents[2] / "bags" / "paper_example"
 # What `ros2 launch` does with a file and arguments.
 ROS2_LAUNCH = (
@@ -244,11 +244,12 @@ def test_replay_ends_once_everything_is_played_and_analyzed(tmp_path):
         heard = listener.listen(Topic("again/gait/strides", STRIDES.type, STRIDES.qos))
 
         def matched():
-            answer = listener.call(Trigger, "again/gait_analyzer/ready").message
-            return answer.startswith("{") and json.loads(answer)["/again/gait/strides"] == 1
+            answer = listener.call(Ready, "again/gait_analyzer/ready")
+            matched = dict(zip(answer.topics, answer.matched, strict=True))
+            return answer.ready and matched["/again/gait/strides"] == 1
 
         listener.until(matched, "a match with the analyzer")
-        assert listener.call(Trigger, "again/bag_player/resume").success
+        listener.call(srv.Resume, "again/bag_player/resume")
         listener.until(lambda: not alive(launch.process.pid), "the end")
         assert launch.wait() == 0, launch.text
     with BagReader(BAG) as reader:
@@ -273,7 +274,7 @@ def test_device_is_brought_up_and_its_end_ends_the_launch(tmp_path):
         strides = listener.listen(STRIDES)
         kind, name, qos = GAIT_EVENTS.type, GAIT_EVENTS.name, GAIT_EVENTS.qos
         events = listener.node.create_publisher(kind, name, qos)
-        listener.known_to("gait_analyzer")
+        listener.client.wait_to_be_known("gait_analyzer")
         listener.until(events.get_subscription_count, "the analyzer")
         for step in range(5):
             event = kind(run=1, kind=0, side=(1 + step) % 2, step=step, source="sensor")

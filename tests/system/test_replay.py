@@ -16,18 +16,21 @@ from typing import Any
 
 import pytest
 from harness import PATIENCE, Probe, entrain_run, payloads, probe
-from std_srvs.srv import Trigger
 
+from gait_entrainment.gait import VerdictSettings
 from gait_entrainment_bags import BagReader, BagWriter
+from gait_entrainment_bags.decoding import decoder_for
 from gait_entrainment_bags.recorded_run import read_run
 from gait_entrainment_bringup import replay_client
 from gait_entrainment_bringup.commands import replay as replay_command
-from gait_entrainment_msgs.srv import Burst, GetRate, IsPaused, Play, Seek, SetRate
+from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.domain import claimed_domain
+from gait_entrainment_nodes.messaging.errors import NodeError
+from gait_entrainment_nodes.messaging.player_services import srv
 from gait_entrainment_nodes.messaging.raw_messages import serialize
 from gait_entrainment_nodes.messaging.stamps import to_time
 from gait_entrainment_nodes.messaging.topics import CLOCK, GAIT_EVENTS
-from gait_entrainment_nodes.nodes.gait_analyzer import GaitAnalyzerNode
+from gait_entrainment_nodes.nodes.gait_analyzer_run import Run
 
 BAG = Path(__file__).parents[2] / "bags" / "paper_example"
 RESULTS = ("/gait/strides", "/gait/pulse_phases")
@@ -61,12 +64,10 @@ def replay(*arguments: object) -> tuple[int, Any]:
 def offline(bag: Path) -> dict[str, list[bytes]]:
     """Analyze without ROS; return what a node would have published of it."""
     run = read_run(bag, torques=False)
-    node: Any = SimpleNamespace(run_number=1, side=run.protocol.side)
-    strides = (GaitAnalyzerNode.message_of(node, s) for s in run.analysis.strides)
-    pulses = (GaitAnalyzerNode.message_of(node, p) for p in run.analysis.pulses)
+    analyzed = Run(1, run.protocol.side, VerdictSettings(), measured=False)
     return {
-        "/gait/strides": [serialize(message) for message in strides],
-        "/gait/pulse_phases": [serialize(message) for message in pulses],
+        "/gait/strides": [serialize(analyzed.message_of(s)) for s in run.analysis.strides],
+        "/gait/pulse_phases": [serialize(analyzed.message_of(p)) for p in run.analysis.pulses],
     }
 
 
@@ -105,7 +106,7 @@ def without(bag: Path, out: Path, drop: Callable[[int, str, Any], bool]) -> Path
             for message in sorted(reader.messages(), key=lambda message: message.place):
                 number = numbers[message.topic]
                 numbers[message.topic] += 1
-                content = reader.decoder(message.topic)(message.data)
+                content = decoder_for(reader.topics[message.topic])(message.data)
                 if not drop(number, message.topic, content):
                     writer.write(
                         message.topic, message.data, message.log_time, message.publish_time
@@ -156,18 +157,19 @@ def test_a_run_in_a_namespace_is_replayed_and_recorded_there(live: Path, tmp_pat
 
 def test_an_analyzer_that_hangs_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(replay_client, "PATIENCE", 3.0)
-    play = replay_client.ReplayClient._ask
+    call = replay_client.ReplayClient.call
 
-    def ask(client: Any, service: str, *arguments: Any) -> None:
-        play(client, service, *arguments)
-        if service == "bag_player/resume":
+    def call_and_stall(client: Any, kind: Any, name: str, *arguments: Any, **options: Any) -> Any:
+        answer = call(client, kind, name, *arguments, **options)
+        if name == "bag_player/resume":
             client._supervisor._processes["gait_analyzer"].send_signal(signal.SIGSTOP)
+        return answer
 
-    monkeypatch.setattr(replay_client.ReplayClient, "_ask", ask)
+    monkeypatch.setattr(replay_client.ReplayClient, "call", call_and_stall)
     options = SimpleNamespace(bag=BAG, rate=1.0, out=None, json=True)
     with claimed_domain() as domain:
         monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))  # undone, where replay sets it
-        with pytest.raises(replay_client.ReplayError, match="no answer of gait_analyzer/ready"):
+        with pytest.raises(NodeError, match="gait_analyzer has been silent for 3 s"):
             replay_command.replay(options, domain)
 
 
@@ -211,35 +213,38 @@ def test_the_services_of_the_player(player: Any) -> None:
     clock = listener.listen(CLOCK)
     ask = listener.call
     events = list(payloads(BAG, ["/gait_events"])["/gait_events"])
-    assert ask(IsPaused, "bag_player/is_paused").paused
-    assert ask(GetRate, "bag_player/get_rate").rate == 1.0
-    assert not ask(SetRate, "bag_player/set_rate", SetRate.Request(rate=-1.0)).success
-    assert ask(SetRate, "bag_player/set_rate", SetRate.Request(rate=1e6)).success
-    assert ask(GetRate, "bag_player/get_rate").rate == 1e6
+    assert ask(srv.IsPaused, "bag_player/is_paused").paused
+    assert ask(srv.GetRate, "bag_player/get_rate").rate == 1.0
+    assert not ask(srv.SetRate, "bag_player/set_rate", srv.SetRate.Request(rate=-1.0)).success
+    assert ask(srv.SetRate, "bag_player/set_rate", srv.SetRate.Request(rate=1e6)).success
+    assert ask(srv.GetRate, "bag_player/get_rate").rate == 1e6
     # Single messages, once the expected subscription has been matched.
-    listener.until(lambda: ask(Trigger, "bag_player/play_next").success, "the start")
-    assert ask(Burst, "bag_player/burst", Burst.Request(num_messages=3)).actually_burst == 3
+    listener.until(lambda: ask(srv.PlayNext, "bag_player/play_next").success, "the start")
+    for _ in range(3):
+        assert ask(srv.PlayNext, "bag_player/play_next").success
     listener.until(lambda: len(heard) == 4, "four events")
     # Back to the start, and on from there to the end.
     start = events[0][0]
-    assert not ask(Seek, "bag_player/seek", Seek.Request(time=to_time(start - 10**12))).success
-    assert ask(Seek, "bag_player/seek", Seek.Request(time=to_time(start))).success
-    assert ask(Trigger, "bag_player/toggle_paused").message == "goes on"
+    assert not ask(
+        srv.Seek, "bag_player/seek", srv.Seek.Request(time=to_time(start - 10**12))
+    ).success
+    assert ask(srv.Seek, "bag_player/seek", srv.Seek.Request(time=to_time(start))).success
+    ask(srv.TogglePaused, "bag_player/toggle_paused")
+    assert not ask(srv.IsPaused, "bag_player/is_paused").paused
     listener.until(lambda: len(heard) == 4 + len(events), "all events")
     assert [e.header.stamp for e in heard[4:]] == [to_time(stamp) for stamp, _ in events]
     ticks = [tick.clock.sec * 10**9 + tick.clock.nanosec for tick in clock]
     assert start in ticks
     assert {(tick - start) % 10_000_000 for tick in ticks} == {0}
-    # Anew from the middle, for a second.
-    middle = Play.Request(start_offset=to_time(events[10][0] - start))
-    middle.playback_duration.sec = 1
-    listener.until(lambda: ask(Play, "bag_player/play", middle).success, "the end")
-    within = [s for s, _ in events if events[10][0] <= s < events[10][0] + 10**9]
-    listener.until(lambda: len(heard) == 4 + len(events) + len(within), "a second of events")
-    assert heard[4 + len(events)].header.stamp == to_time(events[10][0])
-    assert ask(Trigger, "bag_player/pause").success
-    assert ask(Trigger, "bag_player/resume").success
-    assert ask(Trigger, "bag_player/stop").success
+    # On from the middle to the end, paused in between.
+    ask(srv.Pause, "bag_player/pause")
+    assert ask(srv.IsPaused, "bag_player/is_paused").paused
+    middle = to_time(events[10][0])
+    assert ask(srv.Seek, "bag_player/seek", srv.Seek.Request(time=middle)).success
+    ask(srv.Resume, "bag_player/resume")
+    listener.until(lambda: len(heard) == 4 + 2 * len(events) - 10, "the rest of the events")
+    assert heard[4 + len(events)].header.stamp == middle
+    assert not ask(srv.PlayNext, "bag_player/play_next").success
     assert process.process.poll() is None
 
 
@@ -257,11 +262,9 @@ def test_a_player_whose_reader_hangs_says_so_and_obeys_a_signal(player: Any) -> 
         env={**os.environ, "ROS_DOMAIN_ID": domain},
     )
     try:
-        listener.until(
-            lambda: listener.call(Trigger, "bag_player/ready").success, "its subscription"
-        )
+        listener.until(lambda: listener.call(Ready, "bag_player/ready").ready, "its subscription")
         reader.send_signal(signal.SIGSTOP)
-        assert listener.call(Trigger, "bag_player/resume").success
+        listener.call(srv.Resume, "bag_player/resume")
         listener.until(lambda: "does not keep up" in process.log.read_text(), "a word")
         told = time.monotonic()
         process.process.terminate()
@@ -282,7 +285,7 @@ def test_topics_are_remapped_and_played_in_a_loop(player: Any) -> None:
         "clock:=0.0",
     )
     heard = listener.listen(GAIT_EVENTS._replace(name="/again/gait_events"))
-    assert listener.call(Trigger, "bag_player/resume").success
+    listener.call(srv.Resume, "bag_player/resume")
     count = len(payloads(BAG, ["/gait_events"])["/gait_events"])
     listener.until(lambda: len(heard) > 2 * count, "the third round")
     assert heard[:count] == heard[count : 2 * count]

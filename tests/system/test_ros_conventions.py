@@ -20,8 +20,8 @@ from gait_entrainment.conventions import Side
 from gait_entrainment_bringup.node_list import NODES
 from gait_entrainment_bringup.supervisor import Supervisor
 from gait_entrainment_msgs.action import RunProtocol
-from gait_entrainment_msgs.srv import GetRate
 from gait_entrainment_nodes.messaging.domain import claimed_domain
+from gait_entrainment_nodes.messaging.player_services import srv
 from gait_entrainment_nodes.messaging.topics import (
     DIAGNOSTICS,
     HORIZON,
@@ -189,6 +189,6 @@ def test_rate_of_the_player_is_one_with_its_service(tmp_path):
             parameters = Parameters(listener, "bag_player")
             assert_in_order(parameters)
             assert parameters.put(rate=4.0) == [""]
-            assert listener.call(GetRate, "bag_player/get_rate").rate == 4.0
+            assert listener.call(srv.GetRate, "bag_player/get_rate").rate == 4.0
         finally:
             supervisor.stop(["bag_player"])

@@ -13,24 +13,10 @@ import numpy as np
 
 from gait_entrainment.walker import EndingKind
 from gait_entrainment.walker.compiled import compiled
-from gait_entrainment.walker.model import Floats, Model, start_apex
+from gait_entrainment.walker.model import Floats, Model, Stamps, start_apex
 from gait_entrainment.walker.promise import EVER
-from gait_entrainment.walker.segment import (
-    FALL,
-    HEEL_STRIKE,
-    SEGMENT,
-    SINGLE_STANCE,
-    TOE_OFF,
-    WORK_SHAPE,
-    Log,
-)
-from gait_entrainment.walker.trajectory import (
-    SWITCHED,
-    Stamps,
-    first_cursors,
-    proceed,
-    start_walking,
-)
+from gait_entrainment.walker.segment import SEGMENT, WORK_SIZE, Log, Stance, Switch
+from gait_entrainment.walker.trajectory import SWITCHED, Torques, proceed, start_walking
 from gait_entrainment.walker.transitions import seconds
 
 FOREVER = 2**62
@@ -80,7 +66,7 @@ def walk(
     )
     ending = None
     if strikes < steps:
-        ending = EndingKind.FALL if log[0]["ends"] == FALL else EndingKind.FLY_OFF
+        ending = EndingKind.FALL if log[0]["ends"] == Switch.FALL else EndingKind.FLY_OFF
     return Walk(np.append(0.0, heel_strikes[:strikes]), toe_offs[:offs], ending)
 
 
@@ -112,22 +98,21 @@ def walk_steps(
     toe_offs: Floats,
 ) -> tuple[int, int]:
     """Fill in the events [s] after heel strike 0, until one array is full; return how many."""
-    segment = log[0]
-    work, cursors = np.empty(WORK_SHAPE), first_cursors(1)
+    segment, robot = log[0], Torques(changes, torques, 1)
+    work, cursors = np.empty(WORK_SIZE), np.array([0, 1])
     strikes, offs = 0, 0
     if stiffness.size > 0:
-        model.stiffness = stiffness[0]
+        model.ankle_stiffness = stiffness[0]
     start_walking(model, segment, 1, apex)
     while strikes < heel_strikes.size:
-        if segment.stance == SINGLE_STANCE and strikes + 1 < stiffness.size:
-            model.stiffness = stiffness[strikes + 1]  # of the push-off that comes next
-        outcome = proceed(model, work, segment, changes, torques, 1, cursors, FOREVER)
-        if outcome != SWITCHED:
+        if segment.stance == Stance.SINGLE and strikes + 1 < stiffness.size:
+            model.ankle_stiffness = stiffness[strikes + 1]  # of the push-off that comes next
+        if proceed(model, work, segment, robot, cursors, FOREVER) != SWITCHED:
             break
-        if segment.began == HEEL_STRIKE:
+        if segment.began == Switch.HEEL_STRIKE:
             heel_strikes[strikes] = seconds(segment.stamp, segment.rest)
             strikes += 1
-        elif segment.began == TOE_OFF:
+        elif segment.began == Switch.TOE_OFF:
             toe_offs[offs] = seconds(segment.stamp, segment.rest)
             offs += 1
     return strikes, offs

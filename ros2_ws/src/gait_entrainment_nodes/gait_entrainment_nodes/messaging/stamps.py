@@ -1,17 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Between ROS stamps and the core's integer nanoseconds."""
+"""ROS stamps of the core's integer nanoseconds; gait_entrainment.messages goes the other way."""
 
 from builtin_interfaces.msg import Time
 from std_msgs.msg import Header
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
-
-
-def to_nanoseconds(stamp: Time) -> int:
-    """Return a ROS stamp as integer nanoseconds since 1970."""
-    return stamp.sec * NANOSECONDS_PER_SECOND + stamp.nanosec
 
 
 def to_time(nanoseconds: int) -> Time:

@@ -5,23 +5,23 @@
 bag_player: publishes what a bag holds, each message at its time, or as fast as it is taken.
 
 Messages are published as bytes, never decoded. Before the first one it waits until the expected
-subscriptions have been matched, so that nothing of the start is lost. It is the sole owner of
-/clock: ticks lie at fixed instants of the bag, the same at every rate.
+subscriptions are matched, so that nothing of the start is lost. It is the sole owner of /clock:
+ticks lie at fixed instants of the bag, the same at every rate.
 """
 
 import math
 import struct
 import time
-from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
-from std_srvs.srv import Trigger
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
+from gait_entrainment.messages import nanoseconds_of
+from gait_entrainment.settings import setting, settings_of
 from gait_entrainment_bags import (
     FASTEST,
     BagError,
@@ -33,137 +33,130 @@ from gait_entrainment_bags import (
     choose_topics,
     find_definition,
 )
-from gait_entrainment_msgs.srv import Burst, GetRate, IsPaused, Play, Seek, SetRate
+from gait_entrainment_nodes.messaging import topics
+from gait_entrainment_nodes.messaging.player_services import srv
 from gait_entrainment_nodes.messaging.raw_messages import message_class
-from gait_entrainment_nodes.messaging.stamps import to_nanoseconds
-from gait_entrainment_nodes.messaging.topics import CLOCK, Topic
 from gait_entrainment_nodes.nodes.lateness import Lateness
-from gait_entrainment_nodes.nodes.node import Participant, declare, declare_texts, run_node
+from gait_entrainment_nodes.nodes.loop import run_node
+from gait_entrainment_nodes.nodes.parameters import declare_settings, declare_texts
+from gait_entrainment_nodes.nodes.participant import Participant, ReadSettings
 
 # How often matching is looked after before the first message [s].
 MATCHING_PERIOD = 0.02
-# So many messages at most are published before services and signals are looked after again.
+# At most this many messages are published before services and signals are looked after again.
 BURST_LENGTH = 200
-# At the end slow readers have so long to receive the last messages [s].
+# At the end slow readers have this long to receive the last messages [s].
 FAREWELL = 30.0
-# What a writer keeps for late-comers where the bag does not say it.
+# What a writer keeps for late-comers if the bag does not say it.
 KEPT = 1000
 _CDR_LITTLE_ENDIAN = b"\0\1\0\0"
+_ANY_LENGTH = (0.0, 1e9)
 
 
-class BagPlayer(Participant, Node):
+@dataclass(frozen=True)
+class Settings:
+    """Parameters of the node, beside its lists of topics."""
+
+    bag: str = setting("", "bag to play: a folder or an .mcap file")
+    rate: float = setting(
+        1.0, "seconds of the bag per second; 0 for as fast as it goes", "1", (0.0, 1e6)
+    )
+    loop: bool = setting(False, "begin again at the end")
+    start_paused: bool = setting(False, "start paused")
+    start_offset: float = setting(0.0, "where in the bag to start", "s", _ANY_LENGTH)
+    duration: float = setting(0.0, "how much of it to play; 0: all", "s", _ANY_LENGTH)
+    clock: float = setting(
+        40.0,
+        "ticks of /clock per second of the bag; 0: none, a recorded /clock is played",
+        "Hz",
+        (0.0, 1000.0),
+    )
+    expect_timeout: float = setting(
+        30.0, "how long to wait for the expected subscriptions; 0: for ever", "s", _ANY_LENGTH
+    )
+    stay: bool = setting(False, "stay at the end, for ~/seek")
+
+
+class BagPlayer(Participant):
     """ROS side of a playback. See the module's docstring."""
+
+    _begun = False  # all subscriptions that are waited for have been matched
 
     def __init__(self) -> None:
         super().__init__("bag_player")
-        bag = declare(self, "bag", "", "bag to play: a folder or an .mcap file")
-        if not bag:
-            raise ValueError("bag: is empty; give the folder of the bag to play")
-        declare(
-            self,
-            "rate",
-            1.0,
-            "seconds of the bag per second; 0 for as fast as it goes",
-            unit="1",
-            within=(0.0, 1e6),
-            read_only=False,
-        )
-        loop = declare(self, "loop", False, "begin again at the end")
-        paused = declare(self, "start_paused", False, "start paused")
-        start_offset = _seconds(self, "start_offset", 0.0, "where in the bag to start")
-        duration = _seconds(self, "duration", 0.0, "how much of it to play; 0: all")
-        topics = declare_texts(self, "topics", "topics to play, * for any text; empty plays all")
+        declare_settings(self, Settings, fixed=settings_of(Settings).keys() - {"rate"})
+        chosen = declare_texts(self, "topics", "topics to play, * for any text; empty plays all")
         excluded = declare_texts(self, "exclude", "topics to leave out, * for any text")
         remaps = declare_texts(self, "remap", "other names for topics: /from:=/to")
-        clock_rate = declare(
-            self,
-            "clock",
-            40.0,
-            "ticks of /clock per second of the bag; 0: none, a recorded /clock is played",
-            unit="Hz",
-            within=(0.0, 1000.0),
-        )
-        self.expected = declare_texts(
+        self._expected = declare_texts(
             self,
             "expect",
             "topics that must have a subscription before the first message; one that must have "
             "two is named twice",
         )
-        self.patience = _seconds(
-            self, "expect_timeout", 30.0, "how long to wait for them; 0: for ever"
-        )
-        self.stay = declare(self, "stay", False, "stay at the end, for ~/play and ~/seek")
-        self.playback: Playback | None = None
         self.begin_participation()
+        settings = self.settings
+        if not settings.bag:
+            raise ValueError("bag: is empty; give the folder of the bag to play")
         try:
-            self.bag = BagReader(bag)
-            self.playback = Playback(
-                self.bag,
-                self.playable(choose_topics(self.bag, topics, excluded), bool(clock_rate)),
-                start_offset=start_offset,
-                duration=duration or math.inf,
-                rate=self.rate,
-                loop=loop,
-                paused=paused,
-                clock_period=1 / clock_rate if clock_rate else 0.0,
+            self._bag = BagReader(settings.bag)
+            self._types = self._playable(choose_topics(self._bag, chosen, excluded))
+            self._playback = Playback(
+                self._bag,
+                self._types,
+                start_offset=settings.start_offset,
+                duration=settings.duration or math.inf,
+                rate=self._rate,
+                loop=settings.loop,
+                paused=settings.start_paused,
+                clock_period=1 / settings.clock if settings.clock else 0.0,
             )
         except BagError as error:
             raise ValueError(str(error)) from None
-        names = dict(_split_remap(remap) for remap in remaps)
-        if unknown := names.keys() - self.bag.topics.keys():
-            raise ValueError(f"remap: no topic {sorted(unknown)[0]} in the bag")
-        self.players = {
-            name: self.publisher(
-                Topic(names.get(name, name), message_type, _offer(self.bag.topics[name]))
-            )
-            for name, message_type in self.types.items()
-        }
-        self.forgetful = {
-            name
-            for name in self.players
-            if _offer(self.bag.topics[name]).history == HistoryPolicy.KEEP_LAST
-        }
-        self.clock_publisher = self.publisher(CLOCK) if clock_rate else None
-        played = {p.topic_name for p in self.players.values()}
-        if missing := sorted(set(self.expected) - played):
-            raise ValueError(f"expect: {missing[0]} is not played")
+        self._offer_topics(remaps)
         self.note_state(DiagnosticStatus.OK, "plays")
-        self.begun = False
-        self.look_at = time.monotonic()  # when matching is looked after next
-        self.give_up_at = time.monotonic() + (self.patience or math.inf)
-        self.lateness = Lateness()  # of messages, from due to published
-        for name, service, answer in (
-            ("pause", Trigger, self.on_pause),
-            ("resume", Trigger, self.on_resume),
-            ("toggle_paused", Trigger, self.on_toggle_paused),
-            ("stop", Trigger, self.on_stop_request),
-            ("play_next", Trigger, self.on_play_next),
-            ("is_paused", IsPaused, self.on_is_paused),
-            ("get_rate", GetRate, self.on_get_rate),
-            ("set_rate", SetRate, self.on_set_rate),
-            ("seek", Seek, self.on_seek),
-            ("burst", Burst, self.on_burst),
-            ("play", Play, self.on_play),
+        self._look_at = time.monotonic()  # when matching is looked after next
+        self._give_up_at = time.monotonic() + (settings.expect_timeout or math.inf)
+        self._lateness = Lateness()  # of messages, from due to published
+        for name, kind, answer in (
+            ("pause", srv.Pause, self._on_pause),
+            ("resume", srv.Resume, self._on_resume),
+            ("toggle_paused", srv.TogglePaused, self._on_toggle_paused),
+            ("is_paused", srv.IsPaused, self._on_is_paused),
+            ("get_rate", srv.GetRate, self._on_get_rate),
+            ("set_rate", srv.SetRate, self._on_set_rate),
+            ("seek", srv.Seek, self._on_seek),
+            ("play_next", srv.PlayNext, self._on_play_next),
         ):
-            self.create_service(service, f"~/{name}", answer)
+            self.create_service(kind, f"~/{name}", answer)
 
-    def take_parameters(self, value: Callable[[str], Any]) -> None:
+    def why_fixed(self, name: str) -> str:
+        """Return an empty text: the rate may change at any time."""
+        del name
+        return ""
+
+    def take_parameters(self, read: ReadSettings) -> None:
         """Play at another rate from now on."""
-        rate = value("rate") or FASTEST
-        if self.playback is not None:
-            self.playback.set_rate(rate, time.monotonic_ns())
-        self.rate = rate
+        self.settings = read(Settings)
+        if self._begun:
+            self._playback.set_rate(self._rate, time.monotonic_ns())
 
-    def playable(self, topics: list[str], own_clock: bool) -> list[str]:
-        """Return those topics whose type is installed here as it was recorded."""
-        self.types: dict[str, Any] = {}
-        for name in topics:
-            topic = self.bag.topics[name]
-            if own_clock and name == "/clock":
+    @property
+    def _rate(self) -> float:
+        return self.settings.rate or FASTEST
+
+    # The start
+
+    def _playable(self, names: list[str]) -> dict[str, Any]:
+        """Return the types of those topics whose type is installed as it was recorded."""
+        types = {}
+        for name in names:
+            topic = self._bag.topics[name]
+            if self.settings.clock and name == topics.CLOCK.name:
                 continue
             try:
                 installed = find_definition(topic.type)
-                message_type = message_class(topic.type)
+                types[name] = message_class(topic.type)
             except (DefinitionMissingError, ImportError, AttributeError) as error:
                 self.get_logger().error(f"{name} is not played: {error}")
                 continue
@@ -171,83 +164,93 @@ class BagPlayer(Participant, Node):
                 self.get_logger().error(
                     f"{name} is not played: the installed {topic.type} is not the recorded one"
                 )
-                continue
-            self.types[name] = message_type
-        return list(self.types)
+                del types[name]
+        return types
 
-    # The start
-
-    def missing_subscriptions(self) -> str:
-        """Return the topics whose expected subscriptions have not all been matched."""
-        by_name = {player.topic_name: player for player in self.players.values()}
-        missing = [
-            name
-            for name in sorted(set(self.expected))
-            if by_name[name].matched < self.expected.count(name)
-        ]
-        return ", ".join(missing)
+    def _offer_topics(self, remaps: tuple[str, ...]) -> None:
+        """Make the publishers; raises ValueError if a topic that is named is not played."""
+        names = dict(_split_remap(remap) for remap in remaps)
+        if unknown := sorted(names.keys() - self._bag.topics.keys()):
+            raise ValueError(f"remap: no topic {unknown[0]} in the bag")
+        offers = {name: _offer(self._bag.topics[name]) for name in self._types}
+        self._players = {
+            name: self.offer(topics.Topic(names.get(name, name), self._types[name], offer))
+            for name, offer in offers.items()
+        }
+        # Who keeps all waits by itself; who keeps the last ones for late-comers would overwrite.
+        self._forgetful = {n for n, o in offers.items() if o.history == HistoryPolicy.KEEP_LAST}
+        if self.settings.clock:
+            self.offer(topics.CLOCK)
+        self._by_name = {player.topic_name: player for player in self._players.values()}
+        if missing := sorted(set(self._expected) - self._by_name.keys()):
+            raise ValueError(f"expect: {missing[0]} is not played")
 
     def not_ready(self) -> str:
         """Return what is waited for before the first message."""
-        missing = self.missing_subscriptions()
-        return f"subscriptions of {missing}" if missing else super().not_ready()
+        missing = [
+            name
+            for name in sorted(set(self._expected))
+            if self._by_name[name].matched < self._expected.count(name)
+        ]
+        return f"subscriptions of {', '.join(missing)}" if missing else super().not_ready()
 
-    def wait_for_subscriptions(self) -> None:
-        """Begin once all subscriptions have been matched; give up after a while."""
-        self.look_at = time.monotonic() + MATCHING_PERIOD
+    def _begin_if_matched(self) -> None:
+        """Begin once all subscriptions are matched; give up after a while."""
+        self._look_at = time.monotonic() + MATCHING_PERIOD
         waiting = self.not_ready()
         if not waiting:
-            self.begun = True
-            self.playback.begin(time.monotonic_ns())
-        elif time.monotonic() > self.give_up_at:
-            self.failure = f"no {waiting} within {self.patience:g} s; nothing was played"
+            self._begun, now = True, time.monotonic_ns()
+            self._playback.begin(now)
+            self._playback.set_rate(self._rate, now)
+        elif time.monotonic() > self._give_up_at:
+            patience = f"{self.settings.expect_timeout:g} s"
+            self.failure = f"no {waiting} within {patience}; nothing was played"
 
     # Pacing
 
     def next_deadline(self) -> float | None:
         """Return when the next message is due, on steady time [s]."""
-        if not self.begun:
-            return self.look_at
-        due = self.playback.due()
+        if not self._begun:
+            return self._look_at
+        due = self._playback.due()
         return None if due is None else due / NANOSECONDS_PER_SECOND
 
     def on_deadline(self) -> None:
         """Publish what is due by now, in order."""
-        if not self.begun:
-            self.wait_for_subscriptions()
+        if not self._begun:
+            self._begin_if_matched()
             return
-        playback = self.playback
+        playback = self._playback
         try:
             for _ in range(BURST_LENGTH):
                 due, now = playback.due(), time.monotonic_ns()
                 if due is None or (moment := playback.take(now)) is None:
                     break
                 if playback.rate != FASTEST:
-                    self.lateness.add((now - due) / NANOSECONDS_PER_SECOND)
-                self.send(moment)
+                    self._lateness.add((now - due) / NANOSECONDS_PER_SECOND)
+                self._send(moment)
         except BagError as error:
             self.failure = str(error)
-        self.end_if_played()
+        self._end_if_played()
 
-    def send(self, moment: Moment) -> None:
-        """Publish a message or a tick; wait where a reader does not keep up."""
+    def _send(self, moment: Moment) -> None:
+        """Publish a message or a tick; wait if a reader does not keep up."""
         if moment.message is None:
-            if self.clock_publisher is not None:
-                self.clock_publisher.publish(clock_message(moment.instant))
+            if self.settings.clock:
+                self.publish(topics.CLOCK, clock_message(moment.instant))
             return
-        player = self.players[moment.message.topic]
+        player = self._players[moment.message.topic]
         player.publish(moment.message.data)
-        # Who keeps all waits by itself; who keeps the last ones for late-comers would overwrite.
-        if moment.message.topic in self.forgetful and player.count % (KEPT // 2) == 0:
+        if moment.message.topic in self._forgetful and player.count % (KEPT // 2) == 0:
             player.wait_for_readers()
 
-    def end_if_played(self) -> None:
+    def _end_if_played(self) -> None:
         """End the node once everything was played and received, unless it is to stay."""
-        if not self.playback.ended or self.stay or self.finished:
+        if not self._playback.ended or self.settings.stay or self.finished:
             return
-        self.publish_counts(0, self.bag.end)
+        self.publish_counts(0, self._bag.end)
         give_up = time.monotonic() + FAREWELL
-        for player in self.players.values():
+        for player in self._players.values():
             if not player.wait_for_readers(give_up - time.monotonic()):
                 self.failure = (
                     f"a reader of {player.topic_name} has not received its last messages within "
@@ -257,117 +260,74 @@ class BagPlayer(Participant, Node):
 
     def on_stop(self) -> None:
         """Say how much was played, and how late."""
-        self.playback.stop()
-        self.bag.close()
-        count = sum(player.count for player in self.players.values())
-        late = self.lateness
-        pace = (
-            f"; late by {1e3 * late.quantile(0.5):.2f} ms (median), {1e3 * late.worst:.2f} ms "
-            "at worst"
-            if late.count
-            else ""
-        )
+        self._playback.stop()
+        self._bag.close()
+        count = sum(player.count for player in self._players.values())
+        pace, late = "", self._lateness
+        if late.count:
+            median, worst = 1e3 * late.quantile(0.5), 1e3 * late.worst
+            pace = f"; late by {median:.2f} ms (median), {worst:.2f} ms at worst"
         self.get_logger().info(f"{count} messages played{pace}")
 
     # Services
 
-    def on_pause(self, _: Trigger.Request, response: Trigger.Response) -> Any:
-        """Stop at the present instant."""
-        self.playback.pause(time.monotonic_ns())
-        response.success = True
+    def _on_pause(self, _: Any, response: Any) -> Any:
+        self._playback.pause(time.monotonic_ns())
         return response
 
-    def on_resume(self, _: Trigger.Request, response: Trigger.Response) -> Any:
-        """Go on from there."""
-        self.playback.resume(time.monotonic_ns())
-        response.success = True
+    def _on_resume(self, _: Any, response: Any) -> Any:
+        self._playback.resume(time.monotonic_ns())
         return response
 
-    def on_toggle_paused(self, request: Trigger.Request, response: Trigger.Response) -> Any:
-        """Pause, or go on; the message says which."""
-        was_paused = self.playback.paused
-        response = (self.on_resume if was_paused else self.on_pause)(request, response)
-        response.message = "goes on" if was_paused else "paused"
+    def _on_toggle_paused(self, request: Any, response: Any) -> Any:
+        toggle = self._on_resume if self._playback.paused else self._on_pause
+        return toggle(request, response)
+
+    def _on_is_paused(self, _: Any, response: Any) -> Any:
+        response.paused = self._playback.paused
         return response
 
-    def on_is_paused(self, _: IsPaused.Request, response: IsPaused.Response) -> Any:
-        """Say whether it is paused."""
-        response.paused = self.playback.paused
+    def _on_get_rate(self, _: Any, response: Any) -> Any:
+        response.rate = self._rate
         return response
 
-    def on_get_rate(self, _: GetRate.Request, response: GetRate.Response) -> Any:
-        """Tell the rate."""
-        response.rate = self.playback.rate
-        return response
-
-    def on_set_rate(self, request: SetRate.Request, response: SetRate.Response) -> Any:
+    def _on_set_rate(self, request: Any, response: Any) -> Any:
         """Change the parameter, which plays at that rate from now on."""
-        if not request.rate > 0:
-            response.message = f"rate: {request.rate:g}; allowed: above 0"
-            return response
-        rate = 0.0 if math.isinf(request.rate) else request.rate
-        (result,) = self.set_parameters([Parameter("rate", value=rate)])
-        response.success, response.message = result.successful, result.reason
-        return response
+        if request.rate > 0:
+            rate = 0.0 if math.isinf(request.rate) else request.rate
+            (result,) = self.set_parameters([Parameter("rate", value=rate)])
+            response.success, reason = result.successful, result.reason
+        else:
+            reason = f"rate: {request.rate:g}; allowed: above 0"
+        return self._answer(response, reason)
 
-    def on_seek(self, request: Seek.Request, response: Seek.Response) -> Any:
-        """Go on at another instant of the bag."""
+    def _on_seek(self, request: Any, response: Any) -> Any:
+        reason = ""
         try:
-            self.playback.seek(to_nanoseconds(request.time), time.monotonic_ns())
+            self._playback.seek(nanoseconds_of(request.time), time.monotonic_ns())
             response.success = True
         except BagError as error:
-            response.message = str(error)
-        return response
+            reason = str(error)
+        return self._answer(response, reason)
 
-    def on_play_next(self, _: Trigger.Request, response: Trigger.Response) -> Any:
-        """Publish the next message while paused."""
-        if not self.playback.paused:
-            response.message = "not paused"
-        elif not self.play_next(1):
-            response.message = "nothing is left to play"
-        else:
-            response.success = True
-        return response
-
-    def on_burst(self, request: Burst.Request, response: Burst.Response) -> Any:
-        """Publish the next messages while paused."""
-        if self.playback.paused:
-            response.actually_burst = self.play_next(request.num_messages or math.inf)
-        return response
-
-    def play_next(self, count: float) -> int:
-        """Publish so many messages, with the ticks before them; return how many there were."""
-        played = 0
+    def _on_play_next(self, _: Any, response: Any) -> Any:
+        """Publish the next message, with the ticks before it."""
+        reason = "play_next: is not paused, or nothing is left to play"
         try:
-            while self.begun and played < count and (moment := self.playback.take_next()):
-                self.send(moment)
-                played += moment.message is not None
+            while self._begun and (moment := self._playback.take_next()):
+                self._send(moment)
+                if moment.message is not None:
+                    response.success, reason = True, ""
+                    break
         except BagError as error:
             self.failure = str(error)
-        self.end_if_played()
-        return played
+        self._end_if_played()
+        return self._answer(response, reason)
 
-    def on_play(self, request: Play.Request, response: Play.Response) -> Any:
-        """Play anew, once everything was played."""
-        if not self.playback.ended:
-            response.message = "still playing; pause, seek or stop instead"
-            return response
-        try:
-            self.playback.play(
-                to_nanoseconds(request.start_offset),
-                to_nanoseconds(request.playback_duration),
-                time.monotonic_ns(),
-            )
-            response.success = True
-        except BagError as error:
-            response.message = str(error)
-        return response
-
-    def on_stop_request(self, _: Trigger.Request, response: Trigger.Response) -> Any:
-        """Play no more."""
-        self.playback.stop()
-        self.end_if_played()
-        response.success = True
+    def _answer(self, response: Any, reason: str) -> Any:
+        """Return a response; why it is a refusal has no place in it and goes to the log."""
+        if reason:
+            self.get_logger().error(reason)
         return response
 
 
@@ -375,11 +335,6 @@ def clock_message(instant: int) -> bytes:
     """Return a serialized /clock message."""
     sec, nanosec = divmod(instant, NANOSECONDS_PER_SECOND)
     return _CDR_LITTLE_ENDIAN + struct.pack("<iI", sec, nanosec)
-
-
-def _seconds(node: Node, name: str, default: float, description: str) -> float:
-    """Declare a parameter that holds a length of time."""
-    return float(declare(node, name, default, description, unit="s", within=(0.0, 1e9)))
 
 
 def _split_remap(remap: str) -> tuple[str, str]:

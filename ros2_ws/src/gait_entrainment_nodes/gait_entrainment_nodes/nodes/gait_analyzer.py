@@ -5,228 +5,133 @@
 gait_analyzer: stride periods, pulse phases and the entrainment verdict, online, from stamps.
 
 A listener: nothing waits for it. What it publishes is a pure function of the events and the
-onsets, promised or measured, however their messages interleave.
+onsets, promised or measured, in whatever order their messages arrive.
 """
 
-from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import dataclass
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-from gait_entrainment.conventions import EventKind, Side
-from gait_entrainment.gait import (
-    Entrainment,
-    GaitAnalyzer,
-    GaitEvent,
-    PulsePhase,
-    Stride,
-    VerdictSettings,
-    published_values,
-)
+from gait_entrainment.conventions import Side
+from gait_entrainment.gait import VerdictSettings
 from gait_entrainment.gait.analyzer import Result
-from gait_entrainment.robot import MeasuredOnsets, RobotState
+from gait_entrainment.messages import (
+    event_of,
+    nanoseconds_of,
+    profile_of,
+    pulse_of,
+    state_of,
+    stop_of,
+)
+from gait_entrainment.settings import setting
 from gait_entrainment_msgs import msg
-from gait_entrainment_nodes.messaging.stamps import header, to_nanoseconds, to_time
-from gait_entrainment_nodes.messaging.topics import (
-    ENTRAINMENT,
-    GAIT_EVENTS,
-    PULSE_PHASES,
-    PULSES,
-    ROBOT_STATE,
-    STRIDES,
-    TORQUE_PROFILE,
-    WALKER_PROGRESS,
-    Topic,
-)
-from gait_entrainment_nodes.nodes.node import (
-    Participant,
-    declare,
-    declare_fields,
-    declare_side,
-    fields_of,
-    run_node,
-    side_of,
-)
-
-ONSETS = ("commanded", "measured")
-# Where each kind of result is published.
-RESULTS: dict[type, Topic] = {
-    Stride: STRIDES,
-    PulsePhase: PULSE_PHASES,
-    Entrainment: ENTRAINMENT,
-}
+from gait_entrainment_nodes.messaging import topics
+from gait_entrainment_nodes.nodes.gait_analyzer_run import RESULTS, Run
+from gait_entrainment_nodes.nodes.loop import run_node
+from gait_entrainment_nodes.nodes.parameters import declare_settings
+from gait_entrainment_nodes.nodes.participant import Participant, ReadSettings
 
 
-class GaitAnalyzerNode(Participant, Node):
+@dataclass(frozen=True)
+class Settings:
+    """Parameters of the node, beside those of the verdict."""
+
+    side: Side = setting(Side.RIGHT, "the perturbed leg: left or right")
+    onset: str = setting(
+        "commanded",
+        "where a pulse begins: commanded, or measured where the robot's torque rises",
+        choices=("commanded", "measured"),
+    )
+
+
+class GaitAnalyzerNode(Participant):
     """ROS side of the analyzer."""
+
+    run: Run | None
 
     def __init__(self) -> None:
         super().__init__("gait_analyzer")
-        declare_side(self, "side", "the perturbed leg: left or right")
-        self.onset = declare(
-            self,
-            "onset",
-            ONSETS[0],
-            "where a pulse begins: commanded, or measured where the robot's torque rises",
-            choices=ONSETS,
-        )
-        if self.onset not in ONSETS:
-            raise ValueError(f"onset: {self.onset!r}; allowed: {', '.join(ONSETS)}")
-        declare_fields(self, VerdictSettings, "verdict.")
+        declare_settings(self, Settings, fixed=("onset",))
+        declare_settings(self, VerdictSettings, "verdict.")
         self.begin_participation()
-        self.result_publishers = {kind: self.publisher(topic) for kind, topic in RESULTS.items()}
-        self.begin_run(0)
-        self.subscription(GAIT_EVENTS, self.on_event)
-        self.subscription(TORQUE_PROFILE, self.on_profile)
-        self.subscription(WALKER_PROGRESS, self.on_progress)
-        if self.onset == "measured":
-            self.subscription(PULSES, self.on_pulse)
-            self.subscription(ROBOT_STATE, self.on_state)
-        self.create_service(Trigger, "~/finish", self.on_finish)
+        for topic in RESULTS.values():
+            self.offer(topic)
+        self._latest_run = 0  # number of the latest run
+        self.subscribe_to_run(topics.GAIT_EVENTS, self._on_event)
+        self.subscribe_to_run(topics.TORQUE_PROFILE, self._on_profile)
+        self.subscribe_to_run(topics.WALKER_PROGRESS, self._on_progress)
+        if self.settings.onset == "measured":
+            self.subscribe_to_run(topics.PULSES, self._on_pulse)
+            self.subscribe_to_run(topics.ROBOT_STATE, self._on_state)
+        self.create_service(Trigger, "~/finish", self._on_finish)
 
-    def why_fixed(self, name: str) -> str:
-        """Return why a parameter cannot change now: a run is analyzed with it."""
-        del name
-        going_on = self.run_number and not self.finished_run
-        return f"run {self.run_number} goes on; change it between runs" if going_on else ""
-
-    def take_parameters(self, value: Callable[[str], Any]) -> None:
+    def take_parameters(self, read: ReadSettings) -> None:
         """Take what the next run is analyzed with."""
-        side = side_of("side", value)
-        self.settings = fields_of(VerdictSettings, value, "verdict.")
-        self.side = side
+        self.settings, self.verdict = read(Settings), read(VerdictSettings, "verdict.")
 
-    def begin_run(self, run: int) -> None:
-        """Forget the run before: every message carries the number of its run."""
-        self.run_number = run
-        self.analyzer = GaitAnalyzer(self.side, self.settings)
-        self.events = 0
-        self.measured = MeasuredOnsets()
-        self.promised_until = 0  # all pulses up to this instant are known [ns since 1970]
-        self.closed = False  # nothing will be promised any more
-        self.final: msg.Progress | None = None
-        self.finished_run = False
-        self.doubts: dict[str, int] = {}  # counts of suspicious events, as reported last
-        if run:
-            self.note_state(DiagnosticStatus.OK, f"run {run} goes on")
+    def run_of(self, message: Any) -> Run | None:
+        """Return the run of a message if it is analyzed; a newer run begins anew."""
+        if message.run > self._latest_run:
+            self._latest_run = message.run
+            side, measured = self.settings.side, self.settings.onset == "measured"
+            self.run = Run(message.run, side, self.verdict, measured=measured)
+            self.note_state(DiagnosticStatus.OK, f"run {message.run} goes on")
+        return self.run if message.run == self._latest_run else None
 
-    def of_this_run(self, run: int) -> bool:
-        """Whether a message belongs to the run that is analyzed; a newer run begins anew."""
-        if run > self.run_number:
-            self.begin_run(run)
-        return run == self.run_number
+    def _on_event(self, run: Run, event: msg.GaitEvent) -> None:
+        results = run.add_event(event_of(event))
+        if doubts := run.new_doubts():
+            what = "gait events are not as they should be"
+            stamp = nanoseconds_of(event.header.stamp)
+            self.diagnose(stamp, DiagnosticStatus.WARN, what, **doubts)
+        self._take(run, results)
 
-    def on_event(self, event: msg.GaitEvent) -> None:
-        """Take one gait event."""
-        if not self.of_this_run(event.run):
-            return
-        self.events += 1
-        stamp = to_nanoseconds(event.header.stamp)
-        results = self.analyzer.add_event(
-            GaitEvent(stamp, EventKind(event.kind), Side(event.side), event.step)
-        )
-        self.publish(results)
-        self.report_doubts(stamp)
-        self.finish_if_complete()
-
-    def on_profile(self, profile: msg.TorqueProfile) -> None:
+    def _on_profile(self, run: Run, profile: msg.TorqueProfile) -> None:
         """Take the onsets that are promised, or a stop."""
-        if not self.of_this_run(profile.run):
-            return
-        if profile.stop:
-            stamp = to_nanoseconds(profile.header.stamp)
-            self.analyzer.stop(stamp)
-            self.measured.stop(stamp)
-            return
-        onsets = [to_nanoseconds(onset) for onset in profile.onsets]
-        self.promised_until = to_nanoseconds(profile.valid_until)
-        self.closed = self.promised_until == to_nanoseconds(profile.header.stamp)
-        known = onsets, self.promised_until
-        if self.onset == "measured":
-            known = self.measured.add_promise(*known)
-        self.take_onsets(*known)
+        stop = stop_of(profile)
+        if stop is not None:
+            run.stop(stop)
+        else:
+            self._take(run, run.add_profile(profile_of(profile)))
 
-    def on_pulse(self, pulse: msg.TorquePulse) -> None:
-        """Take height and width of a pulse, to know its measured onset by."""
-        if self.of_this_run(pulse.run):
-            onset = to_nanoseconds(pulse.header.stamp)
-            self.take_onsets(*self.measured.add_pulse(onset, pulse.torque, pulse.duration))
+    def _on_pulse(self, run: Run, pulse: msg.TorquePulse) -> None:
+        self._take(run, run.add_pulse(*pulse_of(pulse)))
 
-    def on_state(self, state: msg.AnkleRobotState) -> None:
-        """Take the torque that the robot measured."""
-        if self.of_this_run(state.run):
-            torques = state.commanded_torque, state.measured_torque
-            sampled = RobotState(to_nanoseconds(state.header.stamp), *torques, state.angle)
-            self.take_onsets(*self.measured.add_state(sampled))
+    def _on_state(self, run: Run, state: msg.AnkleRobotState) -> None:
+        self._take(run, run.add_state(state_of(state)))
 
-    def take_onsets(self, onsets: list[int], until: int) -> None:
-        """Hand onsets to the analyzer, with the promise that none before an instant follow."""
-        if self.finished_run:
-            return
-        self.publish(self.analyzer.add_promise(onsets, until))
-        self.finish_if_complete()
+    def _on_progress(self, run: Run, progress: msg.Progress) -> None:
+        if progress.state != msg.Progress.WALKING:
+            run.end_at(nanoseconds_of(progress.header.stamp), progress.events)
+            self._take(run, [])
 
-    def on_progress(self, progress: msg.Progress) -> None:
-        """Learn of the end of the run."""
-        if self.of_this_run(progress.run) and progress.state != msg.Progress.WALKING:
-            self.final = progress
-            self.finish_if_complete()
-
-    def finish_if_complete(self) -> None:
-        """Once the run has ended and all of it has arrived here, publish what was waiting."""
-        final = self.final
-        if final is None or self.events < final.events:
-            return
-        end = to_nanoseconds(final.header.stamp)
-        if self.promised_until < end:
-            return
-        if self.onset == "measured" and not (
-            self.closed and self.measured.states_until >= self.promised_until
-        ):
-            return  # the state at the closing instant is the last one
-        self.finish(end)
-
-    def finish(self, end: int) -> None:
-        """Publish what was waiting: nothing more of this run will come."""
-        self.final = None
-        self.finished_run = True
-        if self.onset == "measured":
-            self.publish(self.analyzer.add_promise(self.measured.finish(), end))
-        self.publish(self.analyzer.finish())
-        self.publish_counts(self.run_number, end)
-
-    def on_finish(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _on_finish(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Finish a run whose end was not recorded, or of which events are missing."""
-        if not self.finished_run:
-            self.finish(self.promised_until)
+        if self.run is not None:
+            self._finish(self.run, self.run.promised_until)
+        elif not self._latest_run:
+            self.publish_counts(0, 0)  # for whoever waits for them: no run was heard
         response.success = True
         return response
 
-    def report_doubts(self, stamp: int) -> None:
-        """Say on /diagnostics when events are missing, doubled, late or contradictory."""
-        doubts = asdict(self.analyzer.event_counts)
-        del doubts["accepted"]
-        if any(doubts.values()) and doubts != self.doubts:
-            self.doubts = doubts
-            self.diagnose(
-                stamp, DiagnosticStatus.WARN, "gait events are not as they should be", **doubts
-            )
+    def _take(self, run: Run, results: list[Result]) -> None:
+        """Publish results, and the rest once all of the run is here."""
+        self._publish_results(run, results)
+        if run.complete:
+            assert run.end is not None
+            self._finish(run, run.end)
 
-    def publish(self, results: list[Result]) -> None:
-        """Publish results in the order in which the core gave them."""
+    def _finish(self, run: Run, end: int) -> None:
+        """Publish what was waiting: nothing more of this run will come."""
+        self.run = None
+        self._publish_results(run, run.finish(end))
+        self.publish_counts(run.number, end)
+
+    def _publish_results(self, run: Run, results: list[Result]) -> None:
         for result in results:
-            self.result_publishers[type(result)].publish(self.message_of(result))
-
-    def message_of(self, result: Result) -> Any:
-        """Convert a result."""
-        values = published_values(result, self.side) | {"run": self.run_number}
-        values["header"] = header(values["header"])
-        for name in values.keys() & {"start", "toe_off"}:
-            values[name] = to_time(values[name])
-        return RESULTS[type(result)].type(**values)
+            self.publish(RESULTS[type(result)], run.message_of(result))
 
 
 def main() -> int:

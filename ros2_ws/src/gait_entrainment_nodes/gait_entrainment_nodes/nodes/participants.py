@@ -1,30 +1,30 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The nodes that take part in an experiment: whether all of them run, and hear each other."""
+"""The nodes that take part in an experiment: whether all of them run and hear each other."""
 
-import json
 from collections.abc import Sequence
+from typing import Any
 
 from rclpy.node import Node
-from std_srvs.srv import Trigger
 
-from gait_entrainment_nodes.nodes.waiting import OverdueError, Waiting
+from gait_entrainment_msgs.srv import Ready
+from gait_entrainment_nodes.nodes.experiment_run import RECORDER, ExperimentError
+from gait_entrainment_nodes.nodes.waiting import Waiting
 
-# After so long [s] a participant is asked anew whether it is ready.
+# A participant that has not answered is asked again after this long [s].
 ASK_AGAIN = 0.5
-RECORDER = "bag_recorder"
 
 
 class Participants:
     """
-    Looks after the participants of an experiment before a run.
+    The participants of an experiment before a run.
 
     Parameters
     ----------
     node
-        The experiment, behind whose other clients this makes its own: who has answered here knows
-        all of them, since discovery goes in the order in which they were made.
+        The experiment, whose other clients have been made: discovery announces clients in the
+        order in which they were made, so a participant that answers here knows all of them.
     names
         Of the participants, in the experiment's namespace: any nodes that offer ``~/ready``.
     waiting
@@ -35,36 +35,36 @@ class Participants:
     def __init__(self, node: Node, names: Sequence[str], waiting: Waiting) -> None:
         self.names = tuple(names)
         self._node, self._waiting = node, waiting
-        self._clients = {name: node.create_client(Trigger, f"{name}/ready") for name in names}
+        self._clients = {name: node.create_client(Ready, f"{name}/ready") for name in names}
 
-    async def not_ready(self) -> str:
-        """Return who is waited for, and for what; an empty text once all are ready."""
+    async def check(self) -> None:
+        """Raise ExperimentError if a participant is not ready: who, and what it waits for."""
         here = self._node.get_namespace()
         nodes = self._node.get_node_names_and_namespaces()
         for name, client in self._clients.items():
             if not client.service_is_ready():
-                return f"{name} does not answer"
+                raise ExperimentError(f"{name} does not answer", name)
             if nodes.count((name, here)) > 1:
-                return (
+                raise ExperimentError(
                     f"there are two {name} in {here}: another experiment runs here; choose "
-                    "another namespace or ROS_DOMAIN_ID"
+                    "another namespace or ROS_DOMAIN_ID",
+                    name,
                 )
         if RECORDER in self.names:
             for topic in self.not_recorded():
-                return f"{RECORDER} has not subscribed to {topic}"
+                raise ExperimentError(f"{RECORDER} has not subscribed to {topic}", RECORDER)
         for name, client in self._clients.items():
             # An answer may be lost, as long as the participant does not know who asked.
-            try:
-                response = await self._waiting.within(
-                    client.call_async(Trigger.Request()), f"{name} does not answer", ASK_AGAIN
-                )
-            except OverdueError as silence:
-                return str(silence)
-            if not response.success:
-                return f"{name} waits for {response.message}"
-            for topic in self.reaching_too_few(response.message):
-                return f"{name} waits for subscriptions of {topic}"
-        return ""
+            answer = client.call_async(Ready.Request())
+            silence = ExperimentError(f"{name} does not answer", name)
+            await self._waiting.until(answer.done, ASK_AGAIN, silence)
+            state = answer.result()
+            if not state.ready:
+                raise ExperimentError(f"{name} waits for {state.waiting_for}", name)
+            # Discovery may have told this node of more subscriptions than that one.
+            for topic, matched in zip(state.topics, state.matched, strict=True):
+                if matched < self._node.count_subscribers(topic):
+                    raise ExperimentError(f"{name} waits for subscriptions of {topic}", name)
 
     def not_recorded(self) -> list[str]:
         """Return the topics of participants that the recorder has not subscribed to."""
@@ -72,29 +72,15 @@ class Participants:
         beneath = here.rstrip("/") + "/"
         recorder = (here, RECORDER)
         publishers = {(here, name) for name in (*self.names, self._node.get_name())} - {recorder}
-        missing = []
-        for name, _ in self._node.get_topic_names_and_types():
-            if not name.startswith(beneath) or "/_" in name:
-                continue
-            offers = self._node.get_publishers_info_by_topic(name)
-            readers = self._node.get_subscriptions_info_by_topic(name)
-            if publishers & {(offer.node_namespace, offer.node_name) for offer in offers} and (
-                recorder not in {(reader.node_namespace, reader.node_name) for reader in readers}
-            ):
-                missing.append(name)
-        return missing
 
-    def reaching_too_few(self, matched: str) -> list[str]:
-        """
-        Return the topics on which a participant reaches fewer subscriptions than exist.
+        def nodes(ends: Sequence[Any]) -> set[tuple[str, str]]:
+            return {(end.node_namespace, end.node_name) for end in ends}
 
-        It says itself how many it reaches, if it is one of ours. How many there are is known
-        here: every participant has been seen whole.
-        """
-        try:
-            counts = json.loads(matched)
-        except ValueError:
-            return []
         return [
-            topic for topic, count in counts.items() if count < self._node.count_subscribers(topic)
+            name
+            for name, _ in self._node.get_topic_names_and_types()
+            if name.startswith(beneath)
+            and "/_" not in name
+            and publishers & nodes(self._node.get_publishers_info_by_topic(name))
+            and recorder not in nodes(self._node.get_subscriptions_info_by_topic(name))
         ]

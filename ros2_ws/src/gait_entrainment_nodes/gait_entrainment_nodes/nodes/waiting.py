@@ -2,81 +2,85 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Waiting for answers in a coroutine of a node, on steady time.
+Waiting for conditions in a coroutine of a node, on steady time.
 
-The node's loop resumes the coroutine: rclpy's executor would do so over and over, for as long as
-it waits, and keep a processor busy.
+The node's loop resumes the coroutine, once a condition holds or its time is over: rclpy's executor
+would resume it over and over for as long as it waits, and keep a processor busy.
 """
 
+import math
 import time
-from collections.abc import Coroutine
+import types
+from collections.abc import Callable, Coroutine, Generator
 from typing import Any
-
-from rclpy.task import Future
 
 # How often waiting is looked after [s].
 TICK = 0.02
-# A tick that is so late [s] says that this process was held up: others are not blamed for it.
+# A tick that is this late [s] shows that this process was held up: nobody else is to blame for it.
 HELD_UP = 1.0
-
-
-class OverdueError(Exception):
-    """Somebody owes an answer for too long; the message says who, and what is amiss."""
 
 
 class Waiting:
     """What a coroutine of a node waits for; the node's loop looks after it at every deadline."""
 
-    def __init__(self) -> None:
-        self.deadline = time.monotonic() + TICK  # when it is looked after next, steady time [s]
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._tick_at = clock() + TICK
         self._coroutine: Coroutine[Any, Any, None] | None = None
-        self._waits: list[tuple[Future, float, str]] = []  # what, until when, why it matters
-        self._ticks: list[Future] = []
+        self._condition: Callable[[], bool] = _nothing
+        self._give_up = math.inf
+
+    @property
+    def busy(self) -> bool:
+        """Whether a coroutine has begun and not ended."""
+        return self._coroutine is not None
+
+    @property
+    def deadline(self) -> float:
+        """The steady time [s] at which to look after it: a tick, or now if a condition holds."""
+        return min(self._tick_at, self._clock()) if self._condition() else self._tick_at
 
     def begin(self, coroutine: Coroutine[Any, Any, None]) -> None:
         """Run a coroutine that waits here only; one at a time."""
-        assert self._coroutine is None
+        assert not self.busy
         self._coroutine = coroutine
-        self._hasten()
+        self._tick_at = self._clock()
 
-    async def until(self, future: Future) -> Any:
-        """Return the result of a future."""
-        future.add_done_callback(lambda _: self._hasten())
-        return await future
+    async def until(
+        self,
+        condition: Callable[[], bool],
+        timeout: float = math.inf,
+        overdue: Exception | None = None,
+    ) -> None:
+        """Wait until a condition holds, at most for a time [s]; then raise what is overdue."""
+        self._condition, self._give_up = condition, self._clock() + timeout
+        try:
+            while not condition():
+                if self._clock() > self._give_up:
+                    if overdue is None:
+                        return
+                    raise overdue
+                await self.tick()
+        finally:
+            self._condition = _nothing
 
-    async def within(self, future: Future, reason: str, timeout: float) -> Any:
-        """Return the result of a future; OverdueError with the reason after a time [s]."""
-        self._waits.append((future, time.monotonic() + timeout, reason))
-        return await self.until(future)
-
-    async def tick(self) -> None:
-        """Wait for the next tick."""
-        future = Future()
-        self._ticks.append(future)
-        await future
+    @types.coroutine
+    def tick(self) -> Generator[None, None, None]:
+        """Wait until the node's loop comes by again."""
+        yield
 
     def look_after(self) -> bool:
         """
         Go on with what is due.
 
-        Returns whether this process was held up: then all waiting begins anew, since what came
+        Returns whether this process was held up: then all waiting begins anew, since what arrived
         meanwhile has not been heard yet.
         """
-        now = time.monotonic()
-        late, self.deadline = now - self.deadline, now + TICK
+        now = self._clock()
+        late, self._tick_at = now - self._tick_at, now + TICK
         held_up = late > HELD_UP
-        waits, self._waits = self._waits, []
-        for future, until, reason in waits:
-            latest = until + late if held_up else until
-            if future.done():
-                continue
-            if now > latest:
-                future.set_exception(OverdueError(reason))
-            else:
-                self._waits.append((future, latest, reason))
-        ticks, self._ticks = self._ticks, []
-        for future in ticks:
-            future.set_result(None)
+        if held_up:
+            self._give_up += late
         if self._coroutine is not None:
             try:
                 self._coroutine.send(None)
@@ -84,6 +88,6 @@ class Waiting:
                 self._coroutine = None
         return held_up
 
-    def _hasten(self) -> None:
-        """Let the loop look after it at once; a deadline that has passed stays as it is."""
-        self.deadline = min(self.deadline, time.monotonic())
+
+def _nothing() -> bool:
+    return False

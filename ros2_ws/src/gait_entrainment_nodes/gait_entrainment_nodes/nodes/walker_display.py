@@ -16,11 +16,11 @@ robot's arc and the ball at the ankle are red while its torque acts and grey whi
 
 import math
 import struct
+from dataclasses import dataclass
 from typing import Any
 
 import xacro
 from geometry_msgs.msg import Point, Quaternion, TransformStamped, Vector3
-from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import ColorRGBA, String
@@ -28,19 +28,14 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
+from gait_entrainment.settings import setting, settings_of
 from gait_entrainment_msgs.msg import AnkleTorque
+from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.environment import PACKAGE, shared_file
-from gait_entrainment_nodes.messaging.topics import (
-    ANKLE_TORQUE,
-    JOINT_STATES,
-    LOOKING_ON,
-    MARKERS,
-    ROBOT_DESCRIPTION,
-    TF,
-    Topic,
-)
 from gait_entrainment_nodes.nodes.footing import Footing
-from gait_entrainment_nodes.nodes.node import Participant, declare, run_node
+from gait_entrainment_nodes.nodes.loop import run_node
+from gait_entrainment_nodes.nodes.parameters import declare_settings
+from gait_entrainment_nodes.nodes.participant import Participant, ReadSettings
 
 WORLD = "world"  # of the ground reactions too; shared by all walkers, so without a prefix
 PREFIXES = ("l_", "r_")  # of joints and frames, by side
@@ -55,55 +50,51 @@ ACTING = ColorRGBA(r=0.9, g=0.1, b=0.1, a=1.0)
 WITHOUT_EFFECT = ColorRGBA(r=0.5, g=0.5, b=0.5, a=1.0)
 
 
-class WalkerDisplay(Participant, Node):
+@dataclass(frozen=True)
+class Settings:
+    """Parameters of the node."""
+
+    leg_length: float = setting(1.0, "leg length", "m", (0.1, 10.0))
+    foot_length: float = setting(0.2, "foot length", "m", (0.01, 10.0))
+    rate: float = setting(50.0, "pictures per second", "Hz", (10.0, 1000.0))
+    torque_scale: float = setting(0.035, "angle of an arc per torque", "rad/(N m)", (0.0, 1.0))
+    frame_prefix: str = setting("", "of every frame but world, such as walker_1/")
+    robot_state: bool = setting(
+        True,
+        "send robot_description and the joints' transforms; false beside a robot_state_publisher",
+    )
+
+
+class WalkerDisplay(Participant):
     """ROS side of the display."""
 
     def __init__(self) -> None:
         super().__init__("walker_display")
-        leg_length = declare(self, "leg_length", 1.0, "leg length", unit="m", within=(0.1, 10.0))
-        foot_length = declare(
-            self, "foot_length", 0.2, "foot length", unit="m", within=(0.01, 10.0)
-        )
-        rate = declare(self, "rate", 50.0, "pictures per second", unit="Hz", within=(10.0, 1000.0))
-        self.scale = declare(
-            self,
-            "torque_scale",
-            0.035,
-            "angle of an arc per torque",
-            unit="rad/(N m)",
-            within=(0.0, 1.0),
-        )
-        self.frame_prefix = declare(
-            self, "frame_prefix", "", "of every frame but world, such as walker_1/"
-        )
-        self.with_robot_state = declare(
-            self,
-            "robot_state",
-            True,
-            "send robot_description and the joints' transforms; false beside a "
-            "robot_state_publisher",
-        )
+        declare_settings(self, Settings, fixed=settings_of(Settings))
         self.begin_participation()
-        self.leg_length = leg_length
-        self.period = round(NANOSECONDS_PER_SECOND / rate)
-        self.footing = Footing(leg_length, foot_length)
-
-        self.transforms = self.publisher(TF)
-        self.markers = self.publisher(MARKERS)
-        if self.with_robot_state:
+        settings = self.settings
+        self._period = round(NANOSECONDS_PER_SECOND / settings.rate)
+        self._footing = Footing(settings.leg_length, settings.foot_length)
+        self.offer(topics.TF)
+        self.offer(topics.MARKERS)
+        if settings.robot_state:
             file = shared_file(PACKAGE, "urdf/sagittal_walker.urdf.xacro")
             lengths = {
-                "leg_length": leg_length,
-                "foot_length": foot_length,
+                "leg_length": settings.leg_length,
+                "foot_length": settings.foot_length,
                 "hip_width": HIP_WIDTH,
             }
             arguments = {name: str(value) for name, value in lengths.items()}
             text = xacro.process_file(str(file), mappings=arguments).toxml()
-            self.publisher(ROBOT_DESCRIPTION).publish(String(data=text))
-        self.look_on(JOINT_STATES, self.on_joint_state)
-        self.look_on(ANKLE_TORQUE, self.on_ankle_torque)
+            self.offer(topics.ROBOT_DESCRIPTION).publish(String(data=text))
+        self._look_on(topics.JOINT_STATES, self._on_joint_state)
+        self._look_on(topics.ANKLE_TORQUE, self._on_ankle_torque)
 
-    def look_on(self, topic: Topic, draw: Any) -> None:
+    def take_parameters(self, read: ReadSettings) -> None:
+        """Take the parameters, none of which may change."""
+        self.settings = read(Settings)
+
+    def _look_on(self, topic: topics.Topic, draw: Any) -> None:
         """Draw from a sampled topic, one message for each picture that is due."""
         latest = -1
 
@@ -112,38 +103,37 @@ class WalkerDisplay(Participant, Node):
             # stamps, so that body and torque are drawn at the same instants.
             nonlocal latest
             seconds, nanoseconds = _STAMP.unpack_from(data)
-            picture = (seconds * NANOSECONDS_PER_SECOND + nanoseconds) // self.period
+            picture = (seconds * NANOSECONDS_PER_SECOND + nanoseconds) // self._period
             if picture != latest:
                 latest = picture
                 draw(deserialize_message(data, topic.type))
 
-        self.create_subscription(topic.type, topic.name, take, LOOKING_ON, raw=True)
+        self.create_subscription(topic.type, topic.name, take, topics.LOOKING_ON, raw=True)
 
-    def on_joint_state(self, message: JointState) -> None:
+    def _on_joint_state(self, message: JointState) -> None:
         """Move the body."""
         angles = dict(zip(message.name, message.position, strict=False))
         try:
             hips, ankles = ([angles[p + joint] for p in PREFIXES] for joint in ("hip", "ankle"))
         except KeyError:
             return  # of other joints: the topic is everybody's
-        x, z = self.footing.place(hips, ankles)
+        x, z = self._footing.place(hips, ankles)
         places = [
             (WORLD, "base_footprint", (x, 0.0, 0.0), 0.0),
             ("base_footprint", "base_link", (0.0, 0.0, z), 0.0),
         ]
-        if self.with_robot_state:
+        if self.settings.robot_state:
             for side, prefix in enumerate(PREFIXES):
                 hip = (0.0, (-0.5 if side else 0.5) * HIP_WIDTH, 0.0)
-                ankle = (0.0, 0.0, -self.leg_length)
+                ankle = (0.0, 0.0, -self.settings.leg_length)
                 places += [
                     ("base_link", prefix + "leg", hip, -hips[side]),
                     (prefix + "leg", prefix + "sole", ankle, ankles[side]),
                 ]
-        self.transforms.publish(
-            TFMessage(transforms=[self.transform(message, *place) for place in places])
-        )
+        transforms = [self._transform(message, *place) for place in places]
+        self.publish(topics.TF, TFMessage(transforms=transforms))
 
-    def transform(
+    def _transform(
         self,
         message: JointState,
         parent: str,
@@ -152,42 +142,42 @@ class WalkerDisplay(Participant, Node):
         turn: float,
     ) -> TransformStamped:
         """Return the transform of a frame that is turned about y [rad] in its parent."""
-        found = TransformStamped(child_frame_id=self.frame(child))
-        found.header.stamp, found.header.frame_id = message.header.stamp, self.frame(parent)
+        found = TransformStamped(child_frame_id=self._frame(child))
+        found.header.stamp, found.header.frame_id = message.header.stamp, self._frame(parent)
         x, y, z = place
         found.transform.translation = Vector3(x=x, y=y, z=z)
         found.transform.rotation = Quaternion(y=math.sin(turn / 2), w=math.cos(turn / 2))
         return found
 
-    def on_ankle_torque(self, message: AnkleTorque) -> None:
+    def _on_ankle_torque(self, message: AnkleTorque) -> None:
         """Draw the torque at both ankles, each in the frame of its leg."""
         markers = []
         for side in Side:
             intrinsic, delivered = message.intrinsic[side], message.delivered[side]
             color = ACTING if message.effective_perturbation[side] else WITHOUT_EFFECT
-            spring = self.marker(message, side, "ankle_spring", SPRING)
-            tip = self.scale * intrinsic
+            spring = self._marker(message, side, "ankle_spring", SPRING)
+            tip = self.settings.torque_scale * intrinsic
             draw_arc(spring, SPRING_RADIUS, 0.0, tip)
-            robot = self.marker(message, side, "ankle_robot", color)
-            draw_arc(robot, ROBOT_RADIUS, tip, tip + self.scale * delivered)
-            pulse = self.marker(message, side, "pulse", color)
+            robot = self._marker(message, side, "ankle_robot", color)
+            draw_arc(robot, ROBOT_RADIUS, tip, tip + self.settings.torque_scale * delivered)
+            pulse = self._marker(message, side, "pulse", color)
             pulse.type, pulse.scale = Marker.SPHERE, Vector3(x=0.13, y=0.13, z=0.13)
             pulse.action = Marker.ADD if delivered else Marker.DELETE
             markers += [spring, robot, pulse]
-        self.markers.publish(MarkerArray(markers=markers))
+        self.publish(topics.MARKERS, MarkerArray(markers=markers))
 
-    def marker(self, message: AnkleTorque, side: Side, name: str, color: ColorRGBA) -> Marker:
+    def _marker(self, message: AnkleTorque, side: Side, name: str, color: ColorRGBA) -> Marker:
         """Return a marker at an ankle, as its leg is turned."""
         marker = Marker(ns=name, id=side, color=color)
         marker.header.stamp = message.header.stamp
-        marker.header.frame_id = self.frame(PREFIXES[side] + "leg")
-        marker.pose.position = Point(y=-OUTSIDE if side else OUTSIDE, z=-self.leg_length)
+        marker.header.frame_id = self._frame(PREFIXES[side] + "leg")
+        marker.pose.position = Point(y=-OUTSIDE if side else OUTSIDE, z=-self.settings.leg_length)
         marker.pose.orientation.w = 1.0
         return marker
 
-    def frame(self, name: str) -> str:
+    def _frame(self, name: str) -> str:
         """Return the full name of a frame."""
-        return name if name == WORLD else self.frame_prefix + name
+        return name if name == WORLD else self.settings.frame_prefix + name
 
 
 def draw_arc(marker: Marker, radius: float, begin: float, end: float) -> None:

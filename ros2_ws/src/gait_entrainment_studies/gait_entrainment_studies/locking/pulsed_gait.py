@@ -169,7 +169,6 @@ class PulsedGait:
         self.steps_per_pulse = steps_per_pulse
         p = parameters
         self.heel_strike, self.toe_off = p.double_stance_start, p.max_plantarflexion
-        self._lengths = p.leg_length, p.foot_length, p.toe_separation
         self._per_energy = 2 / (p.mass * p.leg_length**2)
         self._per_drop = 2 * p.gravity / p.leg_length
         self._kept = p.floquet_multiplier
@@ -271,9 +270,9 @@ class PulsedGait:
 
     def _posture(self, angle: Floats) -> tuple[Floats, Floats, Floats]:
         """Sine and cosine of the leading leg's angle, and its change per ankle angle."""
-        sine = _FORMS.leg_sine(np.cos(angle), *self._lengths)
+        sine = _FORMS.leg_sine(self.parameters, np.cos(angle))
         cosine = np.sqrt(1 - sine**2)
-        return sine, cosine, _FORMS.leg_per_ankle(np.sin(angle), cosine, *self._lengths[1:])
+        return sine, cosine, _FORMS.leg_per_ankle(self.parameters, np.sin(angle), cosine)
 
     def _velocity(self, angle: Floats, apex: Floats, start: Floats) -> Floats:
         """Rate of the ankle angle [rad/s] with the pulse on since `start`."""
@@ -307,7 +306,7 @@ class PulsedGait:
             tail = np.abs(integrand @ _TAILS.T).sum(axis=-1)
             by_apex = -0.5 * half * ((integrand / square[..., 1:-1]) @ _WEIGHTS)
         force = self._pendulum_force(cosine, square)
-        force = force - _FORMS.unloading_arm(np.sin(angle), sine, *self._lengths) * torque
+        force = force - _FORMS.unloading_arm(self.parameters, np.sin(angle), sine) * torque
         time, converged = half * total, tail <= 0.5 * _TAIL_TOLERANCE * total
         sound = (converged & (force >= 0).all(axis=-1)) | (half <= 0)
         rough = ~converged & (square > 0).all(axis=-1) & (half > 0)
@@ -356,8 +355,7 @@ class PulsedGait:
             return _Stretch(time, by_apex, moving & (struck >= 0))
 
     def _pendulum_force(self, cosine: Any, square: Floats) -> Any:
-        p = self.parameters
-        return _FORMS.pendulum_force(cosine, square, p.mass, p.gravity, p.leg_length)
+        return _FORMS.pendulum_force(self.parameters, cosine, square)
 
     def _collide(self, apex: Floats) -> Floats:
         return self._kept * apex - (1 - self._kept) * self._strike_gain

@@ -1,0 +1,86 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Write a driver and run the conformance kit on it: python ankle_robot_driver.py.
+
+What each call must do stands in the docstring of ``gait_entrainment.robot.AnkleRobot``.
+"""
+
+import math
+from dataclasses import dataclass
+
+from gait_entrainment.robot import (
+    AnkleRobot,
+    Capabilities,
+    DeviceError,
+    Driver,
+    RobotState,
+    TorqueProfile,
+)
+from gait_entrainment_drivers.conformance import run_checks
+
+
+@dataclass(frozen=True)
+class Options:
+    """Nothing can be chosen of this robot."""
+
+
+class SquareRobot(AnkleRobot):
+    """A simulated robot that delivers what it is asked for, and measures it."""
+
+    Options = Options
+    capabilities = Capabilities(
+        peak_torque=30.0,  # N m
+        torque_rate=math.inf,
+        own_pulse_timer=True,
+        measures_torque=True,
+        simulated=True,
+        state_rate=0.0,  # one state for each change of torque
+    )
+
+    def __init__(self, side, options, seed):
+        self.side = side
+        self.begin(0)
+
+    def configure(self):
+        self.stopped = False
+
+    def activate(self):
+        pass
+
+    def begin(self, start):
+        self.train, self.promised, self.states = None, start, []
+
+    def schedule(self, train):
+        if self.stopped:
+            raise DeviceError("stopped: close and configure first")
+        self.train = train
+
+    def cancel(self):
+        self.train = None
+
+    def promise(self, until):
+        begin, self.promised, train = self.promised, until, self.train
+        numbers = range(train.count) if train else ()
+        edges = {edge for n in numbers for edge in (train.onset(n), train.end(n))}
+        times = [begin, *sorted(edge for edge in edges if begin < edge < until)]
+        torques = [train.torque_at(time) if train else 0.0 for time in times]
+        onsets = train.onsets_within(begin, until) if train else ()
+        for time, torque in zip(times, torques, strict=True):
+            self.states.append(RobotState(time, torque, torque, math.nan))
+        return TorqueProfile(self.side, tuple(times), tuple(torques), onsets, until)
+
+    def read(self):
+        states, self.states = self.states, []
+        return states
+
+    def stop(self):
+        self.stopped, self.train = True, None
+
+    deactivate = close = cancel
+
+
+if __name__ == "__main__":
+    for result in run_checks(Driver("square", SquareRobot, Options())):
+        print(f"{result.check:26} {result.broken or 'kept'}")

@@ -1,0 +1,112 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Publishers that count what they send and lose none of it."""
+
+import math
+import time
+from collections.abc import Callable
+from typing import Any
+
+import rclpy
+from rclpy.duration import Duration
+
+from gait_entrainment_nodes.messaging.raw_messages import serialize
+from gait_entrainment_nodes.messaging.topics import Topic
+
+# While the slowest reader catches up, a full writer is tried again this often [s].
+RETRY_PERIOD = 0.002
+# How long to wait at a time [s] before looking whether the node is to stop.
+PATIENCE = 0.1
+# A writer that waits for a reader says so in the log this often [s].
+LAG_REPORT_PERIOD = 1.0
+
+
+class StopRequestedError(Exception):
+    """The node must end while a publisher waits for a slow reader."""
+
+
+class CountedPublisher:
+    """
+    A publisher that counts, and that waits for a slow reader rather than lose a message.
+
+    Its node has an attribute ``stopping``, which ends the waiting.
+    """
+
+    def __init__(self, node: Any, topic: Topic) -> None:
+        self._node = node
+        self._publisher = node.create_publisher(topic.type, topic.name, topic.qos)
+        self.count = 0
+
+    @property
+    def topic_name(self) -> str:
+        """Fully qualified name of the topic."""
+        return str(self._publisher.topic_name)
+
+    @property
+    def matched(self) -> int:
+        """Number of subscriptions that will receive what is published from now on."""
+        return int(self._publisher.get_subscription_count())
+
+    @property
+    def unmatched(self) -> int:
+        """Number of known subscriptions that are not matched yet."""
+        return max(int(self._node.count_subscribers(self.topic_name)) - self.matched, 0)
+
+    def publish(self, message: Any) -> None:
+        """
+        Publish a message, or its serialized bytes; wait while the history is full.
+
+        Raises
+        ------
+        StopRequestedError
+            if the node is to stop meanwhile.
+
+        """
+        data = message if isinstance(message, bytes) else serialize(message)
+        if not self._published(data):
+            self._repeat(lambda: self._published(data, after=RETRY_PERIOD))
+        self.count += 1
+
+    def wait_until_received(self, timeout: float) -> bool:
+        """Wait up to a time [s]; return whether every reader has received what was published."""
+        return bool(self._publisher.wait_for_all_acked(Duration(seconds=timeout)))
+
+    def wait_for_readers(self, patience: float = math.inf) -> bool:
+        """
+        Wait as ``wait_until_received`` does, and report a reader that does not keep up.
+
+        Raises
+        ------
+        StopRequestedError
+            if the node is to stop meanwhile.
+
+        """
+        return self._repeat(lambda: self.wait_until_received(PATIENCE), patience)
+
+    def _published(self, data: bytes, after: float = 0.0) -> bool:
+        if after:
+            time.sleep(after)
+        try:
+            self._publisher.publish(data)
+        except RuntimeError:  # rclpy's RCLError: the history is full
+            return False
+        return True
+
+    def _repeat(self, attempt: Callable[[], bool], patience: float = math.inf) -> bool:
+        """Repeat an attempt until it succeeds; False if it does not within a time [s]."""
+        give_up = time.monotonic() + patience
+        report_at = time.monotonic() + LAG_REPORT_PERIOD
+        while not attempt():
+            if self._node.stopping or not rclpy.ok():
+                raise StopRequestedError
+            if time.monotonic() > give_up:
+                return False
+            if time.monotonic() > report_at:
+                report_at += LAG_REPORT_PERIOD
+                readers = self._node.get_subscriptions_info_by_topic(self.topic_name)
+                names = ", ".join(sorted({reader.node_name for reader in readers}))
+                self._node.get_logger().warning(
+                    f"{self.topic_name} waits: one of its readers does not keep up ({names})"
+                )
+        return True

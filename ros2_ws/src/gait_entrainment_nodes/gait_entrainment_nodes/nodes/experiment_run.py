@@ -1,0 +1,284 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+One run of the experiment: what it promises, who owes it an answer and since when, without a node.
+
+What to perturb and when is decided by the core's Conductor. The run answers each progress of the
+walker, once it holds all events that the progress covers, with a horizon; while pulses are being
+requested it promises nothing.
+"""
+
+import math
+import time
+from collections.abc import Callable
+from typing import Any
+
+from gait_entrainment.errors import EntrainmentError
+from gait_entrainment.experiment import Conductor, Phase
+from gait_entrainment.messages import event_of, nanoseconds_of
+from gait_entrainment.protocol import ProtocolError
+from gait_entrainment.robot import PulseTrain
+from gait_entrainment_msgs import msg
+from gait_entrainment_nodes.messaging import topics
+from gait_entrainment_nodes.messaging.stamps import header, to_time
+
+# How long the reason of the perturbator may come after its effect [s]: they are on two topics.
+REASON_TIMEOUT = 0.5
+PERTURBATOR, WALKER, RECORDER = "perturbator", "walker_sim", "bag_recorder"
+
+
+class ExperimentError(EntrainmentError):
+    """The run cannot go on; ``blamed`` is the node whose log may say more, "" if none."""
+
+    def __init__(self, message: str, blamed: str = "") -> None:
+        super().__init__(message)
+        self.blamed = blamed
+
+
+class Run:
+    """
+    One run, from when its participants are brought together to the walker's last word.
+
+    Parameters
+    ----------
+    number
+        Of the run.
+    publish
+        Publishes a message on a topic.
+    request
+        Asks the perturbator for pulses; ``take_answer`` is told what it answers.
+    recorded
+        Whether the walker waits for a recorder.
+    clock
+        Steady time [s].
+
+    """
+
+    def __init__(
+        self,
+        number: int,
+        publish: Callable[[topics.Topic, Any], None],
+        request: Callable[[PulseTrain], None],
+        *,
+        recorded: bool,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.number = number
+        self.conductor: Conductor | None = None  # once the walker has started
+        self.known_until = 0  # all events up to this instant have been seen [ns since 1970]
+        self.promised_until = 0  # by the latest horizon [ns since 1970]; 0 before the first
+        self.final: msg.Progress | None = None  # the walker's last word
+        self.failure: ExperimentError | None = None
+        self.trouble = ""  # what the perturbator has reported
+        self.activated = False  # the perturbator is, for this run
+        self.stopped_at: float | None = None  # it ended or refused torque, steady time [s]
+        self.closing = self.closed = False  # the closing horizon was sent, was answered
+        self._publish, self._request = publish, request
+        self._recorded, self._clock = recorded, clock
+        self._events = 0
+        self._progress: msg.Progress | None = None  # received, not answered yet
+        self._grant = self._recorded_grant = -1
+        self._horizons = self._profiles = 0  # sent, and received in answer
+        self._planning = False  # pulses were requested and not accepted yet
+        self._shown: tuple[Phase, int] | None = None
+        self.forgive()
+
+    @property
+    def over(self) -> bool:
+        """Whether the walker has said its last word, or the run has failed."""
+        return self.final is not None or self.failure is not None
+
+    def begin(self, conductor: Conductor, start: int) -> None:
+        """Make the first promise: the walker has started, heel strike 0 is at [ns since 1970]."""
+        self.conductor = conductor
+        if self.trouble:
+            self.fail(self.trouble_error())
+        else:
+            self._promise(conductor, start)
+
+    def fail(self, error: ExperimentError) -> None:
+        """End the run, if it is not over."""
+        if not self.over:
+            self.failure = error
+
+    def close(self) -> None:
+        """
+        Promise that the run is over at the end of what was promised.
+
+        After the answer nobody has torque left to stop, and deactivation says nothing new. In
+        real time the walker may be past that end already, if the last promise came late.
+        """
+        self.closing = True
+        self.known_until = max(self.promised_until, self.known_until)
+        self._send_horizon(self.known_until, last=True)
+
+    def state(self, phase: Phase, message: str = "") -> msg.ExperimentState:
+        """Return phase and progress of the protocol, for people."""
+        state = msg.ExperimentState(
+            header=header(self.known_until),
+            run=self.number,
+            phase=phase,
+            message=message,
+            measured_period=math.nan,
+            measured_period_error=math.nan,
+            pulse_period=math.nan,
+        )
+        if (conductor := self.conductor) is not None:
+            state.strides = conductor.protocol.strides
+            state.stride = min(conductor.strides, state.strides)
+            state.measured_period = conductor.measured_period
+            state.measured_period_error = conductor.measured_period_error
+            if conductor.train is not None:
+                state.pulse_period = conductor.train.period
+                state.first_onset = to_time(conductor.train.first_onset)
+        return state
+
+    # What comes in
+
+    def take_event(self, event: msg.GaitEvent) -> None:
+        """Take one gait event; request the pulses when it is time."""
+        if self.conductor is None:
+            return
+        self._events += 1
+        try:
+            train = self.conductor.add_event(event_of(event))
+        except ProtocolError as error:
+            self.fail(ExperimentError(str(error)))
+            return
+        if train is not None:
+            self._planning, self._planning_at = True, self._clock()
+            self._request(train)
+        self._answer()
+
+    def take_progress(self, progress: msg.Progress) -> None:
+        """Take the walker's progress; it is answered once all that it covers is here."""
+        if self.conductor is None:
+            return
+        if self._progress is None:  # else this one only repeats that an answer is owed
+            self._progress_at = self._clock()
+        self._progress = progress
+        if self._recorded_grant >= self._grant:
+            self._recorded_at = self._clock()
+        self._grant = progress.grant
+        self._answer()
+
+    def take_recorder_progress(self, progress: msg.Progress) -> None:
+        """Note how far the recorder is, to name it if it is what the walker waits for."""
+        self._recorded_at, self._recorded_grant = self._clock(), progress.grant
+
+    def take_profile(self, profile: msg.TorqueProfile) -> None:
+        """Note that the perturbator has answered a horizon, or has ended the torque."""
+        if profile.stop:
+            self._note_stop()
+        else:
+            self._profiles += 1
+            self._profile_at = self._clock()
+            self.closed = self.closing
+
+    def take_trouble(self, trouble: msg.Trouble) -> None:
+        """Take what the perturbator reports; a fault that has ended the torque ends the run."""
+        latched = trouble.kind == msg.Trouble.LATCHED
+        # In a run somebody else may ask for pulses and be refused.
+        if latched or self._planning or self.conductor is None:
+            self.trouble = trouble.message
+        if latched and self.conductor is not None:
+            self.fail(self.trouble_error())
+
+    def take_answer(self, accepted: bool) -> None:
+        """Go on once the perturbator has accepted the pulses; why it has not may come later."""
+        if not accepted:
+            self._note_stop()
+            return
+        self.trouble = ""  # about somebody else's pulses
+        self._planning = False
+        self._answer()
+
+    def _note_stop(self) -> None:
+        if self.stopped_at is None:
+            self.stopped_at = self._clock()
+
+    # What goes out
+
+    def _answer(self) -> None:
+        """Answer the latest progress with a horizon, unless something is still to come."""
+        progress, conductor = self._progress, self.conductor
+        if progress is None or conductor is None or self._planning or self.over:
+            return
+        if self._events < progress.events:
+            return
+        self._progress = None
+        self.known_until = nanoseconds_of(progress.header.stamp)
+        if progress.state != msg.Progress.WALKING:
+            self.final = progress
+            return
+        self._promise(conductor, self.known_until)
+        shown = (conductor.phase(self.known_until), conductor.strides)
+        if shown != self._shown:
+            self._shown = shown
+            self._publish(topics.EXPERIMENT_STATE, self.state(shown[0]))
+
+    def _promise(self, conductor: Conductor, known_until: int) -> None:
+        """Promise how far no new pulse will be requested."""
+        self.known_until = known_until
+        horizon = conductor.horizon(known_until)
+        # In real time progress goes on while the last stretch is walked.
+        if horizon.until != self.promised_until:
+            self._send_horizon(horizon.until, horizon.last)
+
+    def _send_horizon(self, until: int, last: bool) -> None:
+        """Publish a horizon, which is owed an answer from now on."""
+        self.promised_until = until
+        known, until_time = header(self.known_until), to_time(until)
+        horizon = msg.Horizon(header=known, run=self.number, until=until_time, last=last)
+        self._publish(topics.HORIZON, horizon)
+        if self._horizons == self._profiles:
+            self._profile_at = self._clock()
+        self._horizons += 1
+
+    # Who is silent
+
+    def forgive(self) -> None:
+        """Count silence from now: what arrived has not been heard, this process was held up."""
+        now = self._clock()
+        self._progress_at = self._profile_at = self._planning_at = self._recorded_at = now
+
+    def check(self, silence_timeout: float) -> None:
+        """Fail if somebody has owed an answer for too long [s], or torque ended without reason."""
+        if self.conductor is None or self.over:
+            return
+        now, stopped_at = self._clock(), self.stopped_at
+        if stopped_at is not None and (self.trouble or now > stopped_at + REASON_TIMEOUT):
+            self.fail(self.trouble_error())
+            return
+        asked_at, silent = self._debt()
+        if asked_at < now - silence_timeout:
+            what = f"{silent} has been silent"
+            if silent == WALKER and self._progress is not None:
+                total = self._progress.events
+                what = f"{WALKER}: {total - self._events} of {total} gait events missing"
+            self.fail(ExperimentError(f"{what} for {silence_timeout:g} s", silent))
+
+    def _debt(self) -> tuple[float, str]:
+        """Return since when an answer has been owed, on steady time [s], and by whom."""
+        if self._planning:
+            return self._planning_at, PERTURBATOR
+        if self._horizons > self._profiles:
+            return self._profile_at, PERTURBATOR
+        if self._recorded and self._recorded_grant < self._grant:
+            # In lock-step the walker waits for the recorder, rightly.
+            return self._recorded_at, RECORDER
+        return max(self._progress_at, self._profile_at), WALKER
+
+    # What the perturbator has to say
+
+    def fail_if_troubled(self) -> None:
+        """Raise ExperimentError if the perturbator has reported trouble or ended the torque."""
+        if self.trouble or self.stopped_at is not None:
+            raise self.trouble_error()
+
+    def trouble_error(self, what: str = "") -> ExperimentError:
+        """Return the error that says why the perturbator did ``what`` it did."""
+        reason = self.trouble or "it ended the torque or refused it, and gave no reason"
+        blamed = "" if self.trouble else PERTURBATOR
+        return ExperimentError(f"{PERTURBATOR}{what}: {reason}", blamed)

@@ -1,0 +1,132 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""One run of the analyzer: events and onsets in, results out, without a node."""
+
+from dataclasses import asdict
+from typing import Any
+
+from gait_entrainment.conventions import Side
+from gait_entrainment.gait import (
+    Entrainment,
+    GaitAnalyzer,
+    GaitEvent,
+    PulsePhase,
+    Stride,
+    VerdictSettings,
+)
+from gait_entrainment.gait.analyzer import Result
+from gait_entrainment.messages import result_values
+from gait_entrainment.robot import MeasuredOnsets, RobotState, TorqueProfile
+from gait_entrainment_nodes.messaging import topics
+from gait_entrainment_nodes.messaging.stamps import header, to_time
+
+# Where each kind of result is published.
+RESULTS: dict[type, topics.Topic] = {
+    Stride: topics.STRIDES,
+    PulsePhase: topics.PULSE_PHASES,
+    Entrainment: topics.ENTRAINMENT,
+}
+
+
+class Run:
+    """
+    One run; all instants are [ns since 1970].
+
+    What is added may complete results; they are returned in the order of publishing.
+
+    Parameters
+    ----------
+    number
+        Of the run.
+    side
+        The perturbed leg.
+    settings
+        Of the verdict.
+    measured
+        Whether a pulse begins where the robot's measured torque rises, not where it was promised.
+
+    """
+
+    def __init__(
+        self, number: int, side: Side, settings: VerdictSettings, *, measured: bool
+    ) -> None:
+        self.number, self.side = number, side
+        self.promised_until = 0  # all pulses up to this instant are known
+        self.end: int | None = None  # of the walk, once it is known
+        self._analyzer = GaitAnalyzer(side, settings)
+        self._measured = MeasuredOnsets() if measured else None
+        self._events = 0
+        self._closed = False  # nothing will be promised any more
+        self._events_expected = 0
+        self._doubts: dict[str, int] = {}  # counts of suspicious events, as reported last
+
+    @property
+    def complete(self) -> bool:
+        """Whether the walk has ended and everything about it is here."""
+        if self.end is None or self._events < self._events_expected:
+            return False
+        if self.promised_until < self.end:
+            return False
+        # With measured onsets the state at the closing instant is the last one.
+        return self._measured is None or (
+            self._closed and self._measured.states_until >= self.promised_until
+        )
+
+    def add_event(self, event: GaitEvent) -> list[Result]:
+        """Take one gait event."""
+        self._events += 1
+        return self._analyzer.add_event(event)
+
+    def stop(self, instant: int) -> None:
+        """Take the instant from which on there is no torque."""
+        self._analyzer.stop(instant)
+        if self._measured is not None:
+            self._measured.stop(instant)
+
+    def add_profile(self, profile: TorqueProfile) -> list[Result]:
+        """Take the onsets that are promised."""
+        self.promised_until = profile.valid_until
+        self._closed = not profile.has_length
+        if self._measured is None:
+            return self._analyzer.add_promise(list(profile.onsets), profile.valid_until)
+        known = self._measured.add_promise(list(profile.onsets), profile.valid_until)
+        return self._analyzer.add_promise(*known)
+
+    def add_pulse(self, onset: int, torque: float, duration: float) -> list[Result]:
+        """Take height [N m] and width [s] of a pulse, by which its measured onset is known."""
+        assert self._measured is not None
+        return self._analyzer.add_promise(*self._measured.add_pulse(onset, torque, duration))
+
+    def add_state(self, state: RobotState) -> list[Result]:
+        """Take the torque that the robot measured."""
+        assert self._measured is not None
+        return self._analyzer.add_promise(*self._measured.add_state(state))
+
+    def end_at(self, instant: int, events: int) -> None:
+        """Note that the walk ended at an instant, with this many events."""
+        self.end, self._events_expected = instant, events
+
+    def finish(self, end: int) -> list[Result]:
+        """Return what was waiting for more: the run is over at an instant."""
+        results = []
+        if self._measured is not None:
+            results += self._analyzer.add_promise(self._measured.finish(), end)
+        return results + self._analyzer.finish()
+
+    def new_doubts(self) -> dict[str, int]:
+        """Return counts of missing, doubled, late or contradictory events; {} if as before."""
+        doubts = asdict(self._analyzer.event_counts)
+        del doubts["accepted"]
+        if not any(doubts.values()) or doubts == self._doubts:
+            return {}
+        self._doubts = doubts
+        return doubts
+
+    def message_of(self, result: Result) -> Any:
+        """Return the message that publishes a result."""
+        values = result_values(result, self.side)
+        values["header"] = header(values["header"])
+        for name in values.keys() & {"start", "toe_off"}:
+            values[name] = to_time(values[name])
+        return RESULTS[type(result)].type(run=self.number, **values)

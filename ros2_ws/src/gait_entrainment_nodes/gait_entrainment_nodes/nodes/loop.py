@@ -1,0 +1,100 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+The loop that every node runs in, and its clean stop.
+
+It is a series of ``spin_once`` of the EventsExecutor, which receives ten times as much as the
+default executor; between two calls the node meets its own deadlines on steady time.
+"""
+
+import signal
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+import rclpy
+from rclpy.exceptions import ParameterException
+from rclpy.experimental import EventsExecutor
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+
+# The longest time [s] that the loop sleeps in the executor, so that a signal is soon obeyed.
+LONGEST_SLEEP = 0.1
+
+
+def run_node(make_node: Callable[[], Any]) -> int:
+    """
+    Run a node until it is finished, it fails, or SIGINT or SIGTERM arrives.
+
+    Returns
+    -------
+    int
+        0 for a clean stop, 1 for a failure, 2 for an argument or a parameter that was refused;
+        the reason is one line on standard error, after the traceback of an unforeseen failure.
+
+    """
+    stop_requested = False
+    node: Any = None
+
+    def request_stop(*_: object) -> None:
+        nonlocal stop_requested
+        stop_requested = True
+        if node is not None:
+            node.stopping = True
+
+    # rclpy's own handlers shut the context down at once: no last message could be sent.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, request_stop)
+    name = sys.argv[0].rpartition("/")[2]
+    try:
+        try:
+            _join_ros()
+            node = make_node()
+            node.offer_ready()
+        except (ParameterException, ValueError, RuntimeError) as error:
+            print(f"{name}: {' '.join(str(error).split())}", file=sys.stderr)
+            return 2
+        executor = EventsExecutor()
+        executor.add_node(node)
+        try:
+            while not (stop_requested or node.finished or node.failure):
+                _serve_once(executor, node)
+        except Exception as error:
+            node.fail_with(error)
+        node.end()
+        executor.shutdown()
+        if node.failure:
+            print(f"{name}: {node.failure}", file=sys.stderr)
+            return 1
+        return 0
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+
+
+def _join_ros() -> None:
+    """Initialize rclpy with the arguments of the process; ValueError if it cannot read them."""
+    try:
+        rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:  # one of several errors that rclpy does not export
+        raise ValueError(f"the ROS arguments cannot be read: {error}") from None
+    if extra := remove_ros_args(sys.argv)[1:]:
+        raise ValueError(
+            f"unknown argument {extra[0]!r}; allowed: --ros-args -p PARAMETER:=VALUE ..."
+        )
+
+
+def _serve_once(executor: Any, node: Any) -> None:
+    """Serve ROS until the node's deadline, but not for long, and do what is due then."""
+    deadline = node.next_deadline()
+    sleep = LONGEST_SLEEP
+    if deadline is not None:
+        sleep = min(max(deadline - time.monotonic(), 0.0), LONGEST_SLEEP)
+    executor.spin_once(timeout_sec=sleep)
+    node.publish_state()
+    deadline = node.next_deadline()
+    if deadline is not None and time.monotonic() >= deadline:
+        node.on_deadline()

@@ -1,0 +1,245 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What every node of an experiment has: parameters, counted topics, readiness, diagnostics."""
+
+import functools
+import time
+import traceback
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.impl.rcutils_logger import RcutilsLogger
+from rclpy.node import Node
+
+from gait_entrainment_msgs.msg import PublishedCounts
+from gait_entrainment_msgs.srv import Ready
+from gait_entrainment_nodes.messaging.publisher import CountedPublisher, StopRequestedError
+from gait_entrainment_nodes.messaging.stamps import header
+from gait_entrainment_nodes.messaging.topics import DIAGNOSTICS, PUBLISHED_COUNTS, Topic
+from gait_entrainment_nodes.nodes.parameters import read_settings, refuse_unknown_parameters
+
+# How often a node publishes its state on /diagnostics [s]; rqt calls it stale after 5 s.
+STATE_PERIOD = 1.0
+# At the end of a node its last messages, a stop among them, have this long to arrive [s].
+LAST_WORDS = 0.5
+
+# Makes a settings dataclass, with its prefix if it has one, from the values of parameters.
+ReadSettings = Callable[..., Any]
+
+
+class Participant(Node):
+    """
+    A node that takes part in a run.
+
+    A node declares its parameters, calls ``begin_participation``, then makes its publishers,
+    subscriptions and services.
+    """
+
+    get_logger: Callable[[], RcutilsLogger]  # which rclpy does not type
+    hardware_id = "none"  # of the hardware that its diagnostics are about
+    stopping = False  # set from outside: the node is to end
+    failure: str | None = None  # why the node must end with exit code 1
+    finished = False  # set to end the loop with exit code 0
+    run: Any = None  # the run that goes on, with its ``number``; None between runs
+
+    def begin_participation(self) -> None:
+        """
+        Set up what every participant has.
+
+        Raises ValueError if a parameter is unknown, or the values do not fit each other.
+        """
+        refuse_unknown_parameters(self)
+        self._read_parameters({})
+        self.add_on_set_parameters_callback(self._on_set_parameters)
+        self._offered: list[CountedPublisher] = []
+        self._counted: list[CountedPublisher] = []
+        self._publisher_of: dict[str, CountedPublisher] = {}  # by name in the table of topics
+        self.offer(DIAGNOSTICS)
+        self._state_due = 0.0  # when to publish the state, steady time [s]
+        self.note_state(DiagnosticStatus.OK, "ready")
+        # Not counted itself: its message says what the others published.
+        self.offer(PUBLISHED_COUNTS, counted=False)
+
+    # Parameters
+
+    def why_fixed(self, name: str) -> str:
+        """Return why a parameter that is not read-only cannot change now, or an empty text."""
+        del name
+        going_on = self.run is not None
+        return f"run {self.run.number} goes on; change it between runs" if going_on else ""
+
+    def take_parameters(self, read: ReadSettings) -> None:
+        """
+        Take the values of all parameters, at the start and at each change.
+
+        Raises ValueError if they do not fit each other; then nothing has been taken.
+        """
+
+    def _read_parameters(self, changes: dict[str, Any]) -> None:
+        def value(name: str) -> Any:
+            return changes[name] if name in changes else self.get_parameter(name).value
+
+        self.take_parameters(functools.partial(read_settings, value))
+
+    def _on_set_parameters(self, changes: Sequence[Any]) -> SetParametersResult:
+        """Take a change or refuse it with the reason; types and ranges have been checked."""
+        values = {change.name: change.value for change in changes}
+        try:
+            for name, value in values.items():
+                reason = self.why_fixed(name)
+                if name == "use_sim_time":
+                    reason = "which clock counts is decided when the node starts"
+                if reason:
+                    raise ValueError(f"{name}: {value!r} is refused: {reason}")
+            self._read_parameters(values)
+        except ValueError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    # Topics
+
+    def offer(self, topic: Topic, *, counted: bool = True) -> CountedPublisher:
+        """Create a publisher, for ``publish``; the recorder is told what a counted one sent."""
+        publisher = CountedPublisher(self, topic)
+        self._publisher_of.setdefault(topic.name, publisher)
+        self._offered.append(publisher)
+        if counted:
+            self._counted.append(publisher)
+        return publisher
+
+    def publish(self, topic: Topic, message: Any) -> None:
+        """Publish a message, or its bytes, on a topic that was offered."""
+        self._publisher_of[topic.name].publish(message)
+
+    def subscribe(self, topic: Topic, callback: Callable[[Any], None]) -> None:
+        """Create a subscription with the quality of service of its topic."""
+        self.create_subscription(topic.type, topic.name, callback, topic.qos)
+
+    def subscribe_to_run(self, topic: Topic, callback: Callable[[Any, Any], None]) -> None:
+        """Have each message of the run that goes on handed to a callback, behind the run."""
+
+        def take(message: Any) -> None:
+            if (run := self.run_of(message)) is not None:
+                callback(run, message)
+
+        self.subscribe(topic, take)
+
+    def run_of(self, message: Any) -> Any:
+        """Return the run that a message belongs to, None if that does not go on."""
+        return self.run if self.run is not None and message.run == self.run.number else None
+
+    def publish_counts(self, run: int, stamp: int) -> None:
+        """Tell the recorder, at the end of a run, how many messages were published."""
+        counts = PublishedCounts(
+            header=header(stamp),
+            run=run,
+            node=self.get_fully_qualified_name(),
+            topics=[publisher.topic_name for publisher in self._counted],
+            counts=[publisher.count for publisher in self._counted],
+        )
+        self.publish(PUBLISHED_COUNTS, counts)
+
+    # Readiness
+
+    def offer_ready(self) -> None:
+        """
+        Offer ``~/ready``, after everything else that the node offers and listens to.
+
+        Discovery announces the endpoints of a node in the order in which they were made: whoever
+        sees this service knows all of the node's subscriptions.
+        """
+        self.create_service(Ready, "~/ready", self._on_ready)
+
+    def not_ready(self) -> str:
+        """
+        Return what this node waits for before a run, or an empty text.
+
+        It is ready once every known subscription of its topics is matched, so that the first
+        message that must arrive will arrive.
+        """
+        waiting = [p.topic_name for p in self._offered if p.unmatched]
+        return f"subscriptions of {', '.join(waiting)}" if waiting else ""
+
+    def _on_ready(self, _: Ready.Request, response: Ready.Response) -> Ready.Response:
+        response.waiting_for = self.not_ready()
+        response.ready = not response.waiting_for
+        response.topics = [publisher.topic_name for publisher in self._offered]
+        response.matched = [publisher.matched for publisher in self._offered]
+        return response
+
+    # Diagnostics
+
+    def diagnose(self, stamp: int, level: bytes, message: str, **values: object) -> None:
+        """Publish what happened in a run; it is this node's state until the next is noted."""
+        self.note_state(level, message, **values)
+        self._publish_status("run", stamp)
+
+    def note_state(self, level: bytes, message: str, **values: object) -> None:
+        """Note how this node is, for ``publish_state``."""
+        pairs = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+        self._status = DiagnosticStatus(level=level, message=message, values=pairs)
+
+    def publish_state(self) -> None:
+        """Publish the state if it is due, so that everybody sees that this node is there."""
+        if time.monotonic() >= self._state_due:
+            self._state_due = time.monotonic() + STATE_PERIOD
+            self._publish_status("state", self.get_clock().now().nanoseconds)
+            # Published from the first moment on: a recorder that starts later has lost nothing.
+            self._publisher_of[DIAGNOSTICS.name].count -= 1
+
+    def _publish_status(self, what: str, stamp: int) -> None:
+        status = self._status
+        status.name = f"{self.get_fully_qualified_name().lstrip('/')}: {what}"
+        status.hardware_id = self.hardware_id
+        self.publish(DIAGNOSTICS, DiagnosticArray(header=header(stamp), status=[status]))
+
+    # The loop and its end
+
+    def next_deadline(self) -> float | None:
+        """Return the steady time [s] at which ``on_deadline`` is due; None for never."""
+        return None
+
+    def on_deadline(self) -> None:
+        """Do what was due at the deadline; a late wake-up finds everything that is due."""
+
+    def on_stop(self) -> None:
+        """Bring things to a safe end: torque to zero, files closed."""
+
+    def end(self) -> None:
+        """End the node's part, however it came to its end, and let its last messages arrive."""
+        self.stopping = True
+        try:
+            self.on_stop()
+        except Exception as error:
+            self.fail_with(error)
+        deadline = time.monotonic() + LAST_WORDS
+        for publisher in self._offered:
+            publisher.wait_until_received(max(deadline - time.monotonic(), 0.0))
+
+    def guarded(self, callback: Callable[..., Any]) -> Callable[..., Any]:
+        """
+        Return the callback of an action server or a future, made safe to raise exceptions.
+
+        The EventsExecutor hands on what a subscription, a service or a timer raises, but an
+        exception in a task crashes the process. Here it ends the node in order instead.
+        """
+
+        @functools.wraps(callback)
+        def call(*arguments: Any) -> Any:
+            try:
+                return callback(*arguments)
+            except Exception as error:
+                self.fail_with(error)
+                return None
+
+        return call
+
+    def fail_with(self, error: Exception) -> None:
+        """End the node because of an unforeseen exception, or because it was told to stop."""
+        if isinstance(error, StopRequestedError):
+            return
+        traceback.print_exception(error)
+        self.failure = f"{type(error).__name__}: {error}"

@@ -1,0 +1,189 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+One run of the ankle robot: answers horizons with promised torque, without a node.
+
+A horizon that lies no further than what is known closes the run: it is answered with a profile
+without length, after which there is no torque that could be stopped.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from gait_entrainment.robot import GuardedRobot, PulseTrain, RobotState, TorqueProfile
+from gait_entrainment.robot.faults import STOPPED
+from gait_entrainment_msgs import msg
+from gait_entrainment_msgs.action import DeliverPulseTrain
+from gait_entrainment_nodes.messaging import topics
+from gait_entrainment_nodes.messaging.stamps import header, to_time
+
+Result = DeliverPulseTrain.Result
+
+
+class Run:
+    """
+    One run, from its first horizon to its closing one; all instants are [ns since 1970].
+
+    Parameters
+    ----------
+    number
+        Of the run.
+    start
+        Instant from which torque is promised.
+    robot
+        That delivers it; active.
+    publish
+        Publishes a message on a topic.
+    end_train
+        Takes the result of a train that was scheduled.
+
+    Raises
+    ------
+    DeviceError
+        if the robot cannot begin a run.
+
+    """
+
+    def __init__(
+        self,
+        number: int,
+        start: int,
+        robot: GuardedRobot,
+        publish: Callable[[topics.Topic, Any], None],
+        end_train: Callable[[Result], None],
+    ) -> None:
+        robot.begin(start)
+        self.number, self._robot = number, robot
+        self._publish, self._train_ended = publish, end_train
+        self.closed = False
+        self._now = self._horizon = start
+        self._last = False  # the run ends at the horizon
+        self._revision = 0
+        self._committed = False  # torque may still come, of a train that was scheduled
+        self._under_way = False  # a train, whose result is still to be told
+
+    def schedule(self, train: PulseTrain) -> None:
+        """Schedule pulses; raises LimitError or DeviceError if the robot does not take them."""
+        self._robot.schedule(train)
+        self._committed = self._under_way = True
+
+    def take_horizon(self, now: int, until: int, *, last: bool) -> None:
+        """
+        Promise torque up to a horizon, of which everything before ``now`` is known.
+
+        A robot in simulated time answers at once and in full. A real one knows its torque only
+        afterwards: what it has measured is promised by ``look_after``, piece by piece.
+
+        Raises
+        ------
+        DeviceError
+            if the driver fails.
+
+        """
+        self._now, self._horizon, self._last = now, until, last
+        self._robot.heard()
+        if now < until:
+            self._deliver()
+            return
+        self._end_train(Result.ENDED, "the run ended before the last pulse")
+        self._publish_profile(TorqueProfile(self._robot.side, (until,), (0.0,), (), until), last)
+        self._publish_zero(until)
+        self._robot.cancel()
+        self._committed = False
+        self.closed = True
+
+    def look_after(self) -> None:
+        """Promise what a real robot has measured since; raises DeviceError if the driver fails."""
+        if self._robot.promised_until < self._horizon:
+            self._deliver()
+        else:  # the next horizon is late, and every state belongs to the record
+            for state in self._robot.read():
+                self._publish_state(state)
+
+    def end_torque(self, outcome: int, reason: str, *, fault: bool = False) -> None:
+        """
+        Bring the torque to zero now, whatever was promised.
+
+        A ``fault`` is told the walker even if no torque was due.
+        """
+        self._robot.cancel()  # the robot first, whatever becomes of the messages
+        self._end_train(outcome, reason)
+        if self._committed or fault:
+            self._committed = False
+            until = to_time(self._robot.promised_until)
+            self._publish_revision(header=header(self._now), valid_until=until, stop=True)
+            self._publish_zero(self._now)
+
+    def _deliver(self) -> None:
+        """Promise what is known of the torque up to the horizon."""
+        robot = self._robot
+        first, train = robot.delivered + 1, robot.train
+        profile = robot.promise(self._horizon)
+        states = robot.read()
+        if profile.valid_until > profile.times[0]:
+            last = self._last and profile.valid_until == self._horizon
+            self._publish_profile(profile, last)
+        for number, onset in enumerate(profile.onsets, first):
+            assert train is not None
+            self._publish_pulse(number, onset, train)
+        for state in states:
+            self._publish_state(state)
+        if not (robot.busy or robot.faults):
+            self._end_train(Result.DELIVERED, "every pulse was delivered")
+
+    def _end_train(self, outcome: int, message: str) -> None:
+        if self._under_way:
+            self._under_way = False
+            delivered = self._robot.delivered
+            self._train_ended(Result(outcome=outcome, message=message, delivered=delivered))
+
+    def _publish_profile(self, profile: TorqueProfile, last: bool) -> None:
+        self._publish_revision(
+            header=header(profile.times[0]),
+            times=[to_time(instant) for instant in profile.times],
+            torques=profile.torques,
+            onsets=[to_time(instant) for instant in profile.onsets],
+            valid_until=to_time(profile.valid_until),
+            last=last,
+        )
+
+    def _publish_revision(self, **values: Any) -> None:
+        side, revision = self._robot.side, self._revision
+        profile = msg.TorqueProfile(run=self.number, revision=revision, side=side, **values)
+        self._publish(topics.TORQUE_PROFILE, profile)
+        self._revision += 1
+
+    def _publish_pulse(self, number: int, onset: int, train: PulseTrain) -> None:
+        pulse = msg.TorquePulse(
+            header=header(onset),
+            run=self.number,
+            side=self._robot.side,
+            number=number,
+            torque=train.torque,
+            duration=train.duration,
+        )
+        self._publish(topics.PULSES, pulse)
+
+    def _publish_zero(self, instant: int) -> None:
+        self._publish_state(RobotState(instant, 0.0, 0.0, math.nan))
+
+    def _publish_state(self, state: RobotState) -> None:
+        robot = self._robot
+        status = msg.AnkleRobotState.ACTIVE if robot.enabled else msg.AnkleRobotState.INACTIVE
+        if robot.faults:
+            status = msg.AnkleRobotState.FAULT
+        if STOPPED in robot.faults:
+            status = msg.AnkleRobotState.STOPPED
+        message = msg.AnkleRobotState(
+            header=header(state.stamp),
+            run=self.number,
+            side=robot.side,
+            status=status,
+            commanded_torque=state.commanded,
+            measured_torque=state.measured,
+            angle=state.angle,
+            faults=[fault.name for fault in (state.faults or robot.faults)],
+        )
+        self._publish(topics.ROBOT_STATE, message)

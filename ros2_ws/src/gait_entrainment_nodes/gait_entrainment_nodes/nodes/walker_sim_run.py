@@ -1,0 +1,197 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+One run of the simulated walker: takes promises, yields what is to be published, without a node.
+
+It never computes past the last promise of the perturbator. In lock-step every promised stretch is
+walked at once; in real time as the wall clock goes on, and a stretch for which no promise came in
+time is walked without torque and counted.
+"""
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
+from gait_entrainment.robot import TorqueProfile
+from gait_entrainment.walker import Stretch, WalkerRun
+from gait_entrainment_msgs.msg import Progress, WalkerTiming
+from gait_entrainment_nodes.messaging.stamps import header
+from gait_entrainment_nodes.nodes.lateness import Lateness
+
+# Grants that may be sent before the recorder has acknowledged the first of them: two let it
+# write one while the next is computed.
+UNACKNOWLEDGED_GRANTS = 2
+# Real time: how often progress is reported and promises are asked for [ns].
+PROGRESS_PERIOD = 20_000_000
+
+
+@dataclass(frozen=True)
+class Starved:
+    """A stretch without a promise has begun, to be walked without torque: so much so far [ns]."""
+
+    length: int
+
+
+class Run:
+    """
+    What both kinds of run share: the account of one run.
+
+    ``start`` is the stamp of heel strike 0 [ns since 1970], from which all other instants count.
+    """
+
+    def __init__(self, number: int, walker: WalkerRun, start: int) -> None:
+        self.number, self.walker, self.start = number, walker, start
+        self.lateness = Lateness()  # of samples, from when they were due to when they were sent
+        self.grant = 0  # number of the next progress report
+        self.reproducible = True
+        self.late_stretches = self.starved_stretches = 0
+
+    @property
+    def stamp(self) -> int:
+        """How far everything has been walked [ns since 1970]."""
+        return self.start + self.walker.reached
+
+    def due(self) -> float | None:
+        """Return the steady time [s] at which ``walk`` has something to yield, None if not yet."""
+        raise NotImplementedError
+
+    def walk(self) -> Iterator[Stretch | Starved | Progress]:
+        """Walk as far as is allowed now; what is yielded is published before the next is made."""
+        raise NotImplementedError
+
+    def promise(self, profile: TorqueProfile, last: bool) -> int:
+        """
+        Take a promise, the last of which ends the run; return how much of it came too late [ns].
+
+        Raises ValueError if the promise before it is missing.
+        """
+        late = self.walker.accept(profile)
+        if late:
+            self.late_stretches += 1
+            self.reproducible = False
+        self._allow(profile.valid_until, last)
+        return late
+
+    def _allow(self, until: int, last: bool) -> None:
+        """Allow the walk up to an instant, which is its last stretch or not."""
+        raise NotImplementedError
+
+    def stop(self, instant: int) -> None:
+        """End all torque at an instant, or now if that is over."""
+        self.walker.stop(instant)
+        self.reproducible = False
+
+    def progress(self, *, aborted: bool = False) -> Progress:
+        """Report how far everything has been sent, and at the end of the run how it ended."""
+        state, message, ending = Progress.WALKING, "", self.walker.ending
+        if ending is not None:
+            state = Progress.FELL if ending.kind == "fall" else Progress.FLEW_OFF
+            message = ending.message
+        elif aborted:
+            state, message = Progress.ABORTED, "walker_sim was shut down"
+        elif self.walker.ended:
+            state = Progress.FINISHED
+        self.grant += 1
+        return Progress(
+            header=header(self.stamp),
+            run=self.number,
+            grant=self.grant - 1,
+            events=self.walker.events,
+            samples=self.walker.samples,
+            reproducible=self.reproducible,
+            state=state,
+            message=message,
+        )
+
+    def timing(self) -> WalkerTiming:
+        """Say how well the run kept time."""
+        return WalkerTiming(
+            header=header(self.stamp),
+            run=self.number,
+            late_stretches=self.late_stretches,
+            late=self.walker.late / NANOSECONDS_PER_SECOND,
+            starved_stretches=self.starved_stretches,
+            starved=self.walker.starved / NANOSECONDS_PER_SECOND,
+            samples=self.lateness.count,
+            publish_late_p50=self.lateness.quantile(0.5),
+            publish_late_p99=self.lateness.quantile(0.99),
+            publish_late_worst=self.lateness.quantile(1.0),
+        )
+
+
+class LockStepRun(Run):
+    """Walks every promised stretch at once, ``acknowledged``: as far as a recorder keeps up."""
+
+    def __init__(self, *of_run: Any, acknowledged: bool) -> None:
+        super().__init__(*of_run)
+        self._waits = acknowledged
+        self._acknowledged = 0  # how many grants the recorder has acknowledged
+        self._promised: deque[tuple[int, bool]] = deque()  # (until, last), not walked yet
+
+    def _allow(self, until: int, last: bool) -> None:
+        self._promised.append((until, last))
+
+    def acknowledge(self, progress: Progress) -> None:
+        """Take the recorder's word that it holds everything up to a grant."""
+        self._acknowledged = progress.grant + 1
+
+    def due(self) -> float | None:
+        """See `Run`."""
+        ahead = self._waits and self.grant - self._acknowledged >= UNACKNOWLEDGED_GRANTS
+        return 0.0 if self._promised and not (ahead or self.walker.ended) else None
+
+    def walk(self) -> Iterator[Stretch | Starved | Progress]:
+        """See `Run`."""
+        while self.due() is not None:
+            until, last = self._promised.popleft()
+            yield self.walker.advance(until, last=last)
+            yield self.progress()
+
+
+class RealTimeRun(Run):
+    """Walks as time goes on: instant 0 is due at ``due_at`` [ns] of the steady ``clock``."""
+
+    def __init__(
+        self, *of_run: Any, due_at: int, clock: Callable[[], int] = time.monotonic_ns
+    ) -> None:
+        super().__init__(*of_run)
+        self._due_at, self._clock = due_at, clock
+        self._end: int | None = None  # of the run, once the last promise is here
+        self._starving = False  # the stretch walked last had no promise
+        self._next_progress = 0
+
+    def _allow(self, until: int, last: bool) -> None:
+        # If the last promise comes late, its end is already past.
+        self._end = max(until, self.walker.reached) if last else None
+
+    def due(self) -> float | None:
+        """See `Run`."""
+        due = min(self.walker.next_sample, self._next_progress)
+        if self._end is not None:
+            due = min(due, self._end)
+        return (self._due_at + due) / NANOSECONDS_PER_SECOND
+
+    def walk(self) -> Iterator[Stretch | Starved | Progress]:
+        """See `Run`."""
+        now = self._clock() - self._due_at
+        if now < 0:
+            return
+        last = self._end is not None and now >= self._end
+        starved = self.walker.starved
+        stretch = self.walker.advance(now if self._end is None else min(now, self._end), last=last)
+        yield stretch
+        sent = self._clock() - self._due_at
+        for instant in stretch.sample_times:
+            self.lateness.add((sent - int(instant)) / NANOSECONDS_PER_SECOND)
+        was_starving, self._starving = self._starving, self.walker.starved > starved
+        if self._starving and not was_starving:
+            self.starved_stretches += 1
+            self.reproducible = False
+            yield Starved(self.walker.starved - starved)
+        if now >= self._next_progress or self.walker.ended:
+            self._next_progress = now - now % PROGRESS_PERIOD + PROGRESS_PERIOD
+            yield self.progress()

@@ -1,0 +1,273 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""One run of the experiment: its promises, and who is blamed for what; no node is needed."""
+
+import pytest
+
+from gait_entrainment.conventions import EventKind, Side
+from gait_entrainment.experiment import Conductor, Phase
+from gait_entrainment.messages import nanoseconds_of
+from gait_entrainment.protocol import Protocol, PulsePlan
+from gait_entrainment_msgs.msg import GaitEvent, Progress, TorqueProfile, Trouble
+from gait_entrainment_nodes.messaging.stamps import header
+from gait_entrainment_nodes.messaging.topics import EXPERIMENT_STATE, HORIZON
+from gait_entrainment_nodes.nodes.experiment_run import ExperimentError, Run
+
+SECOND = 10**9
+TIMEOUT = 3.0
+PROTOCOL = Protocol(baseline=2, pulses=PulsePlan(count=1), washout=1)
+
+
+class Bench:
+    """Walker and perturbator around a run, on a clock of their own."""
+
+    def __init__(self, recorded=False):
+        self.now = 100.0
+        self.published, self.trains = [], []
+        self.run = Run(
+            7,
+            lambda topic, message: self.published.append((topic, message)),
+            self.trains.append,
+            recorded=recorded,
+            clock=lambda: self.now,
+        )
+        self.events = self.grant = 0
+
+    def begin(self):
+        self.run.begin(Conductor(PROTOCOL, 0.5), 10 * SECOND)
+
+    @property
+    def horizons(self):
+        return [message for topic, message in self.published if topic is HORIZON]
+
+    def strike(self, instant):
+        """Let a leg strike; legs alternate, the right one is perturbed."""
+        self.events += 1
+        step = self.events - 1
+        side = Side.LEFT if step % 2 else Side.RIGHT
+        event = GaitEvent(header=header(instant), run=7, kind=EventKind.HEEL_STRIKE, side=side)
+        event.step = step
+        self.run.take_event(event)
+
+    def report(self, instant, events=None, state=Progress.WALKING, **values):
+        """Let the walker report progress up to an instant."""
+        events = self.events if events is None else events
+        message = Progress(header=header(instant), grant=self.grant, events=events, state=state)
+        for name, value in values.items():
+            setattr(message, name, value)
+        self.grant += 1
+        self.run.take_progress(message)
+
+    def promise(self, **values):
+        self.run.take_profile(TorqueProfile(run=7, **values))
+
+    def after(self, seconds):
+        """Let time pass, and see what becomes of the run."""
+        self.now += seconds
+        self.run.check(TIMEOUT)
+        return self.run.failure
+
+    def walk_to_planning(self):
+        """Walk until the pulses have been requested."""
+        instant = 10 * SECOND
+        while not self.trains:
+            self.promise()
+            self.strike(instant)
+            self.report(instant)
+            instant += SECOND
+
+
+@pytest.fixture
+def bench():
+    bench = Bench()
+    bench.begin()
+    return bench
+
+
+def blamed(failure):
+    return str(failure), failure.blamed
+
+
+def test_each_progress_is_answered_once_all_that_it_covers_is_here(bench):
+    (first,) = bench.horizons
+    assert (first.run, first.last) == (7, False)
+    assert nanoseconds_of(first.header.stamp) == 10 * SECOND
+    assert nanoseconds_of(first.until) == 10 * SECOND + SECOND // 2
+    bench.promise()
+    bench.report(11 * SECOND, events=1)
+    assert len(bench.horizons) == 1  # an event is still on its way
+    bench.strike(10 * SECOND)
+    assert nanoseconds_of(bench.horizons[-1].until) == 11 * SECOND + SECOND // 2
+    assert bench.run.known_until == 11 * SECOND
+    # In real time progress goes on while nothing new can be promised.
+    bench.report(11 * SECOND)
+    assert len(bench.horizons) == 2
+    shown = [message for topic, message in bench.published if topic is EXPERIMENT_STATE]
+    assert [state.phase for state in shown] == [Phase.BASELINE]
+
+
+def test_nothing_is_promised_while_pulses_are_requested(bench):
+    bench.walk_to_planning()
+    (train,) = bench.trains
+    assert train.count == 1
+    count = len(bench.horizons)
+    bench.promise()
+    bench.report(20 * SECOND)
+    assert len(bench.horizons) == count
+    bench.run.take_answer(True)
+    assert len(bench.horizons) == count + 1
+    state = bench.run.state(Phase.PULSES)
+    assert state.pulse_period == train.period
+    assert nanoseconds_of(state.first_onset) == train.first_onset
+
+
+def test_perturbator_that_does_not_answer_is_named(bench):
+    assert bench.after(TIMEOUT) is None
+    assert blamed(bench.after(0.1)) == ("perturbator has been silent for 3 s", "perturbator")
+
+
+def test_perturbator_that_does_not_answer_a_request_is_named(bench):
+    bench.walk_to_planning()
+    assert bench.after(TIMEOUT) is None
+    assert blamed(bench.after(0.1)) == ("perturbator has been silent for 3 s", "perturbator")
+
+
+def test_walker_that_falls_silent_is_named(bench):
+    bench.after(2.0)
+    bench.promise()  # from here on it is the walker's turn
+    assert bench.after(TIMEOUT) is None
+    assert blamed(bench.after(0.1)) == ("walker_sim has been silent for 3 s", "walker_sim")
+
+
+def test_walker_that_counts_events_which_nobody_receives_is_named(bench):
+    bench.promise()
+    bench.strike(10 * SECOND)
+    for _ in range(4):  # further reports do not pay the debt
+        bench.report(11 * SECOND, events=3)
+        bench.after(1.0)
+    expected = "walker_sim: 2 of 3 gait events missing for 3 s"
+    assert blamed(bench.after(0.1)) == (expected, "walker_sim")
+
+
+def test_recorder_is_named_if_it_is_what_the_walker_waits_for():
+    bench = Bench(recorded=True)
+    bench.begin()
+    bench.promise()
+    bench.strike(10 * SECOND)
+    bench.report(11 * SECOND)
+    bench.promise()
+    bench.after(2.0)
+    bench.run.take_recorder_progress(Progress(run=7, grant=0))
+    bench.report(12 * SECOND)
+    bench.promise()
+    assert bench.after(TIMEOUT) is None
+    assert blamed(bench.after(0.1)) == ("bag_recorder has been silent for 3 s", "bag_recorder")
+
+
+def test_silence_counts_anew_after_this_process_was_held_up(bench):
+    bench.now += 10.0
+    bench.run.forgive()
+    assert bench.after(TIMEOUT) is None
+    assert bench.after(0.1) is not None
+
+
+def test_fault_ends_the_run_in_the_words_of_the_perturbator(bench):
+    latched = Trouble(kind=Trouble.LATCHED, fault="stopped", message="latched: stopped: by hand")
+    bench.run.take_trouble(latched)
+    assert blamed(bench.run.failure) == ("perturbator: latched: stopped: by hand", "")
+
+
+@pytest.mark.parametrize("stop_first", [True, False])
+def test_reason_of_refused_pulses_comes_before_or_after_the_answer(bench, stop_first):
+    bench.walk_to_planning()
+    refused = Trouble(kind=Trouble.REFUSED, message="pulse train rejected: torque: too much")
+    if stop_first:
+        bench.run.take_answer(False)
+        assert bench.after(0.4) is None
+        bench.run.take_trouble(refused)
+    else:
+        bench.run.take_trouble(refused)
+        bench.run.take_answer(False)
+    expected = "perturbator: pulse train rejected: torque: too much"
+    assert blamed(bench.after(0.0)) == (expected, "")
+
+
+def test_refusal_of_somebody_elses_pulses_does_not_matter(bench):
+    refused = Trouble(kind=Trouble.REFUSED, message="pulse train rejected: one at a time")
+    bench.run.take_trouble(refused)
+    assert bench.run.trouble == ""
+    bench.walk_to_planning()
+    bench.run.take_trouble(refused)
+    bench.run.take_answer(True)
+    bench.run.fail_if_troubled()
+
+
+def test_stop_without_a_reason_is_told_after_a_while(bench):
+    bench.promise(stop=True)
+    assert bench.after(0.4) is None
+    message, node = blamed(bench.after(0.2))
+    assert "gave no reason" in message
+    assert node == "perturbator"
+
+
+def test_trouble_before_the_walker_has_started_is_kept():
+    bench = Bench()
+    bench.run.take_trouble(Trouble(kind=Trouble.REFUSED, message="no such motor"))
+    error = bench.run.trouble_error(" refused to be configured")
+    assert blamed(error) == ("perturbator refused to be configured: no such motor", "")
+    bench.begin()
+    assert bench.horizons == []
+    assert blamed(bench.run.failure) == ("perturbator: no such motor", "")
+
+
+def test_closing_horizon_ends_where_the_promises_end(bench):
+    bench.promise()
+    bench.strike(10 * SECOND)
+    final = 10 * SECOND + SECOND // 2
+    bench.report(final, state=Progress.FINISHED, reproducible=True)
+    assert bench.run.over
+    assert bench.run.final.reproducible
+    bench.run.close()
+    closing = bench.horizons[-1]
+    assert closing.last
+    assert nanoseconds_of(closing.until) == nanoseconds_of(closing.header.stamp) == final
+    assert not bench.run.closed
+    bench.promise()
+    assert bench.run.closed
+    bench.run.fail_if_troubled()
+
+
+def test_stop_after_the_walkers_last_word_fails_the_run(bench):
+    bench.promise()
+    bench.strike(10 * SECOND)
+    bench.report(11 * SECOND, state=Progress.FINISHED)
+    bench.run.close()
+    bench.promise(stop=True)
+    assert not bench.run.closed
+    bench.run.take_trouble(Trouble(kind=Trouble.LATCHED, message="latched: over_current: hot"))
+    bench.promise()
+    assert bench.run.closed
+    with pytest.raises(ExperimentError, match="perturbator: latched: over_current"):
+        bench.run.fail_if_troubled()
+
+
+def test_impossible_pulses_fail_the_run():
+    bench = Bench()
+    pulses = PulsePlan(count=5, width=0.9, period_offset=-1.2)
+    bench.run.begin(Conductor(Protocol(baseline=2, pulses=pulses), 0.5), 10 * SECOND)
+    instant = 10 * SECOND
+    while not bench.run.over:
+        bench.promise()
+        bench.strike(instant)
+        bench.report(instant)
+        instant += SECOND
+    assert bench.run.failure.blamed == ""
+    assert "period" in str(bench.run.failure)
+
+
+def test_run_that_is_over_stays_as_it_ended(bench):
+    bench.run.fail(ExperimentError("first"))
+    bench.run.fail(ExperimentError("second"))
+    assert str(bench.run.failure) == "first"
+    assert bench.after(10.0) is bench.run.failure

@@ -1,0 +1,93 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""One run of the analyzer: when it is complete, and what it says of doubtful events."""
+
+from gait_entrainment.conventions import EventKind, Side
+from gait_entrainment.gait import GaitEvent, PulsePhase, Stride, VerdictSettings
+from gait_entrainment.messages import nanoseconds_of
+from gait_entrainment.robot import RobotState, TorqueProfile
+from gait_entrainment_nodes.nodes.gait_analyzer_run import RESULTS, Run
+
+SECOND = 10**9
+
+
+def run(measured=False):
+    return Run(2, Side.RIGHT, VerdictSettings(), measured=measured)
+
+
+def gait(strides):
+    """Return the events of a gait whose steps take a second each, the right leg first."""
+    for step in range(2 * strides + 1):
+        side = Side.LEFT if step % 2 else Side.RIGHT
+        yield GaitEvent(step * SECOND, EventKind.HEEL_STRIKE, side, step)
+        toe_off = step * SECOND + SECOND // 4
+        yield GaitEvent(toe_off, EventKind.TOE_OFF, side.other, step + 1)
+
+
+def promise(begin, until, *onsets):
+    return TorqueProfile(Side.RIGHT, (begin,), (0.0,), onsets, until)
+
+
+def test_run_is_complete_once_events_and_onsets_are_here_whichever_comes_last():
+    events = list(gait(4))
+    for last in ("event", "promise", "end"):
+        analyzed = run()
+        results = []
+        for event in events if last != "event" else events[:-1]:
+            results += analyzed.add_event(event)
+        if last != "promise":
+            results += analyzed.add_profile(promise(0, 9 * SECOND, 3 * SECOND))
+        if last != "end":
+            analyzed.end_at(9 * SECOND, len(events))
+        assert not analyzed.complete
+        if last == "event":
+            results += analyzed.add_event(events[-1])
+        elif last == "promise":
+            results += analyzed.add_profile(promise(0, 9 * SECOND, 3 * SECOND))
+        else:
+            analyzed.end_at(9 * SECOND, len(events))
+        assert analyzed.complete
+        results += analyzed.finish(9 * SECOND)
+        strides = [result for result in results if isinstance(result, Stride)]
+        assert [stride.period for stride in strides] == [2.0] * 4
+        (pulse,) = (result for result in results if isinstance(result, PulsePhase))
+        assert (pulse.stride, pulse.phase) == (2, 0.5)
+
+
+def test_measured_onsets_are_complete_with_the_state_at_the_closing_instant():
+    analyzed = run(measured=True)
+    for event in gait(2):
+        analyzed.add_event(event)
+    analyzed.end_at(5 * SECOND, 10)
+    analyzed.add_profile(promise(0, 5 * SECOND))
+    assert not analyzed.complete
+    analyzed.add_profile(promise(5 * SECOND, 5 * SECOND))  # without length: the run is closed
+    assert not analyzed.complete
+    analyzed.add_state(RobotState(5 * SECOND, 0.0, 0.0, float("nan")))
+    assert analyzed.complete
+
+
+def test_doubts_are_told_once_each_time_that_there_are_more():
+    analyzed = run()
+    events = list(gait(3))
+    for event in events[:4]:
+        analyzed.add_event(event)
+        assert analyzed.new_doubts() == {}
+    analyzed.add_event(events[3])
+    assert sum(analyzed.new_doubts().values()) == 1
+    analyzed.add_event(events[4])
+    assert analyzed.new_doubts() == {}
+    analyzed.add_event(events[4])
+    assert sum(analyzed.new_doubts().values()) == 2
+
+
+def test_message_of_a_result_carries_the_run():
+    analyzed = run()
+    results = [result for event in gait(1) for result in analyzed.add_event(event)]
+    (stride,) = results
+    message = analyzed.message_of(stride)
+    assert type(message) is RESULTS[Stride].type
+    assert (message.run, message.side, message.number) == (2, Side.RIGHT, 1)
+    assert nanoseconds_of(message.header.stamp) == 2 * SECOND
+    assert nanoseconds_of(message.start) == 0

@@ -1,0 +1,172 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""One run of the ankle robot behind its guard: promises, and how trains end; without a node."""
+
+import pytest
+
+from gait_entrainment.conventions import Side
+from gait_entrainment.messages import nanoseconds_of
+from gait_entrainment.robot import DeviceError, DeviceLimits, LimitError, PulseTrain, find_driver
+from gait_entrainment.robot.faults import TORQUE_EXCEEDED
+from gait_entrainment_msgs.msg import AnkleRobotState
+from gait_entrainment_nodes.messaging.topics import PULSES, TORQUE_PROFILE
+from gait_entrainment_nodes.nodes.perturbator_run import Result, Run
+
+SECOND = 10**9
+TRAIN = PulseTrain(
+    side=Side.RIGHT, first_onset=3 * SECOND, period=1.0, count=2, torque=5.0, duration=0.1
+)
+
+
+class Bench:
+    """A robot and what its run publishes."""
+
+    def __init__(self, driver="ideal"):
+        self.robot = find_driver(driver).make(Side.RIGHT, DeviceLimits(), 0)
+        self.robot.configure()
+        self.robot.activate()
+        self.profiles, self.pulses, self.states, self.ended = [], [], [], []
+        self.run = Run(4, SECOND, self.robot, self.publish, self.ended.append)
+
+    def publish(self, topic, message):
+        assert message.run == 4
+        lists = {TORQUE_PROFILE.name: self.profiles, PULSES.name: self.pulses}
+        lists.get(topic.name, self.states).append(message)
+
+    def outcomes(self):
+        return [(result.outcome, result.delivered, result.message) for result in self.ended]
+
+
+@pytest.fixture
+def bench():
+    bench = Bench()
+    yield bench
+    bench.robot.close()
+
+
+def test_horizons_are_answered_with_adjoining_promises(bench):
+    bench.run.take_horizon(SECOND, 2 * SECOND, last=False)
+    bench.run.schedule(TRAIN)
+    bench.run.take_horizon(2 * SECOND, 4 * SECOND, last=True)
+    idle, pulse = bench.profiles
+    assert [profile.revision for profile in bench.profiles] == [0, 1]
+    assert nanoseconds_of(idle.valid_until) == nanoseconds_of(pulse.header.stamp) == 2 * SECOND
+    assert list(idle.torques) == [0.0]
+    assert list(pulse.torques) == [0.0, 5.0, 0.0]
+    assert [nanoseconds_of(onset) for onset in pulse.onsets] == [3 * SECOND]
+    assert (idle.last, pulse.last, pulse.side) == (False, True, Side.RIGHT)
+    (announced,) = bench.pulses
+    assert (announced.number, announced.torque, announced.duration) == (1, 5.0, 0.1)
+    assert bench.ended == []
+
+
+def test_train_is_delivered_once_its_last_pulse_is_promised(bench):
+    bench.run.take_horizon(SECOND, 2 * SECOND, last=False)
+    bench.run.schedule(TRAIN)
+    bench.run.take_horizon(2 * SECOND, 5 * SECOND, last=False)
+    assert bench.outcomes() == [(Result.DELIVERED, 2, "every pulse was delivered")]
+    assert [pulse.number for pulse in bench.pulses] == [1, 2]
+    assert {state.status for state in bench.states} == {AnkleRobotState.ACTIVE}
+
+
+def test_train_beyond_the_limits_is_refused_and_changes_nothing(bench):
+    too_much = PulseTrain(
+        side=Side.RIGHT, first_onset=3 * SECOND, period=1.0, count=1, torque=1e3, duration=0.1
+    )
+    with pytest.raises(LimitError, match="torque"):
+        bench.run.schedule(too_much)
+    bench.run.take_horizon(SECOND, 5 * SECOND, last=False)
+    assert list(bench.profiles[0].torques) == [0.0]
+    # No torque was due, so there is none to stop.
+    bench.run.end_torque(Result.STOPPED, "the perturbator was deactivated")
+    assert not any(profile.stop for profile in bench.profiles)
+
+
+def test_cancelling_stops_the_torque_at_the_latest_instant_known(bench):
+    bench.run.schedule(TRAIN)
+    bench.run.take_horizon(2 * SECOND, 4 * SECOND, last=False)
+    bench.run.end_torque(Result.CANCELLED, "cancelled by the client")
+    assert bench.outcomes() == [(Result.CANCELLED, 1, "cancelled by the client")]
+    stop = bench.profiles[-1]
+    assert stop.stop
+    assert nanoseconds_of(stop.header.stamp) == 2 * SECOND
+    assert nanoseconds_of(stop.valid_until) == 4 * SECOND
+    last = bench.states[-1]
+    assert (last.commanded_torque, nanoseconds_of(last.header.stamp)) == (0.0, 2 * SECOND)
+    # Told once; what is promised from here on has no torque.
+    bench.run.end_torque(Result.STOPPED, "again")
+    assert bench.profiles[-1] is stop
+    bench.run.take_horizon(4 * SECOND, 6 * SECOND, last=False)
+    assert list(bench.profiles[-1].torques) == [0.0]
+    assert bench.profiles[-1].revision == stop.revision + 1
+
+
+def test_closing_horizon_is_answered_without_length_and_ends_the_train(bench):
+    bench.run.schedule(TRAIN)
+    bench.run.take_horizon(SECOND, 4 * SECOND, last=False)
+    bench.run.take_horizon(4 * SECOND, 4 * SECOND, last=True)
+    assert bench.run.closed
+    assert bench.outcomes() == [(Result.ENDED, 1, "the run ended before the last pulse")]
+    closing = bench.profiles[-1]
+    assert closing.last
+    assert not closing.stop
+    assert [nanoseconds_of(t) for t in closing.times] == [4 * SECOND]
+    assert nanoseconds_of(closing.valid_until) == 4 * SECOND
+    # Nothing is left to stop.
+    count = len(bench.profiles)
+    bench.run.end_torque(Result.STOPPED, "the perturbator was deactivated")
+    assert len(bench.profiles) == count
+
+
+def test_fault_is_told_the_walker_even_if_no_torque_was_due(bench):
+    bench.run.take_horizon(SECOND, 2 * SECOND, last=False)
+    bench.robot.stop()
+    bench.run.end_torque(Result.STOPPED, "the stop service was called", fault=True)
+    assert bench.profiles[-1].stop
+    state = bench.states[-1]
+    assert (state.status, list(state.faults)) == (AnkleRobotState.STOPPED, ["stopped"])
+    with pytest.raises(DeviceError, match="latched"):
+        bench.run.schedule(TRAIN)
+
+
+def test_fault_found_in_what_was_delivered_is_no_delivered_train(bench, monkeypatch):
+    bench.run.schedule(TRAIN)
+    promise = bench.robot.promise
+
+    def exceed(until):
+        profile = promise(until)
+        bench.robot.stop(TORQUE_EXCEEDED)
+        return profile
+
+    monkeypatch.setattr(bench.robot, "promise", exceed)
+    bench.run.take_horizon(SECOND, 6 * SECOND, last=False)
+    assert bench.ended == []  # the node reports the fault, then ends the train with it
+    assert bench.states[-1].status == AnkleRobotState.FAULT
+
+
+def test_driver_that_fails_is_told(bench, monkeypatch):
+    def fail(_):
+        raise DeviceError("bus gone")
+
+    monkeypatch.setattr(bench.robot, "promise", fail)
+    with pytest.raises(DeviceError, match="bus gone"):
+        bench.run.take_horizon(SECOND, 2 * SECOND, last=False)
+    assert bench.profiles == []
+
+
+def test_real_robots_torque_is_promised_piece_by_piece(bench, monkeypatch):
+    promise = bench.robot.promise
+    measured = [SECOND, SECOND + SECOND // 2, 2 * SECOND]
+    monkeypatch.setattr(bench.robot, "promise", lambda until: promise(min(measured[0], until)))
+    bench.run.take_horizon(SECOND, 2 * SECOND, last=True)
+    assert bench.profiles == []  # nothing was measured yet
+    measured.pop(0)
+    bench.run.look_after()
+    measured.pop(0)
+    bench.run.look_after()
+    assert [profile.last for profile in bench.profiles] == [False, True]
+    states = len(bench.states)
+    bench.run.look_after()  # the next horizon is late: nothing is left to promise
+    assert len(bench.profiles) == 2
+    assert len(bench.states) >= states
