@@ -89,15 +89,14 @@ def _rows(group: str, found: Mapping[str, Found], **words: Any) -> list[Comparis
 def _gait(p: WalkerParameters) -> list[Comparison]:
     step = paper_pulses(p).unperturbed_period / 2
     force, instant = least_force(p)
+    later = f"{instant:.4f} s into the step"
     found: dict[str, Found] = {
         "step": step,
         "speed": p.step_length / step,
         "vault_over": p.just_vault_over_stiffness,
         "peak_torque": p.peak_torque,
         "force": force,
-        "place": "beginning of double stance"
-        if instant == 0.0
-        else f"{instant:.4f} s into the step",
+        "place": later if instant else "beginning of double stance",
         "closed_form": p.floquet_multiplier,
         "differences": floquet_by_differences(p),
         "convergence": floquet_by_convergence(p),
