@@ -3,7 +3,8 @@
 
 """ROS parameters from the settings of a dataclass, and back."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
+from dataclasses import field, fields
 from enum import Enum
 from typing import Any
 
@@ -14,6 +15,13 @@ from rclpy.node import Node
 from gait_entrainment.settings import Setting, SettingError, settings_of
 from gait_entrainment_nodes.nodes.rclpy_internals import given_parameters
 
+_REFUSED = (InvalidParameterValueException, InvalidParameterTypeException)
+
+
+def texts(meaning: str, *default: str) -> Any:
+    """Return a field of a settings dataclass that holds texts; as a parameter it is read-only."""
+    return field(default=default, metadata={"texts": meaning})
+
 
 def declare_settings(
     node: Node, dataclass_type: Any, prefix: str = "", fixed: Collection[str] = ()
@@ -23,41 +31,22 @@ def declare_settings(
 
     Raises SettingError if a value that the node was started with is not allowed.
     """
+    for texts_field in _texts_of(dataclass_type):
+        _declare_texts(node, prefix + texts_field.name, texts_field)
     for name, told in settings_of(dataclass_type).items():
-        default = getattr(dataclass_type, name)
-        if isinstance(default, Enum):
-            default = default.name.lower()
-        descriptor = ParameterDescriptor(
-            description=f"{told.meaning} [{told.unit}]" if told.unit else told.meaning,
-            additional_constraints=told.allowed if isinstance(default, str) else "",
-            read_only=name in fixed,
-        )
-        if told.kind is int:
-            whole = IntegerRange(from_value=int(told.least), to_value=int(told.most))
-            descriptor.integer_range = [whole]
-        elif told.kind is float:
-            real = FloatingPointRange(from_value=float(told.least), to_value=float(told.most))
-            descriptor.floating_point_range = [real]
-        _declare(node, prefix + name, default, descriptor, told)
-
-
-def declare_texts(
-    node: Node, name: str, meaning: str, default: Sequence[str] = ()
-) -> tuple[str, ...]:
-    """Declare a read-only parameter that holds texts and return its value; "" is left out."""
-    descriptor = ParameterDescriptor(description=meaning, read_only=True)
-    # ROS cannot tell the type of an empty list.
-    _declare(node, name, list(default) or [""], descriptor, None)
-    return tuple(text for text in node.get_parameter(name).value if text)
+        _declare(node, prefix + name, getattr(dataclass_type, name), told, name in fixed)
 
 
 def read_settings(value: Callable[[str], Any], dataclass_type: Any, prefix: str = "") -> Any:
     """
     Return an instance of a dataclass from the values of its parameters, by their names.
 
-    Raises ValueError if a value is not allowed, or they do not fit each other.
+    Raises EntrainmentError if a value is not allowed, or they do not fit each other.
     """
-    values = {}
+    values: dict[str, Any] = {
+        f.name: tuple(text for text in value(prefix + f.name) if text)
+        for f in _texts_of(dataclass_type)
+    }
     for name, told in settings_of(dataclass_type).items():
         given = value(prefix + name)
         check = told.parse if isinstance(given, str) else told.check
@@ -73,17 +62,39 @@ def refuse_unknown_parameters(node: Node) -> None:
             raise SettingError(f"{name}: unknown parameter; allowed: {known}")
 
 
-def _declare(
-    node: Node, name: str, default: Any, descriptor: ParameterDescriptor, told: Setting | None
-) -> None:
+def _declare(node: Node, name: str, default: Any, told: Setting, fixed: bool) -> None:
+    if isinstance(default, Enum):
+        default = default.name.lower()
+    descriptor = ParameterDescriptor(
+        description=f"{told.meaning} [{told.unit}]" if told.unit else told.meaning,
+        additional_constraints=told.allowed if isinstance(default, str) else "",
+        read_only=fixed,
+    )
+    if told.kind is int:
+        whole = IntegerRange(from_value=int(told.least), to_value=int(told.most))
+        descriptor.integer_range = [whole]
+    elif told.kind is float:
+        real = FloatingPointRange(from_value=float(told.least), to_value=float(told.most))
+        descriptor.floating_point_range = [real]
     try:
         node.declare_parameter(name, default, descriptor)
-    except (InvalidParameterValueException, InvalidParameterTypeException):
+    except _REFUSED:
         given = given_parameters(node)[name]
-        if told is None:
-            allowed = "a list of texts"
-        else:
-            told.check(name, given)
-            # Whole numbers do for real ones everywhere but in ROS.
-            allowed = f"a number with a decimal point, such as {float(given)!r}"
-        raise SettingError(f"{name}: {given!r}; allowed: {allowed}") from None
+        told.check(name, given)
+        # Whole numbers do for real ones everywhere but in ROS.
+        number = f"a number with a decimal point, such as {float(given)!r}"
+        raise SettingError(f"{name}: {given!r}; allowed: {number}") from None
+
+
+def _texts_of(dataclass_type: Any) -> list[Any]:
+    return [f for f in fields(dataclass_type) if "texts" in f.metadata]
+
+
+def _declare_texts(node: Node, name: str, told: Any) -> None:
+    descriptor = ParameterDescriptor(description=told.metadata["texts"], read_only=True)
+    try:
+        # ROS cannot tell the type of an empty list: it holds an empty text, which is left out.
+        node.declare_parameter(name, list(told.default) or [""], descriptor)
+    except _REFUSED:
+        given = given_parameters(node)[name]
+        raise SettingError(f"{name}: {given!r}; allowed: a list of texts") from None

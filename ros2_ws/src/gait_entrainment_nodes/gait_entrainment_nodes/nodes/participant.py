@@ -6,7 +6,7 @@
 import functools
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -14,45 +14,64 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
 
+from gait_entrainment.errors import EntrainmentError
+from gait_entrainment.settings import SettingError
 from gait_entrainment_msgs.msg import PublishedCounts
 from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.publisher import CountedPublisher, StopRequestedError
 from gait_entrainment_nodes.messaging.stamps import header
 from gait_entrainment_nodes.messaging.topics import DIAGNOSTICS, PUBLISHED_COUNTS, Topic
-from gait_entrainment_nodes.nodes.parameters import read_settings, refuse_unknown_parameters
+from gait_entrainment_nodes.nodes.parameters import (
+    declare_settings,
+    read_settings,
+    refuse_unknown_parameters,
+)
 
 # How often a node publishes its state on /diagnostics [s]; rqt calls it stale after 5 s.
 STATE_PERIOD = 1.0
 # At the end of a node its last messages, a stop among them, have this long to arrive [s].
 LAST_WORDS = 0.5
 
-# Makes a settings dataclass, with its prefix if it has one, from the values of parameters.
-ReadSettings = Callable[..., Any]
-
 
 class Participant(Node):
     """
     A node that takes part in a run.
 
-    A node declares its parameters, calls ``begin_participation``, then makes its publishers,
-    subscriptions and services.
+    A node calls ``begin_participation``, then makes its publishers, subscriptions and services.
     """
 
     get_logger: Callable[[], RcutilsLogger]  # which rclpy does not type
-    hardware_id = "none"  # of the hardware that its diagnostics are about
     stopping = False  # set from outside: the node is to end
     failure: str | None = None  # why the node must end with exit code 1
     finished = False  # set to end the loop with exit code 0
     run: Any = None  # the run that goes on, with its ``number``; None between runs
 
-    def begin_participation(self) -> None:
+    def begin_participation(self, *, fixed: Collection[str] = (), **settings: Any) -> None:
         """
         Set up what every participant has.
 
-        Raises ValueError if a parameter is unknown, or the values do not fit each other.
+        Parameters
+        ----------
+        fixed
+            Names of parameters that cannot change.
+        settings
+            The node's parameters: settings dataclasses, or pairs of one and the prefix of its
+            parameters, by the attribute of the node that holds their values.
+
+        Raises
+        ------
+        EntrainmentError
+            if a parameter is unknown or not allowed, or the values do not fit each other.
+
         """
+        self._settings = {
+            name: group if isinstance(group, tuple) else (group, "")
+            for name, group in settings.items()
+        }
+        for group, prefix in self._settings.values():
+            declare_settings(self, group, prefix, fixed)
         refuse_unknown_parameters(self)
-        self._read_parameters({})
+        self._take_parameters({})
         self.add_on_set_parameters_callback(self._on_set_parameters)
         self._offered: list[CountedPublisher] = []
         self._counted: list[CountedPublisher] = []
@@ -71,18 +90,17 @@ class Participant(Node):
         going_on = self.run is not None
         return f"run {self.run.number} goes on; change it between runs" if going_on else ""
 
-    def take_parameters(self, read: ReadSettings) -> None:
-        """
-        Take the values of all parameters, at the start and at each change.
+    def on_change(self) -> None:
+        """Act on a change of parameters."""
 
-        Raises ValueError if they do not fit each other; then nothing has been taken.
-        """
+    def _take_parameters(self, changes: dict[str, Any]) -> None:
+        """Take the values of all parameters, or none if they do not fit each other."""
 
-    def _read_parameters(self, changes: dict[str, Any]) -> None:
         def value(name: str) -> Any:
             return changes[name] if name in changes else self.get_parameter(name).value
 
-        self.take_parameters(functools.partial(read_settings, value))
+        read = {name: read_settings(value, *group) for name, group in self._settings.items()}
+        vars(self).update(read)
 
     def _on_set_parameters(self, changes: Sequence[Any]) -> SetParametersResult:
         """Take a change or refuse it with the reason; types and ranges have been checked."""
@@ -93,9 +111,10 @@ class Participant(Node):
                 if name == "use_sim_time":
                     reason = "which clock counts is decided when the node starts"
                 if reason:
-                    raise ValueError(f"{name}: {value!r} is refused: {reason}")
-            self._read_parameters(values)
-        except ValueError as error:
+                    raise SettingError(f"{name}: {value!r} is refused: {reason}")
+            self._take_parameters(values)
+            self.on_change()
+        except EntrainmentError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
@@ -153,6 +172,11 @@ class Participant(Node):
         """
         self.create_service(Ready, "~/ready", self._on_ready)
 
+    @property
+    def matched(self) -> dict[str, int]:
+        """Number of matched subscriptions, by the name of each topic that the node offers."""
+        return {publisher.topic_name: publisher.matched for publisher in self._offered}
+
     def not_ready(self) -> str:
         """
         Return what this node waits for before a run, or an empty text.
@@ -166,11 +190,15 @@ class Participant(Node):
     def _on_ready(self, _: Ready.Request, response: Ready.Response) -> Ready.Response:
         response.waiting_for = self.not_ready()
         response.ready = not response.waiting_for
-        response.topics = [publisher.topic_name for publisher in self._offered]
-        response.matched = [publisher.matched for publisher in self._offered]
+        response.topics, response.matched = list(self.matched), list(self.matched.values())
         return response
 
     # Diagnostics
+
+    @property
+    def hardware_id(self) -> str:
+        """The hardware that the diagnostics are about."""
+        return "none"
 
     def diagnose(self, stamp: int, level: bytes, message: str, **values: object) -> None:
         """Publish what happened in a run; it is this node's state until the next is noted."""
