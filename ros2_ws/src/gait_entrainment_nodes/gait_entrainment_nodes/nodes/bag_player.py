@@ -136,8 +136,9 @@ class BagPlayer(Participant):
         del name
         return ""
 
-    def on_change(self) -> None:
-        """Play at another rate from now on."""
+    def take_parameters(self, changes: dict[str, Any]) -> None:
+        """Take a change of the rate, which counts from now on."""
+        super().take_parameters(changes)
         if self._begun:
             self._playback.set_rate(self._rate, time.monotonic_ns())
 

@@ -18,17 +18,8 @@ class OneGoalServer:
     rclpy's executor resumes a coroutine that waits over and over, and would keep a processor busy
     for as long as a goal takes: so a goal is executed only once it has ended.
 
-    Parameters
-    ----------
-    node, action, name
-        Whose it is, its type and its name.
-    accept
-        Says whether to accept a request, also while a goal is under way: then it must not.
-    begin
-        Takes the request of a goal that was accepted.
-    cancel
-        Called when the client cancels the goal.
-
+    ``accept`` says whether to accept a request; it must refuse one while a goal is under way.
+    ``begin`` takes the request that was accepted; ``cancel`` is called if the client cancels it.
     """
 
     def __init__(

@@ -4,7 +4,7 @@
 """ROS parameters from the settings of a dataclass, and back."""
 
 from collections.abc import Callable, Collection
-from dataclasses import field, fields
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
@@ -15,12 +15,23 @@ from rclpy.node import Node
 from gait_entrainment.settings import Setting, SettingError, settings_of
 from gait_entrainment_nodes.nodes.rclpy_internals import given_parameters
 
-_REFUSED = (InvalidParameterValueException, InvalidParameterTypeException)
+
+@dataclass(frozen=True)
+class _Texts(Setting):
+    """Texts, of which empty ones are left out."""
+
+    kind: type = list
+    choices: tuple[str, ...] = ()
+
+    def check(self, name: str, value: Any) -> Any:
+        if not isinstance(value, list) or not all(isinstance(text, str) for text in value):
+            raise SettingError(f"{name}: {value!r}; allowed: a list of texts")
+        return tuple(text for text in value if text)
 
 
 def texts(meaning: str, *default: str) -> Any:
-    """Return a field of a settings dataclass that holds texts; as a parameter it is read-only."""
-    return field(default=default, metadata={"texts": meaning})
+    """Return a field of a settings dataclass that holds texts; its parameter cannot change."""
+    return field(default=default, metadata={"setting": _Texts(meaning)})
 
 
 def declare_settings(
@@ -31,10 +42,25 @@ def declare_settings(
 
     Raises SettingError if a value that the node was started with is not allowed.
     """
-    for texts_field in _texts_of(dataclass_type):
-        _declare_texts(node, prefix + texts_field.name, texts_field)
     for name, told in settings_of(dataclass_type).items():
-        _declare(node, prefix + name, getattr(dataclass_type, name), told, name in fixed)
+        default, constraints = getattr(dataclass_type, name), ""
+        if isinstance(told, _Texts):
+            default = list(default) or [""]  # ROS cannot tell the type of an empty list
+        elif isinstance(default, Enum | str):
+            default = default if isinstance(default, str) else default.name.lower()
+            constraints = told.allowed
+        descriptor = ParameterDescriptor(
+            description=f"{told.meaning} [{told.unit}]" if told.unit else told.meaning,
+            additional_constraints=constraints,
+            read_only=name in fixed or isinstance(told, _Texts),
+        )
+        if told.kind is int:
+            whole = IntegerRange(from_value=int(told.least), to_value=int(told.most))
+            descriptor.integer_range = [whole]
+        elif told.kind is float:
+            real = FloatingPointRange(from_value=float(told.least), to_value=float(told.most))
+            descriptor.floating_point_range = [real]
+        _declare(node, prefix + name, default, descriptor, told)
 
 
 def read_settings(value: Callable[[str], Any], dataclass_type: Any, prefix: str = "") -> Any:
@@ -43,10 +69,7 @@ def read_settings(value: Callable[[str], Any], dataclass_type: Any, prefix: str 
 
     Raises EntrainmentError if a value is not allowed, or they do not fit each other.
     """
-    values: dict[str, Any] = {
-        f.name: tuple(text for text in value(prefix + f.name) if text)
-        for f in _texts_of(dataclass_type)
-    }
+    values = {}
     for name, told in settings_of(dataclass_type).items():
         given = value(prefix + name)
         check = told.parse if isinstance(given, str) else told.check
@@ -62,39 +85,14 @@ def refuse_unknown_parameters(node: Node) -> None:
             raise SettingError(f"{name}: unknown parameter; allowed: {known}")
 
 
-def _declare(node: Node, name: str, default: Any, told: Setting, fixed: bool) -> None:
-    if isinstance(default, Enum):
-        default = default.name.lower()
-    descriptor = ParameterDescriptor(
-        description=f"{told.meaning} [{told.unit}]" if told.unit else told.meaning,
-        additional_constraints=told.allowed if isinstance(default, str) else "",
-        read_only=fixed,
-    )
-    if told.kind is int:
-        whole = IntegerRange(from_value=int(told.least), to_value=int(told.most))
-        descriptor.integer_range = [whole]
-    elif told.kind is float:
-        real = FloatingPointRange(from_value=float(told.least), to_value=float(told.most))
-        descriptor.floating_point_range = [real]
+def _declare(
+    node: Node, name: str, default: Any, descriptor: ParameterDescriptor, told: Setting
+) -> None:
     try:
         node.declare_parameter(name, default, descriptor)
-    except _REFUSED:
+    except (InvalidParameterValueException, InvalidParameterTypeException):
         given = given_parameters(node)[name]
         told.check(name, given)
         # Whole numbers do for real ones everywhere but in ROS.
         number = f"a number with a decimal point, such as {float(given)!r}"
         raise SettingError(f"{name}: {given!r}; allowed: {number}") from None
-
-
-def _texts_of(dataclass_type: Any) -> list[Any]:
-    return [f for f in fields(dataclass_type) if "texts" in f.metadata]
-
-
-def _declare_texts(node: Node, name: str, told: Any) -> None:
-    descriptor = ParameterDescriptor(description=told.metadata["texts"], read_only=True)
-    try:
-        # ROS cannot tell the type of an empty list: it holds an empty text, which is left out.
-        node.declare_parameter(name, list(told.default) or [""], descriptor)
-    except _REFUSED:
-        given = given_parameters(node)[name]
-        raise SettingError(f"{name}: {given!r}; allowed: a list of texts") from None

@@ -50,31 +50,19 @@ class Participant(Node):
         """
         Set up what every participant has.
 
-        Parameters
-        ----------
-        fixed
-            Names of parameters that cannot change.
-        settings
-            The node's parameters: settings dataclasses, or pairs of one and the prefix of its
-            parameters, by the attribute of the node that holds their values.
+        ``settings`` are the node's parameters, of which some are ``fixed``: by the attribute that
+        holds their values a settings dataclass, or a pair of it and the prefix of its parameters.
 
-        Raises
-        ------
-        EntrainmentError
-            if a parameter is unknown or not allowed, or the values do not fit each other.
-
+        Raises EntrainmentError if a value is not allowed, or the values do not fit each other.
         """
-        self._settings = {
-            name: group if isinstance(group, tuple) else (group, "")
-            for name, group in settings.items()
-        }
-        for group, prefix in self._settings.values():
+        groups = {n: s if isinstance(s, tuple) else (s, "") for n, s in settings.items()}
+        for group, prefix in groups.values():
             declare_settings(self, group, prefix, fixed)
         refuse_unknown_parameters(self)
-        self._take_parameters({})
+        self._settings = groups
+        self.take_parameters({})
         self.add_on_set_parameters_callback(self._on_set_parameters)
         self._offered: list[CountedPublisher] = []
-        self._counted: list[CountedPublisher] = []
         self._publisher_of: dict[str, CountedPublisher] = {}  # by name in the table of topics
         self.offer(DIAGNOSTICS)
         self._state_due = 0.0  # when to publish the state, steady time [s]
@@ -90,10 +78,7 @@ class Participant(Node):
         going_on = self.run is not None
         return f"run {self.run.number} goes on; change it between runs" if going_on else ""
 
-    def on_change(self) -> None:
-        """Act on a change of parameters."""
-
-    def _take_parameters(self, changes: dict[str, Any]) -> None:
+    def take_parameters(self, changes: dict[str, Any]) -> None:
         """Take the values of all parameters, or none if they do not fit each other."""
 
         def value(name: str) -> Any:
@@ -112,8 +97,7 @@ class Participant(Node):
                     reason = "which clock counts is decided when the node starts"
                 if reason:
                     raise SettingError(f"{name}: {value!r} is refused: {reason}")
-            self._take_parameters(values)
-            self.on_change()
+            self.take_parameters(values)
         except EntrainmentError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
@@ -122,11 +106,9 @@ class Participant(Node):
 
     def offer(self, topic: Topic, *, counted: bool = True) -> CountedPublisher:
         """Create a publisher, for ``publish``; the recorder is told what a counted one sent."""
-        publisher = CountedPublisher(self, topic)
+        publisher = CountedPublisher(self, topic, counted=counted)
         self._publisher_of.setdefault(topic.name, publisher)
         self._offered.append(publisher)
-        if counted:
-            self._counted.append(publisher)
         return publisher
 
     def publish(self, topic: Topic, message: Any) -> None:
@@ -152,14 +134,12 @@ class Participant(Node):
 
     def publish_counts(self, run: int, stamp: int) -> None:
         """Tell the recorder, at the end of a run, how many messages were published."""
-        counts = PublishedCounts(
-            header=header(stamp),
-            run=run,
-            node=self.get_fully_qualified_name(),
-            topics=[publisher.topic_name for publisher in self._counted],
-            counts=[publisher.count for publisher in self._counted],
-        )
-        self.publish(PUBLISHED_COUNTS, counts)
+        counted = [publisher for publisher in self._offered if publisher.counted]
+        message = PublishedCounts(header=header(stamp), run=run)
+        message.node = self.get_fully_qualified_name()
+        message.topics = [publisher.topic_name for publisher in counted]
+        message.counts = [publisher.count for publisher in counted]
+        self.publish(PUBLISHED_COUNTS, message)
 
     # Readiness
 
