@@ -16,20 +16,19 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import rclpy
-import yaml
-from rclpy.action import ActionClient
-from rclpy.context import Context
-from rclpy.experimental import EventsExecutor
-from rclpy.node import Node
-
 from gait_entrainment.protocol import Protocol, read_protocol, write_protocol
 from gait_entrainment.simulation import simulate
 from gait_entrainment_bags import BagReader
-from gait_entrainment_bringup.node_list import NODES, STOP_ORDER, parameters
+from gait_entrainment_bringup.node_list import (
+    NODES,
+    STOP_ORDER,
+    parameter_arguments,
+    parameters,
+)
 from gait_entrainment_bringup.supervisor import Supervisor
 from gait_entrainment_msgs.action import RunProtocol
 from gait_entrainment_msgs.srv import Ready
+from gait_entrainment_nodes.messaging.client import Client
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 from gait_entrainment_nodes.messaging.topics import STRIDES, Topic
 
@@ -96,103 +95,74 @@ def simulated_events(bag: Path) -> list[tuple[int, int, int, int]]:
 
 
 class Probe:
-    """A node of the tests in one domain, to listen and to ask."""
+    """A client of the tests in one domain: what it waits for must come."""
 
     def __init__(self, domain: int) -> None:
-        self._context = Context()
-        rclpy.init(context=self._context, domain_id=domain)
-        self.node = Node("probe", context=self._context)
-        self._executor = EventsExecutor(context=self._context)
-        self._executor.add_node(self.node)
-
-    def close(self) -> None:
-        self._executor.shutdown()
-        self.node.destroy_node()
-        rclpy.try_shutdown(context=self._context)
+        self.client = Client("probe", domain=domain)
+        self.node = self.client.node
 
     def until(
         self, condition: Callable[[], Any], what: str = "", patience: float = PATIENCE
     ) -> Any:
         """Serve ROS until a condition holds; return its value."""
-        deadline = time.monotonic() + patience
-        while not (value := condition()):
-            assert time.monotonic() < deadline, f"waited in vain for {what}"
-            self._executor.spin_once(timeout_sec=0.02)
+        value = self.client.wait(condition, patience)
+        assert value, f"waited in vain for {what}"
         return value
 
     def listen(self, topic: Topic) -> list[Any]:
         """Return a list that grows with the messages of a topic."""
         heard: list[Any] = []
-        self.node.create_subscription(topic.type, topic.name, heard.append, topic.qos)
+        self.client.subscribe(topic, heard.append)
         return heard
 
     def call(self, kind: Any, service: str, request: Any = None) -> Any:
-        """Call a service and return its response."""
-        client = self.node.create_client(kind, service)
-        self.until(client.service_is_ready, service)
-        self.known_to(service.rpartition("/")[0])
-        future = client.call_async(request or kind.Request())
-        self.until(future.done, f"an answer of {service}")
-        return future.result()
-
-    def known_to(self, node: str) -> None:
-        """
-        Wait until a node knows everything that this one has made so far.
-
-        Until then its answers may be lost. Discovery goes in the order in which things were made,
-        so one answer to a client made now says it.
-        """
-        client = self.node.create_client(Ready, f"{node}/ready")
-        self.until(client.service_is_ready, node)
-        answers: list[Any] = []
-
-        def answered() -> bool:
-            if not answers or time.monotonic() - asked[-1] > 0.5:
-                asked.append(time.monotonic())
-                answers.append(client.call_async(Ready.Request()))
-            return any(answer.done() for answer in answers)
-
-        asked: list[float] = []
-        self.until(answered, f"an answer of {node}")
+        """Call a service of a node that offers ~/ready, once; return its response."""
+        self.client.service(kind, service)
+        self.client.wait_to_be_known(service.rpartition("/")[0])
+        return self.client.call(kind, service, request, period=math.inf)
 
     def send_goal(self, kind: Any, action: str, goal: Any) -> Any:
-        """Send a goal to an action server; return its handle once it is answered."""
-        client = ActionClient(self.node, kind, action)
-        self.until(client.server_is_ready, action)
-        self.known_to(action.partition("/")[0])
-        future = client.send_goal_async(goal)
-        self.until(future.done, f"an answer of {action}")
-        return future.result()
+        """Send a goal to a node that offers ~/ready; return its handle once it is answered."""
+        self.client.action(kind, action)
+        self.client.wait_to_be_known(action.rpartition("/")[0])
+        return self.client.send_goal(kind, action, goal)
 
     def result(self, handle: Any) -> Any:
         """Wait for the result of a goal."""
-        future = handle.get_result_async()
-        self.until(future.done, "a result")
-        return future.result()
+        answer = self.client.result(handle, PATIENCE)
+        assert answer, "waited in vain for a result"
+        return answer
 
 
 @contextmanager
 def probe(domain: int) -> Iterator[Probe]:
     """Give a probe in a domain."""
-    node = Probe(domain)
-    try:
-        yield node
-    finally:
-        node.close()
+    made = Probe(domain)
+    with made.client:
+        yield made
+
+
+def stat(pid: int) -> list[str]:
+    """Return what the system says of a process, from its state on."""
+    return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
 
 
 def alive(pid: int) -> bool:
     """Whether a process runs; one that is only waiting to be reaped does not."""
     try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+        return stat(pid)[0] != "Z"
     except FileNotFoundError:
         return False
 
 
+def parent_of(pid: int) -> int:
+    """Return the id of the process that started a process."""
+    return int(stat(pid)[1]) if pid else 0
+
+
 def cpu_seconds(pid: int) -> float:
     """Return the processor time that a process has used."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    return (int(stat(pid)[11]) + int(stat(pid)[12])) / os.sysconf("SC_CLK_TCK")
 
 
 class Started:
@@ -239,11 +209,12 @@ class Started:
             assert time.monotonic() < deadline
             for folder in Path("/proc").glob("[0-9]*"):
                 try:
-                    parent = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
                     words = (folder / "cmdline").read_bytes().split(b"\0")
+                    parent = parent_of(int(folder.name))
+                    # `entrain run` starts its nodes by way of a process that has loaded ROS.
+                    if self.process.pid not in (parent, parent_of(parent)):
+                        continue
                 except (FileNotFoundError, ProcessLookupError):
-                    continue
-                if parent != self.process.pid:
                     continue
                 for word in words[:2]:
                     name = word.decode().rpartition("/")[2]
@@ -317,16 +288,12 @@ class Session:
     ) -> None:
         self.bag = folder / "bag"
         self.protocol = protocol_of(*options)
-        node_parameters = parameters(self.protocol, str(self.bag), "{}", real_time=real_time)
-        del node_parameters["bag_recorder"]["publishers"]  # it records until it is stopped
+        given = parameters(self.protocol, self.bag, real_time=real_time)
+        del given["bag_recorder"]["publishers"]  # it records until it is stopped
         if participants:
-            node_parameters["experiment"]["participants"] = list(participants)
-        file = folder / "parameters.yaml"
-        file.write_text(
-            yaml.safe_dump({f"/{n}": {"ros__parameters": p} for n, p in node_parameters.items()})
-        )
+            given["experiment"]["participants"] = list(participants)
         self.supervisor = Supervisor(folder, {**os.environ, "ROS_DOMAIN_ID": str(domain)})
-        self.arguments = ["--ros-args", "--params-file", str(file)]
+        self.arguments = parameter_arguments(given, folder)
         self.probe = Probe(domain)
 
     def start(self, *nodes: str) -> None:
@@ -334,9 +301,9 @@ class Session:
         for node in nodes:
             self.supervisor.start(node, self.arguments)
         for node in nodes:
-            client = self.probe.node.create_client(Ready, f"{node}/ready")
+            service = self.probe.client.service(Ready, f"{node}/ready")
             self.probe.until(
-                lambda client=client: client.service_is_ready() or self.supervisor.ended(), node
+                lambda service=service: service.service_is_ready() or self.supervisor.ended(), node
             )
             assert not self.supervisor.ended(), self.supervisor.last_lines(node)
 
@@ -367,5 +334,5 @@ def session(
             running.start(*nodes)
             yield running
         finally:
-            running.probe.close()
+            running.probe.client.close()
             running.supervisor.stop(STOP_ORDER)

@@ -31,7 +31,7 @@ pytestmark = pytest.mark.skipif(
     find_spec("ros2launch") is None, reason="needs ros2 launch, which the wheels do not bring"
 )
 
-FILES = Path(get_package_share_directory("gait_entrainment_nodes")) / "launch"
+FILES = Path(get_package_share_directory("gait_entrainment_bringup")) / "launch"
 BAG = Path(__file__).parents[2] / "bags" / "paper_example"
 # What `ros2 launch` does with a file and arguments.
 ROS2_LAUNCH = (
@@ -274,7 +274,7 @@ def test_device_is_brought_up_and_its_end_ends_the_launch(tmp_path):
         strides = listener.listen(STRIDES)
         kind, name, qos = GAIT_EVENTS.type, GAIT_EVENTS.name, GAIT_EVENTS.qos
         events = listener.node.create_publisher(kind, name, qos)
-        listener.known_to("gait_analyzer")
+        listener.client.wait_to_be_known("gait_analyzer")
         listener.until(events.get_subscription_count, "the analyzer")
         for step in range(5):
             event = kind(run=1, kind=0, side=(1 + step) % 2, step=step, source="sensor")

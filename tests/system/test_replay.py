@@ -19,11 +19,13 @@ from harness import PATIENCE, Probe, entrain_run, payloads, probe
 
 from gait_entrainment.gait import VerdictSettings
 from gait_entrainment_bags import BagReader, BagWriter
+from gait_entrainment_bags.decoding import decoder_for
 from gait_entrainment_bags.recorded_run import read_run
 from gait_entrainment_bringup import replay_client
 from gait_entrainment_bringup.commands import replay as replay_command
 from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.domain import claimed_domain
+from gait_entrainment_nodes.messaging.errors import NodeError
 from gait_entrainment_nodes.messaging.player_services import srv
 from gait_entrainment_nodes.messaging.raw_messages import serialize
 from gait_entrainment_nodes.messaging.stamps import to_time
@@ -104,7 +106,7 @@ def without(bag: Path, out: Path, drop: Callable[[int, str, Any], bool]) -> Path
             for message in sorted(reader.messages(), key=lambda message: message.place):
                 number = numbers[message.topic]
                 numbers[message.topic] += 1
-                content = reader.decoder(message.topic)(message.data)
+                content = decoder_for(reader.topics[message.topic])(message.data)
                 if not drop(number, message.topic, content):
                     writer.write(
                         message.topic, message.data, message.log_time, message.publish_time
@@ -155,18 +157,19 @@ def test_a_run_in_a_namespace_is_replayed_and_recorded_there(live: Path, tmp_pat
 
 def test_an_analyzer_that_hangs_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(replay_client, "PATIENCE", 3.0)
-    play = replay_client.ReplayClient._ask
+    call = replay_client.ReplayClient.call
 
-    def ask(client: Any, service: str, *arguments: Any) -> None:
-        play(client, service, *arguments)
-        if service == "bag_player/resume":
-            client._supervisor._processes["gait_analyzer"].send_signal(signal.SIGSTOP)
+    def call_and_stall(client: Any, kind: Any, name: str, *arguments: Any, **options: Any) -> Any:
+        answer = call(client, kind, name, *arguments, **options)
+        if name == "bag_player/resume":
+            os.kill(client._supervisor._processes["gait_analyzer"].pid, signal.SIGSTOP)
+        return answer
 
-    monkeypatch.setattr(replay_client.ReplayClient, "_ask", ask)
+    monkeypatch.setattr(replay_client.ReplayClient, "call", call_and_stall)
     options = SimpleNamespace(bag=BAG, rate=1.0, out=None, json=True)
     with claimed_domain() as domain:
         monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))  # undone, where replay sets it
-        with pytest.raises(replay_client.ReplayError, match="no answer of gait_analyzer/ready"):
+        with pytest.raises(NodeError, match="gait_analyzer has been silent for 3 s"):
             replay_command.replay(options, domain)
 
 

@@ -8,7 +8,7 @@ Read it beside the contract in ``gait_entrainment.robot.AnkleRobot``. A real one
 valves in ``schedule`` and report its pressure sensor in ``promise`` and ``read``.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from gait_entrainment.conventions import Side
@@ -79,23 +79,10 @@ class PneumaticAnkleRobot(AnkleRobot):
 
     def promise(self, until: int) -> TorqueProfile:
         """Return the torque in steps of a millisecond."""
-        begin = self._promised
-        times, torques = [begin], [self._torque]
-        while self._next_step < until:
-            self._torque = self._torque_at(self._next_step)
-            asked = self._train.torque_at(self._next_step) if self._train else 0.0
-            self._states.append(RobotState(self._next_step, asked, self._torque, float("nan")))
-            if self._next_step == begin:
-                torques[0] = self._torque
-            elif self._torque != torques[-1]:
-                times.append(self._next_step)
-                torques.append(self._torque)
-            self._next_step += STEP
-        self._promised = until
-        train = self._train
-        onsets = [train.onset(n) for n in range(train.count)] if train else []
-        begun = tuple(onset for onset in onsets if begin <= onset < until)
-        return TorqueProfile(self._side, tuple(times), tuple(torques), begun, until)
+        begin, self._promised = self._promised, until
+        onsets = self._train.onsets_within(begin, until) if self._train else ()
+        changes = self._changes(begin, until)
+        return TorqueProfile.from_changes(self._side, begin, until, changes, onsets)
 
     def read(self) -> Sequence[RobotState]:
         """Return a state for each step."""
@@ -114,6 +101,17 @@ class PneumaticAnkleRobot(AnkleRobot):
     def close(self) -> None:
         """Vent."""
         self._train = None
+
+    def _changes(self, begin: int, until: int) -> Iterator[tuple[int, float]]:
+        """Yield instant [ns] and torque [N m] of each change of torque, and note the states."""
+        yield begin, self._torque
+        while self._next_step < until:
+            before, self._torque = self._torque, self._torque_at(self._next_step)
+            asked = self._train.torque_at(self._next_step) if self._train else 0.0
+            self._states.append(RobotState(self._next_step, asked, self._torque, float("nan")))
+            if self._torque != before:
+                yield self._next_step, self._torque
+            self._next_step += STEP
 
     def _torque_at(self, instant: int) -> float:
         """Return the mean of what was asked for while the muscle filled: an even rise and fall."""

@@ -36,6 +36,6 @@ setup(
     entry_points={
         "console_scripts": [f"{node} = {NAME}.nodes.{node}:main" for node in NODES],
         "gait_entrainment.commands": [f"nodes = {NAME}.commands"],
-        "gait_entrainment.node_check": [f"node = {NAME}.commands.node_check:check_node"],
+        "gait_entrainment.node_check": [f"node = {NAME}.node_bench:check_node"],
     },
 )

@@ -14,37 +14,32 @@ foot AD = l and the leg DC = L at the angle psi. The law of cosines for the side
 so sin(theta) and cos(psi) are linear in each other, which is the paper's function psi(theta)
 solved for the sine. While the walker moves on, theta falls and psi grows.
 
-The functions take plain numbers, import only `math` and call no other: the parameters use them as
-they are, the walker compiles each. Lengths are in m, angles in rad, forces in N, torques in N m,
-masses in kg, rates in rad/s. Equation numbers are those of Ahn and Hogan (2012).
+`body` is anything that has the names of the parameters for what is read of it: `leg_length` L,
+`foot_length` l, `toe_separation` d, `max_plantarflexion` mu, `ankle_stiffness` k, `mass`,
+`gravity`. The functions import only `math` and call no other: the parameters use them as they are,
+the walker compiles each. Lengths are in m, angles in rad, forces in N, torques in N m, masses in
+kg, rates in rad/s. Equation numbers are those of Ahn and Hogan (2012).
 """
 
 import math
+from typing import Any
 
 
-def leg_sine(cos_ankle: float, leg_length: float, foot_length: float, separation: float) -> float:
-    """
-    Sine of the leading leg's lean theta where the trailing ankle's angle psi has this cosine.
-
-    `separation` is d, the distance from the trailing toe to the leading heel.
-    """
-    offset = (separation * separation - foot_length * foot_length) / (2 * leg_length * separation)
-    return offset + foot_length / separation * cos_ankle
+def leg_sine(body: Any, cos_ankle: float) -> Any:
+    """Sine of the leading leg's lean theta if the trailing ankle's angle psi has this cosine."""
+    leg, foot, gap = body.leg_length, body.foot_length, body.toe_separation
+    return (gap * gap - foot * foot) / (2 * leg * gap) + foot / gap * cos_ankle
 
 
-def ankle_cosine(
-    sin_leg: float, leg_length: float, foot_length: float, separation: float
-) -> float:
+def ankle_cosine(body: Any, sin_leg: float) -> Any:
     """Cosine of the trailing ankle's angle psi at this sine of theta: inverse of `leg_sine`."""
-    offset = (separation * separation - foot_length * foot_length) / (2 * leg_length * separation)
-    return (sin_leg - offset) * separation / foot_length
+    leg, foot, gap = body.leg_length, body.foot_length, body.toe_separation
+    return (sin_leg - (gap * gap - foot * foot) / (2 * leg * gap)) * gap / foot
 
 
-def leg_per_ankle(
-    sin_ankle: float, cos_leg: float, foot_length: float, separation: float
-) -> float:
+def leg_per_ankle(body: Any, sin_ankle: float, cos_leg: float) -> Any:
     """Transmission -d theta / d psi of the linkage, positive: the derivative of `leg_sine`."""
-    return foot_length / separation * sin_ankle / cos_leg
+    return body.foot_length / body.toe_separation * sin_ankle / cos_leg
 
 
 def drop(sin_leg: float, cos_leg: float) -> float:
@@ -56,9 +51,9 @@ def drop(sin_leg: float, cos_leg: float) -> float:
     return sin_leg * sin_leg / (1.0 + cos_leg)
 
 
-def spring_torque(ankle: float, stiffness: float, max_plantarflexion: float) -> float:
+def spring_torque(body: Any, ankle: float) -> Any:
     """Torque of the trailing ankle's spring, Eq. 1."""
-    return stiffness * (max_plantarflexion - ankle)
+    return body.ankle_stiffness * (body.max_plantarflexion - ankle)
 
 
 def torque_work(angle: float, torque: float, stiffness: float) -> float:
@@ -66,25 +61,18 @@ def torque_work(angle: float, torque: float, stiffness: float) -> float:
     return angle * (torque - 0.5 * stiffness * angle)
 
 
-def trailing_reach(cos_ankle: float, leg_length: float, foot_length: float) -> float:
+def trailing_reach(body: Any, cos_ankle: float) -> float:
     """Distance AC [m] from the trailing toe to the mass."""
-    return math.sqrt(
-        leg_length * leg_length
-        + foot_length * foot_length
-        - 2 * leg_length * foot_length * cos_ankle
-    )
+    leg, foot = body.leg_length, body.foot_length
+    return math.sqrt(leg * leg + foot * foot - 2 * leg * foot * cos_ankle)
 
 
-def trailing_force(
-    torque: float, sin_ankle: float, reach: float, leg_length: float, foot_length: float
-) -> float:
+def trailing_force(body: Any, torque: float, sin_ankle: float, reach: float) -> Any:
     """Ground reaction F_A at the trailing toe, along AC = reach: moments on the foot, Eq. 5."""
-    return torque * reach / (leg_length * foot_length * sin_ankle)
+    return torque * reach / (body.leg_length * body.foot_length * sin_ankle)
 
 
-def unloading_arm(
-    sin_ankle: float, sin_leg: float, leg_length: float, foot_length: float, separation: float
-) -> float:
+def unloading_arm(body: Any, sin_ankle: float, sin_leg: float) -> Any:
     """
     Force that a newton metre of trailing ankle torque takes off the leading leg [1/m].
 
@@ -92,40 +80,31 @@ def unloading_arm(
     |AC| cos(phi) = d - L sin(theta) and |AC| sin(phi) = L cos(theta), is
     -T (L - d sin(theta)) / (L l sin(psi)).
     """
-    return (leg_length - separation * sin_leg) / (leg_length * foot_length * sin_ankle)
+    leg, foot = body.leg_length, body.foot_length
+    return (leg - body.toe_separation * sin_leg) / (leg * foot * sin_ankle)
 
 
-def pendulum_force(
-    cos_leg: float, squared_rate: float, mass: float, gravity: float, leg_length: float
-) -> float:
+def pendulum_force(body: Any, cos_leg: float, squared_rate: float) -> Any:
     """Ground reaction [N] on an inverted pendulum, m g cos(theta) - m L theta_dot^2."""
-    return mass * (gravity * cos_leg - leg_length * squared_rate)
+    return body.mass * (body.gravity * cos_leg - body.leg_length * squared_rate)
 
 
-def trailing_leg_angle(
-    ankle: float, sin_leg: float, leg_length: float, foot_length: float, separation: float
-) -> float:
+def trailing_leg_angle(body: Any, ankle: float, sin_leg: float) -> float:
     """
     Angle of the trailing leg from the vertical, positive with the ankle ahead of the mass.
 
     The direction from the mass to the toe, turned back by the angle between leg and line CA.
     """
+    leg, foot = body.leg_length, body.foot_length
     cos_leg = math.sqrt(1.0 - sin_leg * sin_leg)
-    toe = math.atan2(leg_length * sin_leg - separation, leg_length * cos_leg)
-    foot = math.atan2(foot_length * math.sin(ankle), leg_length - foot_length * math.cos(ankle))
-    return toe - foot
+    to_toe = math.atan2(leg * sin_leg - body.toe_separation, leg * cos_leg)
+    return to_toe - math.atan2(foot * math.sin(ankle), leg - foot * math.cos(ankle))
 
 
 def trailing_leg_per_ankle(
-    ankle: float,
-    sin_leg: float,
-    transmission: float,
-    reach: float,
-    leg_length: float,
-    foot_length: float,
-    separation: float,
-) -> float:
+    body: Any, ankle: float, sin_leg: float, transmission: float, reach: float
+) -> Any:
     """Derivative of `trailing_leg_angle` by psi; `transmission` and `reach` as at that posture."""
-    toe = transmission * leg_length * (leg_length - separation * sin_leg)
-    foot = foot_length * (leg_length * math.cos(ankle) - foot_length)
-    return -(toe + foot) / (reach * reach)
+    leg, foot = body.leg_length, body.foot_length
+    to_toe = transmission * leg * (leg - body.toe_separation * sin_leg)
+    return -(to_toe + foot * (leg * math.cos(ankle) - foot)) / (reach * reach)

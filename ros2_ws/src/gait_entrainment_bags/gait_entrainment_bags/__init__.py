@@ -11,42 +11,13 @@ from gait_entrainment_bags.errors import (
     BagWriteError,
     DefinitionMissingError,
     DiskFullError,
+    NoBagError,
     UnreadableBagError,
 )
-from gait_entrainment_bags.mcap_file import BagMessage
+from gait_entrainment_bags.mcap_records import BagMessage
 from gait_entrainment_bags.metadata import INFINITE, QosProfile, TopicInfo
 from gait_entrainment_bags.playback import FASTEST, Moment, Playback, choose_topics
 from gait_entrainment_bags.reader import BagInfo, BagReader, info
 from gait_entrainment_bags.recovery import Recovery, recover
 from gait_entrainment_bags.tables import export
 from gait_entrainment_bags.writer import ENDED_EARLY, BagWriter
-
-__all__ = [
-    "BagWriter",
-    "ENDED_EARLY",
-    "BagReader",
-    "BagMessage",
-    "BagInfo",
-    "info",
-    "check",
-    "Finding",
-    "Severity",
-    "recover",
-    "Recovery",
-    "export",
-    "Playback",
-    "Moment",
-    "FASTEST",
-    "choose_topics",
-    "TopicInfo",
-    "QosProfile",
-    "INFINITE",
-    "Definition",
-    "find_definition",
-    "BagError",
-    "BagExistsError",
-    "UnreadableBagError",
-    "DefinitionMissingError",
-    "BagWriteError",
-    "DiskFullError",
-]

@@ -15,18 +15,15 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
+from mcap.records import Schema
+from mcap_ros2.decoder import DecoderFactory
+
 from gait_entrainment_bags.errors import BagError, UnreadableBagError
 from gait_entrainment_bags.metadata import TopicInfo, first_line
 
 CDR_HEADER_SIZE = 4
-_NOT_DECODED = (
-    struct.error,
-    ValueError,
-    IndexError,
-    NotImplementedError,
-    MemoryError,
-    RecursionError,  # a definition that contains itself
-)
+# The last one includes what is not implemented, and the recursion of what contains itself.
+_NOT_DECODED = (struct.error, ValueError, IndexError, MemoryError, RuntimeError)
 
 
 @cache
@@ -34,29 +31,18 @@ def decoder_for(topic: TopicInfo) -> Callable[[bytes], Any]:
     """
     Make a decoder: CDR in, an object with one attribute per field out.
 
-    The decoder raises UnreadableBagError for bytes that are no message of the type.
-
-    Raises
-    ------
-    BagError
-        The definition cannot be understood.
-
+    Raises BagError if the definition cannot be understood; the decoder raises UnreadableBagError
+    for bytes that are no message of the type.
     """
-    # Both are slow to import (together some 20 ms), and reading raw messages needs neither.
-    from mcap.records import Schema
-    from mcap_ros2.decoder import DecoderFactory
-
     schema = Schema(1, topic.schema_text.encode(), "ros2msg", topic.type)
     try:
         # The parser prints what it raises.
         with contextlib.redirect_stderr(None):
-            decode = DecoderFactory().decoder_for("cdr", schema)
+            decode: Any = DecoderFactory().decoder_for("cdr", schema)
     except Exception as error:  # its parser raises whatever a line of text leads it to
         raise BagError(
             f"{topic.name}: the definition of {topic.type} cannot be used: {first_line(error)}"
         ) from None
-    if decode is None:
-        raise BagError(f"{topic.name}: no decoder for {topic.type}")
 
     def decode_or_say(data: bytes) -> Any:
         try:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Definitions of message types as installed: the text that makes a bag readable anywhere.
+Definitions of message types: as installed, and as the text that makes a bag readable anywhere.
 
 They are read from the ``share`` folders of a ROS 2 installation, without ROS itself: ``.msg``
 files for messages, the ``.json`` type descriptions beside them for the type hashes, and for the
@@ -22,37 +22,21 @@ from gait_entrainment_bags.errors import DefinitionMissingError
 
 SEPARATOR = "=" * 80
 
-BUILT_IN_TYPES = frozenset(
-    f"{kind}{bits}" for kind in ("int", "uint") for bits in (8, 16, 32, 64)
-) | {"bool", "byte", "char", "float32", "float64", "string", "wstring"}
-
 # type_description_interfaces/msg/FieldType: kinds of values, to which 48 is added for an array
 # of fixed length, 96 for a bounded and 144 for an unbounded sequence.
 _VALUE_TYPES = {
-    2: "int8",
-    3: "uint8",
-    4: "int16",
-    5: "uint16",
-    6: "int32",
-    7: "uint32",
-    8: "int64",
-    9: "uint64",
-    10: "float32",
-    11: "float64",
-    13: "char",
-    15: "bool",
-    16: "byte",
-    17: "string",
-    18: "wstring",
-    21: "string<={}",
-    22: "wstring<={}",
-}
+    2: "int8", 3: "uint8", 4: "int16", 5: "uint16", 6: "int32", 7: "uint32", 8: "int64",
+    9: "uint64", 10: "float32", 11: "float64", 13: "char", 15: "bool", 16: "byte", 17: "string",
+    18: "wstring", 21: "string<={}", 22: "wstring<={}",
+}  # fmt: skip
 _NESTED_TYPE = 1
 _KINDS_OF_VALUES = 48
+BUILT_IN_TYPES = frozenset(name for name in _VALUE_TYPES.values() if "<" not in name)
 
 _TYPE_NAME = re.compile(r"([A-Za-z]\w*)/(msg|srv|action)/([A-Za-z]\w*)")
-# What a nested name belongs to: Trigger_Event to Trigger, Walk_FeedbackMessage to Walk.
-_PARENT_NAME = re.compile(r"[^_]+")
+# Type, bound of a text, brackets of an array and what is in them, name; no constant.
+_FIELD = re.compile(r"\s*([\w/]+)(?:<=\d+)?(\[(<?=?\d*)\])?\s+(\w+)\b(?!\s*=)")
+_UNIT = re.compile(r"\[([A-Za-z][^\[\]]*)\]")
 
 
 @dataclass(frozen=True)
@@ -66,21 +50,11 @@ class Definition:
 
 def find_definition(type_name: str, prefixes: Iterable[Path | str] | None = None) -> Definition:
     """
-    Gather the definition of a message type.
+    Gather the definition of ``package/msg/Type``, or of a message inside a service or an action.
 
-    Parameters
-    ----------
-    type_name
-        ``package/msg/Type``, or a message inside a service or an action such as
-        ``package/action/Walk_FeedbackMessage``.
-    prefixes
-        Folders that hold ``share/``; those of AMENT_PREFIX_PATH if None.
-
-    Raises
-    ------
-    DefinitionMissingError
-        The type or one of those it is made of is not installed, or cannot be read.
-
+    The prefixes are folders that hold ``share/``; those of AMENT_PREFIX_PATH if None. Raises
+    DefinitionMissingError if the type or one that it is made of is not installed, or cannot be
+    read. The name of a message inside an action is ``package/action/Walk_FeedbackMessage``.
     """
     if prefixes is None:
         prefixes = filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep))
@@ -94,30 +68,26 @@ def find_definition(type_name: str, prefixes: Iterable[Path | str] | None = None
 
 @cache
 def _find_definition(type_name: str, prefixes: tuple[Path, ...]) -> Definition:
-    parts = [_text_of(type_name, prefixes)]
-    seen = {type_name}
-    waiting = list(_dependencies(type_name, parts[0]))
+    parts: dict[str, str] = {}
+    waiting = [type_name]
     while waiting:
-        dependency = waiting.pop(0)
-        if dependency in seen:
-            continue
-        seen.add(dependency)
-        text = _text_of(dependency, prefixes)
-        parts.append(f"{SEPARATOR}\nMSG: {_short(dependency)}\n{text}")
-        waiting += _dependencies(dependency, text)
-    return Definition(type_name, "\n".join(parts), _hash_of(type_name, prefixes))
+        name = waiting.pop(0)
+        if name not in parts:
+            text = _text_of(name, prefixes)
+            parts[name] = f"{SEPARATOR}\nMSG: {short_name(name)}\n{text}" if parts else text
+            waiting += _dependencies(name, text)
+    for entry in _description_of(type_name, prefixes)["type_hashes"]:
+        if entry["type_name"] == type_name:
+            return Definition(type_name, "\n".join(parts.values()), entry["hash_string"])
+    raise DefinitionMissingError(f"{type_name}: its type description gives no hash")
 
 
 def _text_of(type_name: str, prefixes: tuple[Path, ...]) -> str:
     package, kind, name = _split(type_name)
     if kind == "msg":
-        path = _find_file(f"share/{package}/msg/{name}.msg", type_name, prefixes)
-        return _read(path, type_name)
-    description = _description_of(type_name, prefixes)["type_description_msg"]
-    for described in (
-        description["type_description"],
-        *description["referenced_type_descriptions"],
-    ):
+        return _read(f"share/{package}/msg/{name}.msg", type_name, prefixes)
+    found = _description_of(type_name, prefixes)["type_description_msg"]
+    for described in (found["type_description"], *found["referenced_type_descriptions"]):
         if described["type_name"] == type_name:
             return "".join(_field_line(field) for field in described["fields"])
     raise DefinitionMissingError(f"{type_name}: not in the type description of {package}")
@@ -127,54 +97,83 @@ def _field_line(field: Mapping[str, Any]) -> str:
     described = field["type"]
     sequence, value = divmod(described["type_id"], _KINDS_OF_VALUES)
     if value == _NESTED_TYPE:
-        text = _short(described["nested_type_name"])
+        text = short_name(described["nested_type_name"])
     else:
         text = _VALUE_TYPES[value].format(described["string_capacity"])
     capacity = described["capacity"]
     return text + ("", f"[{capacity}]", f"[<={capacity}]", "[]")[sequence] + f" {field['name']}\n"
 
 
-def _hash_of(type_name: str, prefixes: tuple[Path, ...]) -> str:
-    for entry in _description_of(type_name, prefixes)["type_hashes"]:
-        if entry["type_name"] == type_name:
-            return str(entry["hash_string"])
-    raise DefinitionMissingError(f"{type_name}: its type description gives no hash")
-
-
 def _description_of(type_name: str, prefixes: tuple[Path, ...]) -> Any:
     package, kind, name = _split(type_name)
-    if kind != "msg":
-        parent = _PARENT_NAME.match(name)
-        name = parent.group() if parent else name
-    path = _find_file(f"share/{package}/{kind}/{name}.json", type_name, prefixes)
+    # Of a service or an action: Trigger_Event belongs to Trigger, Walk_FeedbackMessage to Walk.
+    file = f"share/{package}/{kind}/{name if kind == 'msg' else name.partition('_')[0]}.json"
     try:
-        return json.loads(_read(path, type_name))
+        return json.loads(_read(file, type_name, prefixes))
     except ValueError:
-        raise DefinitionMissingError(f"{type_name}: {path} is not valid JSON") from None
+        raise DefinitionMissingError(f"{type_name}: {file} is not valid JSON") from None
+
+
+def _read(relative: str, type_name: str, prefixes: tuple[Path, ...]) -> str:
+    """Read a file of the first prefix that has it."""
+    path = next((prefix / relative for prefix in prefixes if (prefix / relative).is_file()), None)
+    if path is None:
+        where = ", ".join(map(str, prefixes)) or "AMENT_PREFIX_PATH, which is empty"
+        raise DefinitionMissingError(f"{type_name}: no {relative} in {where}")
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        raise DefinitionMissingError(f"{type_name}: {path} cannot be read: {error}") from None
+
+
+@dataclass(frozen=True)
+class Field:
+    """A field of a definition: its type without bounds, built in or ``package/Type``."""
+
+    name: str
+    type: str
+    length: int | None  # of an array; -1: any length; None: not an array
+    unit: str
+
+
+def fields_of(text: str, package: str) -> Iterator[Field]:
+    """
+    Read the fields of a definition, constants left out, with the units in their comments.
+
+    A unit stands in brackets, ``[N m]``. One in the comment at the head of the definition holds
+    for every field that has none of its own.
+    """
+    head_unit, in_head = "", True
+    for line in text.splitlines():
+        code, _, comment = line.partition("#")
+        found = _UNIT.search(comment)
+        unit = found.group(1) if found else ""
+        in_head = in_head and not code.strip()
+        if in_head:
+            head_unit = head_unit or unit
+        if field := _FIELD.match(code):
+            type_name, array, size, name = field.groups()
+            if type_name not in BUILT_IN_TYPES and "/" not in type_name:
+                type_name = f"{package}/{type_name}"
+            length = None if array is None else int(size) if size.isdecimal() else -1
+            yield Field(name, type_name, length, unit or head_unit)
 
 
 def _dependencies(type_name: str, text: str) -> Iterator[str]:
     """Give the full names of the message types that a definition names, in its order."""
     package, kind, _ = _split(type_name)
-    for line in text.splitlines():
-        words = line.split("#", 1)[0].split()
-        # A constant (uint8 LEFT=0) has a built-in type as well, so nothing is taken for a type.
-        if len(words) < 2:
-            continue
-        base = words[0].split("[", 1)[0].split("<", 1)[0]
-        if base in BUILT_IN_TYPES:
-            continue
-        owner, _, name = base.rpartition("/")
-        # In a text made from a type description names with an underscore are those of the same
-        # service or action.
-        nested = kind if "_" in name else "msg"
-        yield f"{owner or package}/{nested}/{name}"
+    for field in fields_of(text, package):
+        if field.type not in BUILT_IN_TYPES:
+            owner, _, name = field.type.rpartition("/")
+            # In a text made from a type description names with an underscore are those of the
+            # same service or action.
+            yield f"{owner}/{kind if '_' in name else 'msg'}/{name}"
 
 
 def schema_parts(type_name: str, schema_text: str) -> dict[str, str]:
     """Take the text of a schema apart: definitions by ``package/Type``, the root one first."""
     root, *others = schema_text.split(f"{SEPARATOR}\nMSG: ")
-    parts = {_short(type_name): root}
+    parts = {short_name(type_name): root}
     for other in others:
         name, _, text = other.partition("\n")
         parts[name.strip().replace("/msg/", "/")] = text
@@ -183,8 +182,7 @@ def schema_parts(type_name: str, schema_text: str) -> dict[str, str]:
 
 def definition_lines(schema_text: str) -> list[list[str]]:
     """Return the words of a definition: what is left without comments and empty lines."""
-    lines = (line.partition("#")[0].split() for line in schema_text.splitlines())
-    return [words for words in lines if words]
+    return [w for line in schema_text.splitlines() if (w := line.partition("#")[0].split())]
 
 
 def missing_definitions(type_name: str, schema_text: str) -> list[str]:
@@ -194,7 +192,7 @@ def missing_definitions(type_name: str, schema_text: str) -> list[str]:
         parts = schema_parts(type_name, schema_text)
         for name, text in parts.items():
             full = name.replace("/", "/msg/", 1)
-            needed |= {_short(dependency) for dependency in _dependencies(full, text)}
+            needed |= {short_name(dependency) for dependency in _dependencies(full, text)}
     except DefinitionMissingError as error:
         return [str(error)]
     return sorted(needed - parts.keys())
@@ -205,7 +203,8 @@ def is_type_name(name: str) -> bool:
     return _TYPE_NAME.fullmatch(name) is not None
 
 
-def _short(type_name: str) -> str:
+def short_name(type_name: str) -> str:
+    """Return ``package/Type`` for ``package/msg/Type``."""
     package, _, name = _split(type_name)
     return f"{package}/{name}"
 
@@ -215,18 +214,3 @@ def _split(type_name: str) -> tuple[str, str, str]:
     if match is None:
         raise DefinitionMissingError(f"{type_name!r}: a type name reads package/msg/Type")
     return match.group(1), match.group(2), match.group(3)
-
-
-def _find_file(relative: str, type_name: str, prefixes: tuple[Path, ...]) -> Path:
-    for prefix in prefixes:
-        if (path := prefix / relative).is_file():
-            return path
-    where = ", ".join(str(prefix) for prefix in prefixes) or "AMENT_PREFIX_PATH, which is empty"
-    raise DefinitionMissingError(f"{type_name}: no {relative} in {where}")
-
-
-def _read(path: Path, type_name: str) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, ValueError) as error:
-        raise DefinitionMissingError(f"{type_name}: {path} cannot be read: {error}") from None

@@ -1,37 +1,63 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""
-What can go wrong with a bag. Each message is one line for people.
+"""What can go wrong with a bag. Each message is one line for people."""
 
-    BagError
-      BagExistsError           the folder to record into is already there
-      UnreadableBagError       not a bag, or a damaged or unfinished one
-      DefinitionMissingError   no definition of a message type is installed
-      BagWriteError            the recording could not go on
-        DiskFullError          ... because the disk is full
-"""
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from gait_entrainment.errors import EntrainmentError
 
 
-class BagError(Exception):
-    """Anything about a bag that stops what was asked for."""
+class BagError(EntrainmentError):
+    """Whatever about a bag prevents what was asked for."""
 
 
 class BagExistsError(BagError):
-    """The folder to record into is already there; nothing was touched."""
+    """The folder to make is already there; nothing was touched."""
+
+    exit_code = 2
 
 
 class UnreadableBagError(BagError):
-    """Not a bag, or one that is damaged, or that was never closed."""
+    """Not a bag, or one that is damaged or was never closed."""
+
+
+class NoBagError(UnreadableBagError):
+    """There is nothing at the path that was given."""
+
+    exit_code = 2
 
 
 class DefinitionMissingError(BagError):
-    """No message definition for a type is installed, so no viewer could decode its messages."""
+    """No definition of a message type is installed, so no viewer could decode its messages."""
 
 
 class BagWriteError(BagError):
-    """The recording could not go on; what had been written before is still there."""
+    """The recording could not go on; what was written before is still there."""
 
 
 class DiskFullError(BagWriteError):
     """The disk is full; the message says whether the bag could be closed."""
+
+
+@contextmanager
+def noting(note: Callable[[str], object]) -> Iterator[None]:
+    """Note what turns out to be unreadable, and go on after it."""
+    try:
+        yield
+    except UnreadableBagError as error:
+        note(str(error))
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder that is not there yet; raises BagExistsError or BagWriteError."""
+    try:
+        folder.mkdir(parents=True)
+    except FileExistsError:
+        raise BagExistsError(
+            f"{folder}: is already there; choose another folder, nothing is overwritten"
+        ) from None
+    except OSError as error:
+        raise BagWriteError(f"{folder}: cannot be made: {error.strerror}") from None

@@ -1,11 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""
-Figures of one run: stride period, phase lag, timing of the pulses, ankle torque by stride.
-
-matplotlib is imported only when a figure is drawn: it takes longer than a whole simulation.
-"""
+"""Figures of one run: stride period, phase lag, timing of the pulses, ankle torque by stride."""
 
 from pathlib import Path
 from typing import Any
@@ -13,16 +9,16 @@ from typing import Any
 import numpy as np
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
-from gait_entrainment.drawing import BLUE, GREEN, GREY, ORANGE
+from gait_entrainment.drawing import BLUE, GREEN, GREY, ORANGE, new_figure
 from gait_entrainment.robot.timing import distribution, lateness_ms
 from gait_entrainment_bags.recorded_run import RecordedRun, drawn_strides
+
+_SIZE = (7.2, 3.6)
+_DOTTED_LINE = {"color": BLUE, "marker": ".", "lw": 0.8}
 
 
 def draw_figures(run: RecordedRun, folder: Path) -> list[Path]:
     """Draw the figures of a run as PNG files into a folder; return their paths."""
-    import matplotlib
-
-    matplotlib.use("Agg")
     figures = {
         "stride_period.png": _stride_period(run),
         "phase_lag.png": _phase_lag(run),
@@ -34,27 +30,11 @@ def draw_figures(run: RecordedRun, folder: Path) -> list[Path]:
     return [folder / name for name in figures]
 
 
-def _axes(height: float = 3.6) -> tuple[Any, Any]:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.2, height), layout="constrained")
-    axes = figure.subplots()
-    axes.spines[["top", "right"]].set_visible(False)
-    return figure, axes
-
-
-def _shade_pulses(run: RecordedRun, axes: Any) -> None:
-    """Shade the strides in which pulses were given."""
-    strides = [p.stride for p in run.analysis.pulses]
-    if strides:
-        axes.axvspan(
-            min(strides) - 0.5, max(strides) + 0.5, color=ORANGE, alpha=0.10, lw=0, label="pulses"
-        )
-
-
 def _stride_period(run: RecordedRun) -> Any:
-    figure, axes = _axes()
-    _shade_pulses(run, axes)
+    figure, axes = new_figure(size=_SIZE)
+    if given := [pulse.stride for pulse in run.analysis.pulses]:
+        span = min(given) - 0.5, max(given) + 0.5
+        axes.axvspan(*span, color=ORANGE, alpha=0.10, lw=0, label="pulses")
     for period, text, colour, style in (
         (run.measured_period, "unperturbed", GREY, "--"),
         (run.pulse_period, "pulse period", ORANGE, "-."),
@@ -62,7 +42,7 @@ def _stride_period(run: RecordedRun) -> Any:
         if np.isfinite(period):
             axes.axhline(period, color=colour, ls=style, lw=1.2, label=f"{text} {period:.4f} s")
     strides = [s for s in run.analysis.strides if s.number <= run.protocol.strides]
-    axes.plot([s.number for s in strides], [s.period for s in strides], ".-", color=BLUE, lw=0.8)
+    axes.plot([s.number for s in strides], [s.period for s in strides], **_DOTTED_LINE)
     axes.set(xlabel="stride", ylabel="stride period [s]", title="Stride period")
     axes.ticklabel_format(useOffset=False)
     if axes.get_legend_handles_labels()[0]:
@@ -71,45 +51,33 @@ def _stride_period(run: RecordedRun) -> Any:
 
 
 def _phase_lag(run: RecordedRun) -> Any:
-    figure, axes = _axes()
-    pulses = run.analysis.pulses
+    figure, axes = new_figure(size=_SIZE)
     axes.axhline(0, color=GREY, ls="--", lw=1.2, label="toe-off: end of double stance")
-    axes.plot(
-        [p.stride for p in pulses],
-        [p.phase_lag * 1e3 for p in pulses],
-        ".-",
-        color=BLUE,
-        lw=0.8,
-        label="pulse onset",
-    )
+    strides = [pulse.stride for pulse in run.analysis.pulses]
+    lags = [pulse.phase_lag * 1e3 for pulse in run.analysis.pulses]
+    axes.plot(strides, lags, label="pulse onset", **_DOTTED_LINE)
     last = run.analysis.entrainments[-1] if run.analysis.entrainments else None
-    if last is not None and last.entrained_since_stride:
-        axes.axvline(
-            last.entrained_since_stride,
-            color=GREEN,
-            lw=1.2,
-            label=f"near its final lag since stride {last.entrained_since_stride}",
-        )
+    if last is not None and (since := last.entrained_since_stride):
+        label = f"near its final lag since stride {since}"
+        axes.axvline(since, color=GREEN, lw=1.2, label=label)
     axes.set(xlabel="stride", ylabel="onset minus toe-off [ms]", title="Phase lag of the pulses")
     axes.legend(frameon=False)
     return figure
 
 
 def _pulse_timing(run: RecordedRun) -> Any:
-    """Draw which share of the pulses was sent, and was measured, at most so late."""
-    figure, axes = _axes()
+    """Draw which share of the pulses was sent, and was measured, by how late at most."""
+    figure, axes = new_figure(size=_SIZE)
     for kind, colour, style in (("sent", ORANGE, "--"), ("measured", BLUE, "-")):
         late = distribution(run.timings, kind, run.measured_period)
         if late is None:
             continue
-        figures = f"median {late['median_ms']:.1f}, 99 % {late['p99_ms']:.1f}"
         missing = f"; {late['missing']} never seen" if late["missing"] else ""
-        axes.ecdf(
-            lateness_ms(run.timings, kind),
-            color=colour,
-            ls=style,
-            label=f"{kind}: {figures}, worst {late['worst_ms']:.1f} ms{missing}",
+        label = (
+            f"{kind}: median {late['median_ms']:.1f}, 99 % {late['p99_ms']:.1f}, "
+            f"worst {late['worst_ms']:.1f} ms{missing}"
         )
+        axes.ecdf(lateness_ms(run.timings, kind), color=colour, ls=style, label=label)
     axes.set(
         xlabel="onset after its command [ms]",
         ylabel="share of the pulses",
@@ -118,10 +86,8 @@ def _pulse_timing(run: RecordedRun) -> Any:
     )
     if np.isfinite(run.measured_period):
         percent = 10 * run.measured_period  # [ms]
-        above = axes.secondary_xaxis(
-            "top", functions=(lambda ms: ms / percent, lambda share: share * percent)
-        )
-        above.set_xlabel("[% of the unperturbed stride]")
+        scales = (lambda ms: ms / percent, lambda share: share * percent)
+        axes.secondary_xaxis("top", functions=scales).set_xlabel("[% of the unperturbed stride]")
     if axes.get_legend_handles_labels()[0]:
         axes.axvline(0, color=GREY, lw=1.2)  # so that the command is in view
         figure.legend(loc="outside lower center", frameon=False)
@@ -131,7 +97,7 @@ def _pulse_timing(run: RecordedRun) -> Any:
 def _ankle_torque(run: RecordedRun) -> Any:
     """Draw one line of ankle torque per stride, from the other leg's heel strike on, as Fig. 7."""
     rows = drawn_strides(run.protocol, run.analysis)
-    figure, axes = _axes(height=2 + 0.28 * len(rows))
+    figure, axes = new_figure(size=(7.2, 2 + 0.28 * len(rows)))
     torques = run.torques
     peak = run.protocol.walker.peak_torque
     scale = 0.9 / peak
@@ -147,13 +113,7 @@ def _ankle_torque(run: RecordedRun) -> Any:
         axes.fill_between(time, row - own, row - whole, color=ORANGE, lw=0)
         axes.plot(time, row - whole, color=BLUE, lw=0.6)
         axes.plot(time[delivered], np.full(delivered.sum(), row + 0.12), "s", ms=1.5, color=ORANGE)
-        axes.text(
-            longest * 1.01 if row else stride.period * 1.01,
-            row,
-            f"{stride.period:.4f} s",
-            fontsize=7,
-            va="bottom",
-        )
+        axes.text(longest * 1.01, row, f"{stride.period:.4f} s", fontsize=7, va="bottom")
     axes.text(longest * 1.01, -0.85, "stride period", fontsize=7)
     axes.set_yticks(range(len(rows)), [str(s.number) for s in rows], fontsize=7)
     axes.invert_yaxis()

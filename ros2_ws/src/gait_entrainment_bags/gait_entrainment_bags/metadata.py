@@ -9,52 +9,50 @@ which holds the same map without its root key. The form is that of rosbag2's Jaz
 (``rosbag2_storage/yaml.hpp`` and ``qos.cpp``).
 """
 
+import contextlib
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import yaml
+from mcap.records import Channel, Metadata, Schema
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment_bags.errors import UnreadableBagError
 
 METADATA_VERSION = 9
 METADATA_FILE = "metadata.yaml"
-ROOT_KEY = "rosbag2_bagfile_information"
 RECORD_NAME = "rosbag2"  # of the MCAP metadata record
-RECORD_KEY = "serialized_metadata"
+_ROOT_KEY = "rosbag2_bagfile_information"
+_RECORD_KEY = "serialized_metadata"
 
 INFINITE = 2**63 - 1
 """Duration [ns] by which DDS says "no limit": 9223372036 s and 854775807 ns."""
 
 # The spelling of rosbag2's version 9 by the integers that earlier versions used.
-QOS_POLICIES: dict[str, dict[int, str]] = {
-    "history": {0: "system_default", 1: "keep_last", 2: "keep_all", 3: "unknown"},
-    "reliability": {
-        0: "system_default",
-        1: "reliable",
-        2: "best_effort",
-        3: "unknown",
-        4: "best_available",
-    },
-    "durability": {
-        0: "system_default",
-        1: "transient_local",
-        2: "volatile",
-        3: "unknown",
-        4: "best_available",
-    },
-    "liveliness": {
-        0: "system_default",
-        1: "automatic",
-        3: "manual_by_topic",
-        4: "unknown",
-        5: "best_available",
-    },
+QOS_POLICIES = {
+    policy: {number: word for number, word in enumerate(words.split()) if word != "-"}
+    for policy, words in {
+        "history": "system_default keep_last keep_all unknown",
+        "reliability": "system_default reliable best_effort unknown best_available",
+        "durability": "system_default transient_local volatile unknown best_available",
+        "liveliness": "system_default automatic - manual_by_topic unknown best_available",
+    }.items()
 }
 _QOS_DURATIONS = ("deadline", "lifespan", "liveliness_lease_duration")
+
+# Keys that a version has added to those of version 1.
+_ADDED = {
+    "offered_qos_profiles": 4,
+    "files": 5,
+    "custom_data": 6,
+    "type_description_hash": 7,
+    "ros_distro": 8,
+}
+# Keys whose kind depends on the version, or does not matter.
+_OF_ANY_KIND = ("offered_qos_profiles", "custom_data", "type_description_hash")
 
 
 @dataclass(frozen=True)
@@ -62,11 +60,7 @@ class QosProfile:
     """
     Quality of service that a publisher offered, in rosbag2's terms; durations in nanoseconds.
 
-    Raises
-    ------
-    ValueError
-        A policy is not spelled as rosbag2 spells it.
-
+    Raises ValueError if a policy is not spelled as rosbag2 spells it.
     """
 
     history: str = "keep_last"
@@ -87,13 +81,11 @@ class QosProfile:
 
     def as_map(self) -> dict[str, Any]:
         """Give the map of nine keys that rosbag2 writes."""
-        durations = {name: _duration(getattr(self, name)) for name in _QOS_DURATIONS}
-        return asdict(self) | durations
-
-
-def _duration(nanoseconds: int) -> dict[str, int]:
-    seconds, rest = divmod(nanoseconds, NANOSECONDS_PER_SECOND)
-    return {"sec": seconds, "nsec": rest}
+        values = asdict(self)
+        for name in _QOS_DURATIONS:
+            seconds, rest = divmod(values[name], NANOSECONDS_PER_SECOND)
+            values[name] = {"sec": seconds, "nsec": rest}
+        return values
 
 
 @dataclass(frozen=True)
@@ -112,9 +104,9 @@ class TopicInfo:
     qos_profiles: tuple[QosProfile, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass
 class FileInformation:
-    """One file of a bag; times in nanoseconds, 0 where it holds no message."""
+    """One file of a bag; times in nanoseconds, 0 if it holds no message."""
 
     path: str
     start: int = 0
@@ -126,8 +118,8 @@ class FileInformation:
 class BagDescription:
     """All that ``metadata.yaml`` says about a bag."""
 
-    topics: tuple[tuple[TopicInfo, int], ...]  # each with its number of messages
-    files: tuple[FileInformation, ...]
+    topics: Sequence[tuple[TopicInfo, int]]  # each with its number of messages
+    files: Sequence[FileInformation]
     custom_data: Mapping[str, str] = field(default_factory=dict)
     ros_distro: str = ""
 
@@ -173,34 +165,108 @@ class BagDescription:
 
     def as_record(self) -> dict[str, str]:
         """Give the content of the MCAP metadata record ``rosbag2``."""
-        return {RECORD_KEY: dump_yaml(self.as_map())}
+        return {_RECORD_KEY: _dump_yaml(self.as_map())}
 
     def write(self, folder: Path) -> None:
         """Write ``metadata.yaml`` so that a reader finds the old file or the new, never half."""
         unfinished = folder / (METADATA_FILE + ".tmp")
         with unfinished.open("w", encoding="utf-8") as stream:
-            stream.write(dump_yaml({ROOT_KEY: self.as_map()}))
+            stream.write(_dump_yaml({_ROOT_KEY: self.as_map()}))
             stream.flush()
             os.fsync(stream.fileno())
         unfinished.replace(folder / METADATA_FILE)
 
 
+# Every key, with a value of its kind.
+_EXAMPLE = BagDescription([(TopicInfo("", "", ""), 0)], [FileInformation("")]).as_map()
+
+
+def read_metadata_file(folder: Path) -> dict[str, Any]:
+    """Read ``metadata.yaml`` without its root key; raises UnreadableBagError if it has none."""
+    path = folder / METADATA_FILE
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise UnreadableBagError(f"{path}: no such file") from None
+    except (OSError, ValueError) as error:
+        raise UnreadableBagError(f"{path}: cannot be read: {error}") from None
+    content = load_yaml(text, str(path))
+    description = content.get(_ROOT_KEY) if isinstance(content, dict) else None
+    if not isinstance(description, dict):
+        raise UnreadableBagError(f"{path}: no {_ROOT_KEY} in it")
+    return description
+
+
+def described_beside(path: Path) -> dict[str, Any]:
+    """Give what the ``metadata.yaml`` of a folder says, or {} if it says nothing."""
+    with contextlib.suppress(UnreadableBagError):
+        return read_metadata_file(path)
+    return {}
+
+
+def recorded_description(records: Sequence[Metadata]) -> dict[str, Any]:
+    """Give rosbag2's description from the last metadata record of that name, {} without one."""
+    for record in reversed(records):
+        if record.name == RECORD_NAME:
+            with contextlib.suppress(UnreadableBagError):
+                found = load_yaml(record.metadata.get(_RECORD_KEY, ""), RECORD_NAME)
+                if isinstance(found, dict):
+                    return found
+    return {}
+
+
+def custom_data_of(description: Mapping[str, Any]) -> dict[str, str]:
+    """Give the custom data in a description, {} without any."""
+    found = description.get("custom_data")
+    return {str(k): str(v) for k, v in found.items()} if isinstance(found, dict) else {}
+
+
+def missing_keys(description: Mapping[str, Any]) -> Iterator[str]:
+    """Name the keys that a description of its version must have, and lacks or has wrong."""
+    version = description.get("version")
+    return _misfits(description, _EXAMPLE, "", version if isinstance(version, int) else 1)
+
+
+def _misfits(found: Any, example: Any, place: str, version: int) -> Iterator[str]:
+    if isinstance(example, dict) and isinstance(found, dict):
+        for key, inner in example.items():
+            where = f"{place}.{key}".lstrip(".")
+            if version < _ADDED.get(key, 1):
+                continue
+            if key not in found:
+                yield where
+            elif key not in _OF_ANY_KIND:
+                yield from _misfits(found[key], inner, where, version)
+    elif isinstance(example, list) and isinstance(found, list):
+        for number, entry in enumerate(found):
+            yield from _misfits(entry, example[0], f"{place}[{number}]", version)
+    elif type(found) is not type(example):
+        yield place
+
+
+def topic_of(channel: Channel, schema: Schema | None) -> TopicInfo:
+    """Describe the topic of a channel; what is damaged in its description is left out."""
+    qos: tuple[QosProfile, ...] = ()
+    with contextlib.suppress(UnreadableBagError):  # the messages can be read all the same
+        qos = parse_qos_profiles(channel.metadata.get("offered_qos_profiles", ""), channel.topic)
+    type_hash = channel.metadata.get("topic_type_hash", "")
+    if schema is None:
+        return TopicInfo(channel.topic, "", "", type_hash, qos)
+    text = schema.data.decode(errors="replace")
+    return TopicInfo(channel.topic, schema.name, text, type_hash, qos)
+
+
 def offered_qos_text(profiles: Iterable[QosProfile]) -> str:
     """Give the text of a channel's ``offered_qos_profiles``: a YAML sequence of maps."""
-    return dump_yaml([profile.as_map() for profile in profiles])
+    return _dump_yaml([profile.as_map() for profile in profiles])
 
 
 def parse_qos_profiles(value: object, where: str) -> tuple[QosProfile, ...]:
     """
     Read offered QoS profiles: a sequence of maps, or text that holds one.
 
-    Policies may be spelled as in version 9, or as the integers of earlier versions.
-
-    Raises
-    ------
-    UnreadableBagError
-        It is not of that form; the text says which key is wrong.
-
+    Policies may be spelled as in version 9, or as the integers of earlier versions. Raises
+    UnreadableBagError if it is not of that form; the message says which key is wrong.
     """
     if isinstance(value, str):
         value = load_yaml(value, where) or []
@@ -228,21 +294,13 @@ def _parse_qos_profile(entry: object, where: str) -> QosProfile:
         raise UnreadableBagError(f"{where}: {error}") from None
 
 
-def dump_yaml(value: object) -> str:
+def _dump_yaml(value: object) -> str:
     """Write YAML with the keys in the order given."""
     return str(yaml.dump(value, Dumper=_DUMPER, sort_keys=False, allow_unicode=True))
 
 
 def load_yaml(text: str, where: str) -> Any:
-    """
-    Read YAML that somebody else wrote.
-
-    Raises
-    ------
-    UnreadableBagError
-        It is not YAML, or nested too deeply to be read.
-
-    """
+    """Read somebody's YAML; raises UnreadableBagError if it is invalid or nested too deeply."""
     try:
         depth = 0
         for event in yaml.parse(text, Loader=_LOADER):
@@ -260,7 +318,7 @@ def first_line(error: Exception) -> str:
     return " ".join(str(error).split()) or type(error).__name__
 
 
-# PyYAML's own C parser, ten times faster, is absent only where PyYAML was built without libyaml.
+# PyYAML's own C parser, ten times faster, is absent only if PyYAML was built without libyaml.
 # Its loader calls itself for each level, and 30,000 of them end the process.
 _DEEPEST = 100
 _DUMPER: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)

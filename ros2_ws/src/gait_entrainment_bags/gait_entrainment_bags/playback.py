@@ -9,20 +9,22 @@ Every call says what time it is, so that a node paces by absolute deadlines and 
 
 import queue
 import threading
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Generator, Iterator
+from contextlib import closing, suppress
 from fnmatch import fnmatchcase
+from itertools import islice
 from typing import NamedTuple
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment_bags.errors import BagError
-from gait_entrainment_bags.mcap_file import BagMessage
+from gait_entrainment_bags.mcap_records import BagMessage
 from gait_entrainment_bags.reader import BagReader
 
 FASTEST = float("inf")
 """Rate at which every message is due at once: whoever takes them sets the pace."""
 
-# Messages are read ahead in batches of so many, and so many batches.
-_BATCH, _BATCHES = 500, 8
+# Messages are read ahead in this many batches of this many messages.
+_BATCHES, _BATCH = 8, 500
 
 
 class Moment(NamedTuple):
@@ -34,33 +36,15 @@ class Moment(NamedTuple):
 
 class Playback:
     """
-    The messages of a bag in the order of log time, each at its time.
+    The messages of an open bag in the order of log time, each at its time.
 
-    Parameters
-    ----------
-    bag
-        Must stay open meanwhile.
-    topics
-        Names of the topics to play.
-    start_offset
-        Seconds into the bag at which to start, and to which a loop returns.
-    duration
-        Seconds to play, from there.
-    rate
-        Seconds of the bag per second, above 0; `FASTEST` for no pace at all.
-    loop
-        Begin again at the end.
-    paused
-        Start paused.
-    clock_period
-        Seconds of the bag from one tick of the clock to the next, from the start on; 0: none.
-        Ticks do not depend on the rate, so that a listener sees the same at every rate.
+    Played are the topics of these names, from ``start_offset`` seconds into the bag, to which a
+    loop returns, for ``duration`` seconds. The rate is in seconds of the bag per second, above 0;
+    `FASTEST` is no pace at all. The clock ticks every ``clock_period`` seconds of the bag from
+    the start on, 0: never; so a listener sees the same ticks at every rate.
 
-    Raises
-    ------
-    BagError
-        A number is out of range, a topic is not in the bag, or the bag holds no message.
-
+    Raises BagError if a number is out of range, a topic is not in the bag, or the bag holds no
+    message; UnreadableBagError, from every method that moves on, if the bag is damaged.
     """
 
     def __init__(
@@ -75,33 +59,24 @@ class Playback:
         paused: bool = False,
         clock_period: float = 0.0,
     ) -> None:
-        if missing := sorted(set(topics) - bag.topics.keys()):
-            raise BagError(f"{bag.path}: no topic {', '.join(missing)} in the bag")
+        self._topics = list(bag.require_topics(topics))
         if not bag.message_count:
             raise BagError(f"{bag.path}: holds no message to play")
-        _require_rate(rate)
+        _require_positive("rate", rate)
+        _require_positive("duration", duration, " s")
         self.rate = rate
         self.paused = paused
         self.ended = False
-        self.start = self.end = 0
-        """First instant to play, and instant to stop before [ns since 1970]."""
+        self.start = self.end = 0  # first instant to play, and the one to stop before [ns]
         self._bag = bag
-        self._topics = list(topics)
         self._loop = loop
         self._tick_period = round(clock_period * NANOSECONDS_PER_SECOND)
         # The instant `_origin` of the bag is due at `_origin_at` on the steady clock.
         self._origin = self._origin_at = 0
-        self._reading: _ReadAhead | None = None
-        self._moments: Iterator[Moment] = iter(())
+        self._moments = self._moments_from(0)
         self._next: Moment | None = None
-        if not duration > 0:
-            raise BagError(f"duration: {duration:g} s; allowed: above 0")
-        whole = bag.duration / NANOSECONDS_PER_SECOND
-        self.play(
-            round(start_offset * NANOSECONDS_PER_SECOND),
-            round(duration * NANOSECONDS_PER_SECOND) if duration <= whole else 0,
-            0,
-        )
+        lasting = min(duration * NANOSECONDS_PER_SECOND, bag.duration + 1)
+        self.play(round(start_offset * NANOSECONDS_PER_SECOND), round(lasting), 0)
 
     def begin(self, now: int) -> None:
         """Let the first instant be due now (steady time [ns])."""
@@ -116,22 +91,12 @@ class Playback:
         return self._origin_at + round((self._next.instant - self._origin) / self.rate)
 
     def take(self, now: int) -> Moment | None:
-        """
-        Give the next moment if it is due by now (steady time [ns]).
-
-        Raises
-        ------
-        UnreadableBagError
-            The bag turns out to be damaged.
-
-        """
+        """Give the next moment if it is due by now (steady time [ns]); None if none is."""
         due = self.due()
-        if due is None or now < due:
-            return None
-        return self._advance(due)
+        return None if due is None or now < due else self._advance(due)
 
     def take_next(self) -> Moment | None:
-        """Give the next moment while paused, whenever it is due; None where all were given."""
+        """Give the next moment while paused, whenever it is due; None once all were given."""
         if not self.paused or self.ended:
             return None
         moment = self._advance(self._origin_at)
@@ -152,44 +117,20 @@ class Playback:
             self.paused = False
 
     def set_rate(self, rate: float, now: int) -> None:
-        """
-        Play at another rate from now on.
-
-        Raises
-        ------
-        BagError
-            It is not above 0.
-
-        """
-        _require_rate(rate)
+        """Play at another rate from now on; raises BagError if it is not above 0."""
+        _require_positive("rate", rate)
         self._origin, self._origin_at = self.instant(now), now
         self.rate = rate
 
     def seek(self, instant: int, now: int) -> None:
-        """
-        Go on from another instant of the bag [ns since 1970], at its first message.
-
-        Raises
-        ------
-        BagError
-            It lies outside of what is played.
-
-        """
+        """Go on from an instant [ns since 1970]; raises BagError outside of what is played."""
         if not self.start <= instant < self.end:
             raise BagError(f"time: {instant} ns; allowed: {self.start} to {self.end - 1} ns")
         self._origin_at = now
         self._go_to(instant)
 
     def play(self, start_offset: int, duration: int, now: int) -> None:
-        """
-        Play from an offset into the bag [ns] for so long [ns]; 0 for all that follows.
-
-        Raises
-        ------
-        BagError
-            The offset lies outside of the bag.
-
-        """
+        """Play a duration [ns; 0: all] from an offset [ns]; raises BagError outside of the bag."""
         if not 0 <= start_offset <= self._bag.duration:
             raise BagError(
                 f"start_offset: {start_offset / NANOSECONDS_PER_SECOND:g} s; allowed: 0 to "
@@ -205,7 +146,7 @@ class Playback:
     def stop(self) -> None:
         """Play no more; `seek` and `play` begin anew."""
         self.ended = True
-        self._close()
+        self._moments.close()
 
     def instant(self, now: int) -> int:
         """Return the instant of the bag that is due now [ns since 1970]."""
@@ -214,11 +155,9 @@ class Playback:
         return self._origin + round((now - self._origin_at) * self.rate)
 
     def _go_to(self, instant: int) -> None:
-        self._close()
+        self._moments.close()
         self._origin = instant
-        self._reading = _ReadAhead(self._bag.messages(self._topics, instant, self.end))
-        self._moments = self._with_ticks(instant, self._reading.messages())
-        self.ended = False
+        self._moments = self._moments_from(instant)
         self._next = next(self._moments, None)
         self.ended = self._next is None
 
@@ -237,18 +176,14 @@ class Playback:
                 self.stop()
         return moment
 
-    def _with_ticks(self, start: int, messages: Iterator[BagMessage]) -> Iterator[Moment]:
+    def _moments_from(self, start: int) -> Generator[Moment, None, None]:
         tick, period = start, self._tick_period
-        for message in messages:
-            while period and tick <= message.log_time:
-                yield Moment(tick, None)
-                tick += period
-            yield Moment(message.log_time, message)
-
-    def _close(self) -> None:
-        if self._reading is not None:
-            self._reading.stop()
-            self._reading = None
+        with closing(_read_ahead(self._bag.messages(self._topics, start, self.end))) as messages:
+            for message in messages:
+                while period and tick <= message.log_time:
+                    yield Moment(tick, None)
+                    tick += period
+                yield Moment(message.log_time, message)
 
 
 def choose_topics(
@@ -257,13 +192,8 @@ def choose_topics(
     """
     List the topics of a bag that match one of the patterns, and none of the excluded.
 
-    Patterns are names, or hold ``*`` for any text, as ``/gait/*`` does; none at all match all.
-
-    Raises
-    ------
-    BagError
-        A pattern matches no topic of the bag.
-
+    Patterns are names, or hold ``*`` for any text, as ``/gait/*`` does; without any all match.
+    Raises BagError if a pattern matches no topic of the bag.
     """
     for pattern in patterns:
         if not any(fnmatchcase(name, pattern) for name in bag.topics):
@@ -276,48 +206,33 @@ def choose_topics(
     ]
 
 
-def _require_rate(rate: float) -> None:
-    if not rate > 0:
-        raise BagError(f"rate: {rate:g}; allowed: above 0")
+def _require_positive(name: str, value: float, unit: str = "") -> None:
+    if not value > 0:
+        raise BagError(f"{name}: {value:g}{unit}; allowed: above 0")
 
 
-class _ReadAhead:
-    """Reads messages in a thread: a chunk takes 20 ms, which would make messages late."""
+def _read_ahead(messages: Iterator[BagMessage]) -> Generator[BagMessage, None, None]:
+    """Read messages in a thread until closed: a chunk takes 20 ms, which would make them late."""
+    batches: queue.Queue[list[BagMessage] | Exception | None] = queue.Queue(_BATCHES)
+    stopped = threading.Event()
 
-    def __init__(self, messages: Iterator[BagMessage]) -> None:
-        self._messages = messages
-        self._batches: queue.Queue[list[BagMessage] | Exception | None] = queue.Queue(_BATCHES)
-        self._stopped = False
-        self._thread = threading.Thread(target=self._read, daemon=True)
-        self._thread.start()
+    def read() -> None:
+        try:
+            while (batch := list(islice(messages, _BATCH))) and not stopped.is_set():
+                batches.put(batch)
+            batches.put(None)
+        except Exception as error:  # raised below, by who takes the messages
+            batches.put(error)
 
-    def messages(self) -> Iterator[BagMessage]:
-        """Give the messages; what goes wrong in the thread is raised here."""
-        while (batch := self._batches.get()) is not None:
+    thread = threading.Thread(target=read, daemon=True)
+    thread.start()
+    try:
+        while (batch := batches.get()) is not None:
             if isinstance(batch, Exception):
                 raise batch
             yield from batch
-
-    def stop(self) -> None:
-        """End the thread, so that nobody reads the bag any more."""
-        self._stopped = True
-        while self._thread.is_alive():
-            try:
-                self._batches.get(timeout=0.01)
-            except queue.Empty:
-                continue
-
-    def _read(self) -> None:
-        try:
-            batch: list[BagMessage] = []
-            for message in self._messages:
-                batch.append(message)
-                if len(batch) == _BATCH:
-                    self._batches.put(batch)
-                    batch = []
-                if self._stopped:
-                    return
-            self._batches.put(batch)
-            self._batches.put(None)
-        except Exception as error:
-            self._batches.put(error)
+    finally:
+        stopped.set()
+        while thread.is_alive():
+            with suppress(queue.Empty):
+                batches.get(timeout=0.01)

@@ -3,67 +3,51 @@
 
 """Reading a bag: what is in it through its index, and its messages in the order of log time."""
 
-import contextlib
 import math
 from bisect import bisect_left
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection, Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import Any
 
-from mcap.records import Channel, Schema
-
 from gait_entrainment_bags.decoding import decoder_for
 from gait_entrainment_bags.definitions import definition_lines
-from gait_entrainment_bags.errors import BagError, UnreadableBagError
-from gait_entrainment_bags.mcap_file import BagMessage, Chunk, Contents, McapFile
+from gait_entrainment_bags.errors import BagError, NoBagError, UnreadableBagError
+from gait_entrainment_bags.mcap_file import McapFile
+from gait_entrainment_bags.mcap_records import BagMessage, Chunk, Contents
 from gait_entrainment_bags.metadata import (
-    METADATA_FILE,
-    RECORD_KEY,
-    RECORD_NAME,
-    ROOT_KEY,
-    QosProfile,
     TopicInfo,
-    load_yaml,
-    parse_qos_profiles,
+    custom_data_of,
+    described_beside,
+    recorded_description,
 )
 
 
-class BagReader:
+class BagReader(AbstractContextManager["BagReader"]):
     """
     A bag opened for reading: a folder, or a single ``.mcap`` file.
 
-    Raises
-    ------
-    UnreadableBagError
-        It is not a bag, or damaged, or was never closed.
-
+    ``counts`` are its messages by topic, ``start`` and ``end`` the first and the last log time
+    [ns since the epoch; 0 without messages], ``size`` the bytes of all its files. Raises
+    UnreadableBagError if it is not a bag, or damaged, or was never closed; NoBagError if there is
+    nothing.
     """
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
         self.topics: dict[str, TopicInfo] = {}
         self.counts: dict[str, int] = {}
-        """Messages in the bag, by topic."""
-        self.start = 0
-        """First log time [ns since the epoch]; 0 without messages."""
-        self.end = 0
-        """Last log time [ns since the epoch]."""
+        self.start = self.end = self.size = 0
         self.custom_data: dict[str, str] = {}
         self.ros_distro = ""
-        self.size = 0
-        """Bytes of all files."""
-
         self._files: list[tuple[McapFile, Contents]] = []
         try:
             for file_path in bag_files(self.path):
-                self._add_file(file_path)
+                self._add_file(McapFile(file_path))
         except UnreadableBagError:
             self.close()
             raise
-
-    def __enter__(self) -> "BagReader":
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
@@ -83,62 +67,41 @@ class BagReader:
         """Messages in the bag."""
         return sum(self.counts.values())
 
-    def _add_file(self, path: Path) -> None:
-        file = McapFile(path)
-        contents = Contents()
-        self._files.append((file, contents))
-        summary = file.read_summary()
-        if summary is None:
-            summary = file.scan()
-            if summary.damages:
-                raise UnreadableBagError(summary.damages[0].text)
-        self._files[-1] = (file, summary)
-        if summary.message_count:
-            self.start = min(self.start, summary.start) if self.message_count else summary.start
-            self.end = max(self.end, summary.end)
+    def _add_file(self, file: McapFile) -> None:
+        self._files.append((file, Contents()))
+        contents = file.read_summary()
+        if contents is None:
+            contents = file.scan()
+            if contents.damages:
+                raise UnreadableBagError(contents.damages[0])
+        self._files[-1] = (file, contents)
+        if contents.counts.total():
+            self.start = min(self.start, contents.start) if self.message_count else contents.start
+            self.end = max(self.end, contents.end)
         self.size += file.size
-        for channel in summary.channels.values():
-            topic = topic_of(channel, summary.schemas)
+        for topic in contents.topics:
             known = self.topics.setdefault(topic.name, topic)
             if difference := differing_types(known, topic):
-                raise UnreadableBagError(f"{path}: {topic.name} has {difference}")
+                raise UnreadableBagError(f"{file.path}: {topic.name} has {difference}")
             self.counts.setdefault(topic.name, 0)
-        for name, count in summary.counts.items():
+        for name, count in contents.counts.items():
             self.counts[name] += count
-        description = recorded_description(summary)
-        if isinstance(custom_data := description.get("custom_data"), dict):
-            self.custom_data = {str(key): str(value) for key, value in custom_data.items()}
+        description = recorded_description(contents.metadata)
+        self.custom_data = custom_data_of(description) or self.custom_data
         self.ros_distro = str(description.get("ros_distro", self.ros_distro))
 
     def messages(
-        self,
-        topics: Collection[str] | None = None,
-        start: int = 0,
-        end: float = math.inf,
+        self, topics: Collection[str] | None = None, start: int = 0, end: float = math.inf
     ) -> Iterator[BagMessage]:
         """
         Give messages in the order of log time; those of one instant in the order of the file.
 
-        Held in memory at once are the chunks whose spans of time overlap.
-
-        Parameters
-        ----------
-        topics
-            Names of topics, or None for all of them.
-        start, end
-            First log time to give, and the log time to stop before [ns since the epoch].
-
-        Raises
-        ------
-        BagError
-            A topic is not in the bag.
-        UnreadableBagError
-            What is read turns out to be damaged, or does not add up.
-
+        They are of the topics of these names (None: all), with log times from ``start`` up to,
+        but without, ``end`` [ns since the epoch]. Held in memory at once are the chunks whose
+        spans of time overlap. Raises BagError if a topic is not in the bag, UnreadableBagError if
+        what is read turns out to be damaged, or does not add up.
         """
-        wanted = set(self.topics if topics is None else topics)
-        if missing := wanted - self.topics.keys():
-            raise BagError(f"{self.path}: no topic {', '.join(sorted(missing))} in the bag")
+        wanted = set(self.topics if topics is None else self.require_topics(topics))
         given = 0
         pending: list[BagMessage] = []  # sorted
         plan = self._plan(wanted, start, end)
@@ -149,10 +112,9 @@ class BagReader:
             given += len(found)
             pending += found
             pending.sort()
+            settled = len(pending)
             if number + 1 < len(plan):
                 settled = bisect_left(pending, (plan[number + 1][2].start,))
-            else:
-                settled = len(pending)
             for message in pending[:settled]:
                 if start <= message.log_time < end:
                     yield message
@@ -163,6 +125,12 @@ class BagReader:
                 f"{self.path}: {given} messages found, but {expected} expected by its index"
             )
 
+    def require_topics(self, topics: Collection[str]) -> Collection[str]:
+        """Return topics if all of them are in the bag; else raise BagError."""
+        if missing := sorted(set(topics) - self.topics.keys()):
+            raise BagError(f"{self.path}: no topic {', '.join(missing)} in the bag")
+        return topics
+
     def _plan(
         self, wanted: set[str], start: int, end: float
     ) -> list[tuple[int, McapFile, Chunk, dict[int, str]]]:
@@ -170,7 +138,7 @@ class BagReader:
         plan = []
         rank = 0
         for file, contents in self._files:
-            names = {channel: name for channel, name in contents.topics.items() if name in wanted}
+            names = {channel: name for channel, name in contents.names.items() if name in wanted}
             for chunk in sorted(contents.chunks, key=lambda chunk: chunk.offset):
                 rank += 1
                 holds = not chunk.index_offsets or not names.keys().isdisjoint(chunk.index_offsets)
@@ -179,28 +147,12 @@ class BagReader:
         plan.sort(key=lambda entry: (entry[2].start, entry[0]))
         return plan
 
-    def decoder(self, topic: str) -> Callable[[bytes], Any]:
-        """Give the decoder of a topic's messages, as `decoding.decoder_for` makes it."""
-        return decoder_for(self.topics[topic])
-
     def decoded(
-        self,
-        topics: Collection[str] | None = None,
-        start: int = 0,
-        end: float = math.inf,
+        self, topics: Collection[str] | None = None, start: int = 0, end: float = math.inf
     ) -> Iterator[tuple[BagMessage, Any]]:
-        """
-        Give messages as `messages` does, each with its decoded form.
-
-        Raises
-        ------
-        BagError
-            As `messages`; or the definition of a topic cannot be used.
-
-        """
-        decoders = {
-            name: self.decoder(name) for name in self.topics if topics is None or name in topics
-        }
+        """Give messages as `messages` does, decoded; BagError also if a definition is broken."""
+        names = self.topics if topics is None else self.require_topics(topics)
+        decoders = {name: decoder_for(self.topics[name]) for name in names}
         for message in self.messages(topics, start, end):
             yield message, decoders[message.topic](message.data)
 
@@ -221,16 +173,9 @@ class BagInfo:
 
 
 def info(path: Path | str) -> BagInfo:
-    """
-    Say what is in a bag, from its index alone.
-
-    Raises
-    ------
-    UnreadableBagError
-        It is not a bag, or damaged, or was never closed.
-
-    """
+    """Say what is in a bag, from its index alone; raises UnreadableBagError as BagReader does."""
     with BagReader(path) as reader:
+        names = sorted(reader.topics)
         return BagInfo(
             path=str(reader.path),
             files=tuple(str(file.path) for file, _ in reader._files),
@@ -238,32 +183,14 @@ def info(path: Path | str) -> BagInfo:
             start=reader.start,
             duration=reader.duration,
             message_count=reader.message_count,
-            topics=tuple(
-                (name, topic.type, reader.counts[name])
-                for name, topic in sorted(reader.topics.items())
-            ),
+            topics=tuple((name, reader.topics[name].type, reader.counts[name]) for name in names),
             custom_data=reader.custom_data,
             ros_distro=reader.ros_distro,
         )
 
 
-def topic_of(channel: Channel, schemas: dict[int, Schema]) -> TopicInfo:
-    """Describe the topic of a channel; what is damaged in its description is left out."""
-    schema = schemas.get(channel.schema_id)
-    qos: tuple[QosProfile, ...] = ()
-    with contextlib.suppress(UnreadableBagError):  # the messages can be read all the same
-        qos = parse_qos_profiles(channel.metadata.get("offered_qos_profiles", ""), channel.topic)
-    return TopicInfo(
-        name=channel.topic,
-        type=schema.name if schema else "",
-        schema_text=schema.data.decode(errors="replace") if schema else "",
-        type_hash=channel.metadata.get("topic_type_hash", ""),
-        qos_profiles=qos,
-    )
-
-
 def differing_types(one: TopicInfo, other: TopicInfo) -> str:
-    """Say how the types of two channels of a topic differ; an empty text where they do not."""
+    """Say how the types of two channels of a topic differ; an empty text if they do not."""
     if one.type != other.type:
         return f"two types, {one.type} and {other.type}"
     if definition_lines(one.schema_text) != definition_lines(other.schema_text):
@@ -271,59 +198,22 @@ def differing_types(one: TopicInfo, other: TopicInfo) -> str:
     return ""
 
 
-def recorded_description(contents: Contents) -> dict[str, Any]:
-    """Give rosbag2's description from the last metadata record of that name, {} without one."""
-    for record in reversed(contents.metadata):
-        if record.name == RECORD_NAME:
-            try:
-                found = load_yaml(record.metadata.get(RECORD_KEY, ""), RECORD_NAME)
-            except UnreadableBagError:
-                continue
-            if isinstance(found, dict):
-                return found
-    return {}
-
-
-def read_metadata_file(folder: Path) -> dict[str, Any]:
-    """
-    Read ``metadata.yaml``, without its root key.
-
-    Raises
-    ------
-    UnreadableBagError
-        It is missing, or not what rosbag2 writes.
-
-    """
-    path = folder / METADATA_FILE
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise UnreadableBagError(f"{path}: no such file") from None
-    except (OSError, ValueError) as error:
-        raise UnreadableBagError(f"{path}: cannot be read: {error}") from None
-    content = load_yaml(text, str(path))
-    description = content.get(ROOT_KEY) if isinstance(content, dict) else None
-    if not isinstance(description, dict):
-        raise UnreadableBagError(f"{path}: no {ROOT_KEY} in it")
-    return description
+def require_bag(path: Path) -> None:
+    """Raise NoBagError if there is nothing at a path."""
+    if not path.exists():
+        raise NoBagError(f"{path}: no such file or folder")
 
 
 def bag_files(path: Path) -> list[Path]:
     """
     List the files of a bag: as ``metadata.yaml`` does, or without one all MCAP files in order.
 
-    Raises
-    ------
-    UnreadableBagError
-        There is no bag, or it is stored in another way than MCAP.
-
+    Raises UnreadableBagError if there is no bag, or it is stored in another way than MCAP.
     """
+    require_bag(path)
     if not path.is_dir():
         return [path]
-    try:
-        description = read_metadata_file(path)
-    except UnreadableBagError:
-        description = {}
+    description = described_beside(path)
     storage = description.get("storage_identifier", "mcap")
     if storage != "mcap":
         raise UnreadableBagError(

@@ -4,51 +4,50 @@
 """
 One recorded run, read from its bag and analyzed anew, without ROS.
 
-Only what is needed is read, through the index of the bag: of an hour of samples the events, the
-promised pulses and what the analyzer published. Ankle torque is read where a figure shows it.
+Only what is needed is read, through the index of the bag: of an hour of samples the events, what
+the robot promised and felt, and what the analyzer published. Ankle torque is read only where a
+figure shows it.
 """
 
 import json
 import math
 import struct
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gait_entrainment.conventions import EventKind, Side, stamp_nanoseconds
+from gait_entrainment import messages, topic_names
+from gait_entrainment.conventions import Side
 from gait_entrainment.experiment import Conductor
-from gait_entrainment.gait import (
-    Analysis,
-    GaitEvent,
-    Stride,
-    VerdictSettings,
-    analyze,
-    published_values,
-)
+from gait_entrainment.gait import Analysis, Stride, VerdictSettings, analyze
 from gait_entrainment.gait.analyzer import Result
 from gait_entrainment.outcome import Run, outcome_of, timing_outcome
 from gait_entrainment.protocol import Protocol, ProtocolError, read_protocol
-from gait_entrainment.robot import PulseTiming
-from gait_entrainment_bags import ENDED_EARLY, BagError, BagMessage, BagReader
-from gait_entrainment_bags.pulse_timing import fields_expected, recorded_timings
+from gait_entrainment.robot import MeasuredOnsets, TorqueProfile
+from gait_entrainment_bags.decoding import decoder_for
+from gait_entrainment_bags.errors import BagError
+from gait_entrainment_bags.mcap_records import BagMessage
+from gait_entrainment_bags.reader import BagReader
+from gait_entrainment_bags.writer import ENDED_EARLY
 
 # Strides of which the ankle torque is read: more would not be told apart in a figure.
 STRIDES_DRAWN = 24
-_EVENTS, _PROFILES = "gait_events", "perturbation/torque_profile"
-_TORQUE = "ankle_torque"
-_STRIDES, _PULSES, _VERDICTS = "gait/strides", "gait/pulse_phases", "gait/entrainment"
 _TYPES = {
-    _EVENTS: "GaitEvent",
-    _PROFILES: "TorqueProfile",
-    _TORQUE: "AnkleTorque",
-    _STRIDES: "Stride",
-    _PULSES: "PulsePhase",
-    _VERDICTS: "Entrainment",
+    topic_names.GAIT_EVENTS: "GaitEvent",
+    topic_names.TORQUE_PROFILE: "TorqueProfile",
+    topic_names.PULSES: "TorquePulse",
+    topic_names.ROBOT_STATE: "AnkleRobotState",
+    topic_names.ANKLE_TORQUE: "AnkleTorque",
+    topic_names.STRIDES: "Stride",
+    topic_names.PULSE_PHASES: "PulsePhase",
+    topic_names.ENTRAINMENT: "Entrainment",
 }
+_Value = TypeVar("_Value")
 
 
 @dataclass(frozen=True)
@@ -65,22 +64,15 @@ class AnkleTorques:
 class RecordedRun(Run):
     """What a bag holds of one run; stamps are nanoseconds since 1970, as recorded."""
 
-    protocol: Protocol
-    events: tuple[GaitEvent, ...]
-    onsets: tuple[int, ...]  # of the pulses [ns]
-    measured_period: float  # mean stride period over the baseline [s]; NaN without a plan
-    pulse_period: float  # as planned from it [s]; NaN without a plan
-    analysis: Analysis
-    timings: tuple[PulseTiming, ...]  # commanded, sent and measured onset of each pulse
     torques: AnkleTorques  # of the strides that figures show; empty unless asked for
     messages: int  # in the bag, on all topics
-    lost: int | None  # published but not recorded; None where no publisher gave a count
+    lost: int | None  # published but not recorded; None if no publisher gave a count
     real_time_factor: float  # walked time over wall time, first to last /clock; NaN without
     onset: str = "commanded"  # what the live analysis took pulses to begin with, or "measured"
     ended_early: str = ""  # why the recording ended before the run did
     differences: tuple[str, ...] | None = None
     """How what the analyzer published live differs from an analysis anew of the same onsets, a
-    line per topic; () where they are equal to the last bit, None where nothing was recorded."""
+    line per topic; () if they are equal to the last bit, None if nothing was recorded."""
 
 
 def read_run(
@@ -91,24 +83,12 @@ def read_run(
     onset: str | None = None,
 ) -> RecordedRun:
     """
-    Read a bag of this project and analyze it anew.
+    Read a bag of this project, a folder or an ``.mcap`` file, and analyze it anew.
 
-    Parameters
-    ----------
-    path
-        Folder or ``.mcap`` file.
-    settings
-        The numbers in the verdict.
-    torques
-        Read the ankle torque of the strides that figures show.
-    onset
-        Where a pulse begins: "commanded" or "measured"; by default as the live analysis took it.
-
-    Raises
-    ------
-    BagError
-        where it is no bag, is damaged, or lacks the protocol or the topics that are needed.
-
+    ``settings`` are the numbers in the verdict. ``torques`` reads the ankle torque of the strides
+    that figures show. A pulse begins at its "commanded" or "measured" ``onset``; by default as
+    the live analysis took it. Raises BagError if it is no bag, is damaged, or lacks the protocol
+    or the topics that are needed.
     """
     with BagReader(path) as bag:
         try:
@@ -117,9 +97,8 @@ def read_run(
             raise BagError(f"{path}: holds no protocol: not a run of this project") from None
         except ProtocolError as error:
             raise BagError(f"{path}: its protocol cannot be read: {error}") from None
-        record = _Record(bag, path)
-        timings = tuple(recorded_timings(path))
-        onsets = {"commanded": record.onsets, "measured": [t.onset for t in timings]}
+        record = _Record(bag)
+        onsets = {"commanded": record.onsets, "measured": [t.onset for t in record.timings]}
         live_onset = bag.custom_data.get("onset", "commanded")
         if live_onset not in onsets:
             raise BagError(f"{path}: its onset is {live_onset!r}; allowed: {', '.join(onsets)}")
@@ -133,22 +112,18 @@ def read_run(
                 conductor.add_event(event)
         except ProtocolError:
             pass  # too few events are left to plan by: the periods stay unknown
+        drawn = drawn_strides(protocol, analysis) if torques else []
         return RecordedRun(
             protocol=protocol,
             events=tuple(record.events),
             onsets=tuple(record.onsets),
             measured_period=conductor.measured_period,
-            pulse_period=conductor.train.period if conductor.train else math.nan,
+            pulse_period=conductor.pulse_period,
             analysis=analysis,
-            timings=timings,
+            timings=tuple(record.timings),
             onset=live_onset,
             differences=record.differences_from(live, protocol.side),
-            torques=_read_torques(
-                bag,
-                protocol.side,
-                drawn_strides(protocol, analysis) if torques else [],
-                stamped=record.stamped,
-            ),
+            torques=record.read_torques(protocol.side, drawn),
             messages=bag.message_count,
             lost=_lost(bag),
             real_time_factor=record.real_time_factor,
@@ -157,7 +132,7 @@ def read_run(
 
 
 def _lost(bag: BagReader) -> int | None:
-    """Return how many messages the recorder missed; None where it does not say."""
+    """Return how many messages the recorder missed; None if it does not say."""
     told = bag.custom_data.get("messages_lost")
     if told is None:
         return None
@@ -182,156 +157,150 @@ class _Record:
     """
     Events, onsets and published results of a bag, read in one pass.
 
-    Messages are taken in the order in which they were received, which is that of the file: the
-    analyzer met them in that order, and a stop voids only what was promised before it.
+    The messages of a topic are taken in the order in which they were received, which is that of
+    the file: the analyzer met them in that order, and a stop voids only what was promised before.
     """
 
-    def __init__(self, bag: BagReader, path: Path | str) -> None:
-        self.events: list[GaitEvent] = []
+    def __init__(self, bag: BagReader) -> None:
+        self._bag = bag
+        self._names = {relative: name for relative in _TYPES if (name := _find(bag, relative))}
+        needed = (topic_names.GAIT_EVENTS, topic_names.TORQUE_PROFILE)
+        if missing := [relative for relative in needed if relative not in self._names]:
+            raise BagError(f"{bag.path}: lacks the topics {', '.join(missing)}")
+        self._torque = self._names.pop(topic_names.ANKLE_TORQUE, "")
+        self._messages: dict[str, list[BagMessage]] = {name: [] for name in self._names.values()}
+        self.real_time_factor = self._read()
+        events = self._messages[self._names[topic_names.GAIT_EVENTS]]
+        self.events = list(self._values(topic_names.GAIT_EVENTS, messages.event_of))
+        # Whether the log times are the stamps, so that instants can be looked up.
+        self._stamped = [m.log_time for m in events] == [event.stamp for event in self.events]
         self.onsets: list[int] = []
-        self.stamped = True  # log times are the stamps, so that instants can be looked up
-        self._published: dict[str, list[Any]] = {}
-        names = {suffix: _find(bag, suffix) for suffix in (_EVENTS, _PROFILES)}
-        if missing := [suffix for suffix, name in names.items() if name is None]:
-            raise BagError(f"{path}: lacks the topics {', '.join(missing)}")
-        for suffix in (_STRIDES, _PULSES, _VERDICTS):
-            if (name := _find(bag, suffix)) is not None:
-                names[suffix] = name
-                self._published[suffix] = []
-        suffixes = {name: suffix for suffix, name in names.items() if name is not None}
-        clocks: list[BagMessage] = []
-        decoded = []
-        # /clock tells how fast the run went; of its messages the first and the last are kept.
-        clock = ["/clock"] if "/clock" in bag.topics else []
-        for message in bag.messages([*suffixes, *clock]):
-            if message.topic == "/clock":
-                clocks[1:] = [message]
+        measured = MeasuredOnsets()
+        for promise in self._values(topic_names.TORQUE_PROFILE, _promise_of):
+            if isinstance(promise, TorqueProfile):
+                self.onsets += promise.onsets
+                measured.add_promise(promise.onsets, promise.valid_until)
             else:
-                decoded.append(message)
-        decoded.sort(key=lambda message: message.place)
-        decode = {name: bag.decoder(name) for name in suffixes}
-        for message in decoded:
-            with fields_expected(message.topic):
-                self._add(suffixes[message.topic], message, decode[message.topic](message.data))
-        self.real_time_factor = _real_time_factor(clocks)
+                self.onsets = [onset for onset in self.onsets if onset < promise]
+                measured.stop(promise)
+        for pulse in self._values(topic_names.PULSES, messages.pulse_of):
+            measured.add_pulse(*pulse)
+        for state in self._values(topic_names.ROBOT_STATE, messages.state_of):
+            measured.add_state(state)
+        measured.finish()
+        self.timings = measured.timings
 
-    def _add(self, suffix: str, message: BagMessage, content: Any) -> None:
-        stamp = stamp_nanoseconds(content.header.stamp)
-        if suffix == _EVENTS:
-            self.stamped &= message.log_time == stamp
-            try:
-                kind, side = EventKind(content.kind), Side(content.side)
-            except ValueError as error:
-                raise BagError(f"{message.topic}: not a gait event: {error}") from None
-            self.events.append(GaitEvent(stamp, kind, side, content.step))
-        elif suffix == _PROFILES:
-            if content.stop:
-                self.onsets = [onset for onset in self.onsets if onset < stamp]
+    def _read(self) -> float:
+        """Read the messages by topic; return walked over wall time by /clock, NaN without."""
+        clocks: list[BagMessage] = []  # the first and the last
+        clock = [topic_names.CLOCK] if topic_names.CLOCK in self._bag.topics else []
+        for message in self._bag.messages([*self._messages, *clock]):
+            if message.topic in self._messages:
+                self._messages[message.topic].append(message)
             else:
-                self.onsets += [stamp_nanoseconds(onset) for onset in content.onsets]
-        else:
-            self._published[suffix].append(content)
+                clocks[1:] = [message]
+        for received in self._messages.values():
+            received.sort(key=lambda message: message.place)
+        if len(clocks) < 2 or clocks[1].publish_time <= clocks[0].publish_time:
+            return math.nan
+        wall = clocks[1].publish_time - clocks[0].publish_time
+        return (clocks[1].log_time - clocks[0].log_time) / wall
+
+    def _values(self, relative: str, value_of: Callable[[Any], _Value]) -> Iterator[_Value]:
+        """Give the values of the messages of a topic, which are not kept."""
+        if relative in self._names:
+            name = self._names[relative]
+            decode = decoder_for(self._bag.topics[name])
+            with _fields_expected(name):
+                for message in self._messages.pop(name):
+                    yield value_of(decode(message.data))
 
     def differences_from(self, analysis: Analysis, side: Side) -> tuple[str, ...] | None:
-        """Return how the published results differ from an analysis; None where there are none."""
-        if not self._published:
-            return None
+        """Return how the published results differ from an analysis; None if there are none."""
         results: dict[str, Sequence[Result]] = {
-            _STRIDES: analysis.strides,
-            _PULSES: analysis.pulses,
-            _VERDICTS: analysis.entrainments,
+            topic_names.STRIDES: analysis.strides,
+            topic_names.PULSE_PHASES: analysis.pulses,
+            topic_names.ENTRAINMENT: analysis.entrainments,
         }
+        if results.keys().isdisjoint(self._names):
+            return None
         differences = []
-        for suffix, contents in self._published.items():
-            anew = [published_values(result, side) for result in results[suffix]]
-            with fields_expected(suffix):
-                differences.append(_difference(suffix, contents, anew))
+        for relative in filter(self._names.get, results):
+            anew = [messages.result_values(result, side) for result in results[relative]]
+            with _fields_expected(relative):
+                found = list(self._values(relative, lambda message: message))
+                differences.append(_difference(relative, found, anew))
         return tuple(filter(None, differences))
 
+    def read_torques(self, side: Side, strides: Sequence[Stride]) -> AnkleTorques:
+        """Read the ankle torque of some strides; of all if the log times are not the stamps."""
+        stamps: list[int] = []
+        rows: list[tuple[float, float, float]] = []
+        spans: list[tuple[int, float]] = [(stride.start, stride.end) for stride in strides]
+        if strides and not self._stamped:
+            spans = [(0, math.inf)]
+        with _fields_expected(self._torque):
+            for span in spans if self._torque else []:
+                for _, message in self._bag.decoded([self._torque], *span):
+                    torques = message.intrinsic, message.delivered, message.effective_perturbation
+                    stamps.append(messages.nanoseconds_of(message.header.stamp))
+                    rows.append(tuple(torque[side] for torque in torques))
+        return AnkleTorques(np.array(stamps, np.int64), *np.array(rows).reshape(-1, 3).T)
 
-def _find(bag: BagReader, suffix: str) -> str | None:
+
+def _find(bag: BagReader, relative: str) -> str | None:
     """Return the topic of a bag with this relative name and its type, in whatever namespace."""
-    type_name = f"gait_entrainment_msgs/msg/{_TYPES[suffix]}"
-    return next(
-        (
-            name
-            for name, topic in bag.topics.items()
-            if name.endswith(f"/{suffix}") and topic.type == type_name
-        ),
-        None,
-    )
+    type_name = f"gait_entrainment_msgs/msg/{_TYPES[relative]}"
+    names = (name for name, topic in bag.topics.items() if topic.type == type_name)
+    return next((name for name in names if name.endswith(f"/{relative}")), None)
 
 
-def _difference(suffix: str, published: Sequence[Any], anew: Sequence[dict[str, Any]]) -> str:
-    """Say where published messages first differ from results; an empty text where nowhere."""
-    for number, (content, values) in enumerate(zip(published, anew, strict=False), start=1):
+def _promise_of(message: Any) -> TorqueProfile | int:
+    """Return what a TorqueProfile message promises, or the instant of the stop it reports."""
+    stop = messages.stop_of(message)
+    return messages.profile_of(message) if stop is None else stop
+
+
+@contextmanager
+def _fields_expected(topic: str) -> Iterator[None]:
+    """Raise BagError for a message without a field or a meaning that this version knows."""
+    try:
+        yield
+    except AttributeError as error:
+        raise BagError(
+            f"{topic}: its messages have no field {error.name}: recorded by another version"
+        ) from None
+    except messages.MessageError as error:
+        raise BagError(f"{topic}: {error}") from None
+
+
+def _difference(topic: str, published: Sequence[Any], anew: Sequence[dict[str, Any]]) -> str:
+    """Say where published messages first differ from results; an empty text if nowhere."""
+    for number, (message, values) in enumerate(zip(published, anew, strict=False), start=1):
         for name, value in values.items():
-            found = getattr(content, name)
+            found = _plain(getattr(message, name))
             if _bits(found) != _bits(value):
-                return (
-                    f"{suffix}: {name} of message {number}: {_told(found)} recorded, {value} anew"
-                )
+                return f"{topic}: {name} of message {number}: {found} recorded, {value} anew"
     if len(published) != len(anew):
-        return f"{suffix}: {len(published)} messages recorded, {len(anew)} anew"
+        return f"{topic}: {len(published)} messages recorded, {len(anew)} anew"
     return ""
 
 
+def _plain(value: Any) -> Any:
+    """Return a header or a time as nanoseconds, anything else as it is."""
+    value = getattr(value, "stamp", value)
+    return messages.nanoseconds_of(value) if hasattr(value, "nanosec") else value
+
+
 def _bits(value: Any) -> Any:
-    """Return a value in a form that is equal where every bit of a float is, also of a NaN."""
+    """Return a value in a form that is equal only if every bit of a float is, also of a NaN."""
     if isinstance(value, float):
         return struct.pack("<d", value)
-    if isinstance(value, (list, tuple)):
-        return [_bits(item) for item in value]
-    if hasattr(value, "stamp"):
-        return stamp_nanoseconds(value.stamp)
-    return stamp_nanoseconds(value) if hasattr(value, "nanosec") else int(value)
-
-
-def _told(value: Any) -> Any:
-    return _bits(value) if hasattr(value, "stamp") or hasattr(value, "nanosec") else value
-
-
-def _real_time_factor(clocks: Sequence[BagMessage]) -> float:
-    """Return simulated over wall time from the first to the last /clock; NaN without two."""
-    if len(clocks) < 2 or clocks[1].publish_time <= clocks[0].publish_time:
-        return math.nan
-    wall = clocks[1].publish_time - clocks[0].publish_time
-    return (clocks[1].log_time - clocks[0].log_time) / wall
-
-
-def _read_torques(
-    bag: BagReader, side: Side, strides: Sequence[Stride], *, stamped: bool
-) -> AnkleTorques:
-    """Read the ankle torque of some strides; of all where the log times are not the stamps."""
-    rows: list[tuple[int, float, float, float]] = []
-    name = _find(bag, _TORQUE)
-    spans: Iterable[tuple[int, float]] = [(stride.start, stride.end) for stride in strides]
-    if strides and not stamped:
-        spans = [(0, math.inf)]
-    for start, end in spans if name is not None else []:
-        rows += _torque_rows(bag, str(name), side, start, end)
-    stamps, *columns = zip(*rows, strict=True) if rows else ((), (), (), ())
-    return AnkleTorques(
-        np.array(stamps, np.int64), *(np.array(column, float) for column in columns)
-    )
-
-
-def _torque_rows(
-    bag: BagReader, name: str, side: Side, start: int, end: float
-) -> Iterator[tuple[int, float, float, float]]:
-    for _, message in bag.decoded([name], start, end):
-        with fields_expected(name):
-            row = (
-                stamp_nanoseconds(message.header.stamp),
-                message.intrinsic[side],
-                message.delivered[side],
-                message.effective_perturbation[side],
-            )
-        yield row
+    return [_bits(item) for item in value] if isinstance(value, (list, tuple)) else int(value)
 
 
 def recorded_outcome(run: RecordedRun, bag: Path) -> dict[str, Any]:
-    """Return the outcome of a run, and what its bag tells of how it went."""
+    """Return the outcome of a run, and what its bag says about how it went."""
     factor = run.real_time_factor
     return outcome_of(run) | {
         "bag": str(bag),

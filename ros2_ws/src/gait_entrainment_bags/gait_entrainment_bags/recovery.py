@@ -3,21 +3,22 @@
 
 """Rescuing what can be read of a bag that was never closed, or is damaged, into a new bag."""
 
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from gait_entrainment_bags.definitions import is_type_name
-from gait_entrainment_bags.errors import UnreadableBagError
-from gait_entrainment_bags.mcap_file import BagMessage, Chunk, Contents, McapFile
-from gait_entrainment_bags.metadata import TopicInfo
-from gait_entrainment_bags.reader import (
-    bag_files,
-    differing_types,
-    read_metadata_file,
+from gait_entrainment_bags.errors import UnreadableBagError, noting
+from gait_entrainment_bags.mcap_file import McapFile
+from gait_entrainment_bags.mcap_records import Contents
+from gait_entrainment_bags.metadata import (
+    TopicInfo,
+    custom_data_of,
+    described_beside,
     recorded_description,
-    topic_of,
 )
+from gait_entrainment_bags.reader import bag_files, differing_types
 from gait_entrainment_bags.writer import BagWriter
 
 RECOVERY_KEY = "recovery"
@@ -29,61 +30,38 @@ class Recovery:
     """What was rescued, and what was not."""
 
     folder: Path
-    counts: dict[str, int]
-    """Messages rescued, by topic."""
-    last: int
-    """Log time of the latest message rescued [ns since the epoch]; 0 without messages."""
-    losses: tuple[str, ...]
-    """One line for each place where something is missing; empty if the bag was whole."""
+    counts: dict[str, int]  # messages rescued, by topic
+    last: int  # log time of the latest of them [ns since the epoch]; 0 without messages
+    losses: tuple[str, ...]  # a line for each place where something is missing; () if none is
 
 
 def recover(path: Path | str, out: Path | str) -> Recovery:
     """
     Write all that can be read of a bag, a folder or an ``.mcap`` file, into a new folder.
 
-    Raises
-    ------
-    BagExistsError
-        The folder is already there.
-    UnreadableBagError
-        Not one of the files is an MCAP file that could be read.
-    BagWriteError
-        The new bag cannot be written.
-
+    Raises BagExistsError if the folder is already there, UnreadableBagError if none of the files
+    is an MCAP file that can be read, BagWriteError if the new bag cannot be written.
     """
     path = Path(path)
     losses: list[str] = []
     files = []
-    for file_path in bag_files(path):
-        try:
-            files.append(McapFile(file_path))
-        except UnreadableBagError as error:
-            losses.append(str(error))
-    if not files:
-        raise UnreadableBagError(losses[0])
-    try:
-        with BagWriter(out, ros_distro="") as writer:
-            rescue = _Rescue(writer)
-            for file in files:
-                losses += rescue.take(file)
-            losses += rescue.refused.values()
-            missing = "; ".join(losses) or "nothing is missing"
-            description = rescue.description or _described_beside(path)
-            if isinstance(custom_data := description.get("custom_data"), dict):
-                writer.custom_data.update((str(k), str(v)) for k, v in custom_data.items())
-            writer.custom_data[RECOVERY_KEY] = f"made of {path.name}; {missing}"
-            writer.ros_distro = str(description.get("ros_distro", ""))
-    finally:
+    with ExitStack() as opened:
+        for file_path in bag_files(path):
+            with noting(losses.append):
+                files.append(opened.enter_context(closing(McapFile(file_path))))
+        if not files:
+            raise UnreadableBagError(losses[0])
+        writer = opened.enter_context(BagWriter(out, ros_distro=""))
+        rescue = _Rescue(writer)
         for file in files:
-            file.close()
+            losses += rescue.take(file)
+        losses += rescue.refused.values()
+        missing = "; ".join(losses) or "nothing is missing"
+        description = rescue.description or described_beside(path)
+        writer.custom_data |= custom_data_of(description)
+        writer.custom_data[RECOVERY_KEY] = f"made of {path.name}; {missing}"
+        writer.ros_distro = str(description.get("ros_distro", ""))
     return Recovery(Path(out), dict(writer.counts), rescue.last, tuple(losses))
-
-
-def _described_beside(path: Path) -> dict[str, Any]:
-    try:
-        return read_metadata_file(path)
-    except UnreadableBagError:
-        return {}
 
 
 class _Rescue:
@@ -95,35 +73,38 @@ class _Rescue:
         self.description: dict[str, Any] = {}
         self.refused: dict[str, str] = {}  # reason by topic
         self._topics: dict[str, TopicInfo] = {}
+        self._announced: object = None
 
     def take(self, file: McapFile) -> list[str]:
         """Carry over a file; say what is missing of it."""
-        losses = []
+        losses: list[str] = []
         summary: Contents | None = None
-        try:
+        with noting(losses.append):
             summary = file.read_summary()
-        except UnreadableBagError as error:
-            losses.append(str(error))
-        contents = file.scan(self._keep, summary)
+        contents = Contents()
+        for _, messages in file.walk(contents, summary):
+            self._announce(contents)
+            for message in messages:
+                if message.topic not in self.refused:
+                    self.writer.write(
+                        message.topic, message.data, message.log_time, message.publish_time
+                    )
+                    self.last = max(self.last, message.log_time)
         self._announce(contents)
-        self.description = recorded_description(contents) or self.description
-        losses += [damage.text for damage in contents.damages]
-        if summary is not None and (missing := summary.message_count - contents.message_count) > 0:
-            losses.append(f"{file.path}: {missing} of {summary.message_count} messages are lost")
+        self.description = recorded_description(contents.metadata) or self.description
+        losses += contents.damages
+        expected = 0 if summary is None else summary.counts.total()
+        if (missing := expected - contents.counts.total()) > 0:
+            losses.append(f"{file.path}: {missing} of {expected} messages are lost")
         return losses
 
-    def _keep(self, contents: Contents, _: Chunk, messages: list[BagMessage]) -> None:
-        self._announce(contents)
-        for message in messages:
-            if message.topic not in self.refused:
-                self.writer.write(
-                    message.topic, message.data, message.log_time, message.publish_time
-                )
-                self.last = max(self.last, message.log_time)
-
     def _announce(self, contents: Contents) -> None:
-        for channel in contents.channels.values():
-            topic = topic_of(channel, contents.schemas)
+        """Announce the topics that have come since the last call."""
+        present = [*contents.schemas], [*contents.channels]
+        if present == self._announced:
+            return
+        self._announced = present
+        for topic in contents.topics:
             known = self._topics.setdefault(topic.name, topic)
             if difference := differing_types(known, topic):
                 self.refused[topic.name] = f"{topic.name} has {difference}: the rest of it is lost"
@@ -132,4 +113,6 @@ class _Rescue:
             if is_type_name(topic.type):
                 self.writer.add_topic(topic)
             else:
-                self.refused[topic.name] = f"{topic.name}: lost, its type {topic.type!r} is none"
+                self.refused[topic.name] = (
+                    f"{topic.name}: lost: its type {topic.type!r} does not read package/msg/Type"
+                )

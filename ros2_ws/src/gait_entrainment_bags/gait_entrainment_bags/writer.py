@@ -12,9 +12,10 @@ import errno
 import os
 import shutil
 import tempfile
-import threading
 import time
 from collections.abc import Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import AbstractContextManager
 from io import FileIO
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment_bags.definitions import is_type_name
-from gait_entrainment_bags.errors import BagError, BagExistsError, BagWriteError, DiskFullError
+from gait_entrainment_bags.errors import BagError, BagWriteError, DiskFullError, make_folder
 from gait_entrainment_bags.metadata import (
     RECORD_NAME,
     BagDescription,
@@ -33,48 +34,27 @@ from gait_entrainment_bags.metadata import (
     offered_qos_text,
 )
 
-COMPRESSIONS = {
-    "none": CompressionType.NONE,
-    "lz4": CompressionType.LZ4,
-    "zstd": CompressionType.ZSTD,
-}
 ENDED_EARLY = "ended_early"
 """Entry of the custom data of a bag whose recording ended before its time; says why."""
-MEBIBYTE = 2**20
-TIME_END = 2**64
-DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
+_COMPRESSIONS = {kind.name.lower(): kind for kind in CompressionType}  # none, lz4, zstd
+_MEBIBYTE = 2**20
+_DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
-class BagWriter:
+class BagWriter(AbstractContextManager["BagWriter"]):
     """
     A bag that is being recorded; not to be shared between threads.
 
-    Parameters
-    ----------
-    folder
-        Folder to make; the files are named after it, as rosbag2 names them.
-    ros_distro
-        For instance ``jazzy``.
-    custom_data
-        What else belongs to the record. ``writer.custom_data`` may be completed until `close`.
-    chunk_size
-        Bytes of messages that are compressed together.
-    compression
-        ``zstd``, ``lz4`` or ``none``.
-    flush_interval
-        Seconds after which `write` completes a chunk though it is not full. Where messages may
-        stop coming, call `flush` as well, from a timer that runs on steady time.
-    max_bytes, max_duration
-        Begin a new file once the present one holds so many bytes, or spans so many seconds of
-        log time. 0: never.
+    The folder is made, and the files in it are named after it, as rosbag2 names them. Messages of
+    ``chunk_size`` bytes are compressed together by ``zstd``, ``lz4`` or ``none``. A chunk that is
+    not full is completed by the `write` that comes ``flush_interval`` seconds later; if messages
+    may stop coming, call `flush` as well, from a timer that runs on steady time. A new file
+    begins once the present one holds ``max_bytes`` bytes, or spans ``max_duration`` seconds of
+    log time; 0: never. The attribute ``custom_data`` may be completed until `close`.
 
-    Raises
-    ------
-    BagExistsError
-        The folder is already there.
-    BagWriteError
-        It cannot be made or written to. No folder is left behind.
-
+    Raises BagExistsError if the folder is already there, BagWriteError if it cannot be made or
+    written to; no folder is left behind. Every method raises BagWriteError if writing fails: the
+    bag takes no more, and `recover` rescues what reached the disk.
     """
 
     def __init__(
@@ -83,14 +63,14 @@ class BagWriter:
         *,
         ros_distro: str,
         custom_data: Mapping[str, str] | None = None,
-        chunk_size: int = MEBIBYTE,
+        chunk_size: int = _MEBIBYTE,
         compression: str = "zstd",
         flush_interval: float = 1.0,
         max_bytes: int = 0,
         max_duration: float = 0.0,
     ) -> None:
-        if compression not in COMPRESSIONS:
-            raise BagError(f"compression {compression!r}: one of {', '.join(COMPRESSIONS)}")
+        if compression not in _COMPRESSIONS:
+            raise BagError(f"compression {compression!r}: one of {', '.join(_COMPRESSIONS)}")
         if not chunk_size > 0 or max_bytes < 0 or not max_duration >= 0 or not flush_interval > 0:
             raise BagError(
                 "chunk_size and flush_interval must be above 0, max_bytes and max_duration at "
@@ -99,31 +79,17 @@ class BagWriter:
         self.folder = Path(folder).absolute()
         self.ros_distro = ros_distro
         self.custom_data = dict(custom_data or {})
-        self.counts: dict[str, int] = {}
-        """Messages written so far, by topic."""
-
+        self.counts: dict[str, int] = {}  # messages written so far, by topic
         self._chunk_size = chunk_size
-        self._compression = COMPRESSIONS[compression]
+        self._compression = _COMPRESSIONS[compression]
         self._flush_interval = round(flush_interval * NANOSECONDS_PER_SECOND)
         self._max_bytes = max_bytes
         self._max_span = round(max_duration * NANOSECONDS_PER_SECOND)
         self._topics: dict[str, TopicInfo] = {}
-        self._schemas: dict[tuple[str, str], int] = {}  # of the present file: id by type and text
-        self._channels: dict[str, int] = {}  # of the present file: id by topic
         self._files: list[FileInformation] = []  # the last one is the present file
-        self._first = self._last = 0  # log times of the present file
-        self._count = 0  # messages in the present file
         self._flush_at: int | None = None  # on the steady clock; None: nothing is pending
         self._closed = False
-
-        try:
-            self.folder.mkdir(parents=True)
-        except FileExistsError:
-            raise BagExistsError(
-                f"{folder}: is already there; choose another folder, a bag is never overwritten"
-            ) from None
-        except OSError as error:
-            raise BagWriteError(f"{folder}: cannot be made: {error.strerror}") from None
+        make_folder(Path(folder))
         try:
             self._open_file()
             self._write_description()
@@ -131,24 +97,11 @@ class BagWriter:
             shutil.rmtree(self.folder, ignore_errors=True)
             raise _write_error(error, f"{folder}: cannot be recorded into, removed") from None
 
-    def __enter__(self) -> "BagWriter":
-        return self
-
     def __exit__(self, *_: object) -> None:
         self.close()
 
     def add_topic(self, topic: TopicInfo) -> None:
-        """
-        Announce a topic; it appears in the bag even if no message follows.
-
-        Raises
-        ------
-        BagError
-            The topic was announced before, or its type is none.
-        BagWriteError
-            As for `write`.
-
-        """
+        """Announce a topic: it is in the bag even without messages; BagError if it already is."""
         if topic.name in self._topics:
             raise BagError(f"{topic.name}: already in the bag")
         if not is_type_name(topic.type):
@@ -165,32 +118,18 @@ class BagWriter:
 
     def write(self, topic: str, data: bytes, log_time: int, publish_time: int) -> None:
         """
-        Record one message.
+        Record one message, in CDR with its header of four bytes, of a topic that was announced.
 
-        Parameters
-        ----------
-        topic
-            Name of a topic that was announced.
-        data
-            The serialized message: CDR with its header of four bytes.
-        log_time, publish_time
-            When the message was received (or the instant that it speaks of) and sent
-            [ns since the epoch].
-
-        Raises
-        ------
-        DiskFullError
-            The disk is full. The bag has been closed with all that was written, this message
-            included, unless the text says otherwise; it takes no more.
-        BagWriteError
-            Writing failed for another reason; `recover` rescues what reached the disk.
-
+        It was received (or speaks of the instant) at the log time, and was sent at the publish
+        time [ns since the epoch]. Raises BagError for a topic or a time that is not allowed; and
+        DiskFullError if the disk is full: unless the text says otherwise the bag has then been
+        closed with all that was written, this message included.
         """
         self._require_open()
         channel = self._channels.get(topic)
         if channel is None:
             raise BagError(f"{topic}: not announced by add_topic")
-        if not (0 <= log_time < TIME_END and 0 <= publish_time < TIME_END):
+        if not (0 <= log_time < 2**64 and 0 <= publish_time < 2**64):
             raise BagError(
                 f"{topic}: a time lies outside of 0 to 2**64 - 1 ns: "
                 f"log time {log_time}, publish time {publish_time}"
@@ -199,15 +138,16 @@ class BagWriter:
             self._writer.add_message(channel, log_time, data, publish_time)
         except OSError as error:
             raise self._failure(error) from None
-        self._count += 1
+        present = self._files[-1]
+        if log_time < present.start or not present.message_count:
+            present.start = log_time
+        if log_time > present.end:
+            present.end = log_time
+        present.message_count += 1
         self.counts[topic] += 1
-        if log_time > self._last:
-            self._last = log_time
-        if log_time < self._first:
-            self._first = log_time
-        self._after_write()
+        self._complete(present)
 
-    def _after_write(self) -> None:
+    def _complete(self, present: FileInformation) -> None:
         """Complete what is due: the chunk once it is old enough, the file once it is large."""
         now = time.monotonic_ns()
         if self._flush_at is None:
@@ -215,14 +155,14 @@ class BagWriter:
         elif now >= self._flush_at:
             self.flush()
         if self._file.full:
-            self.custom_data[ENDED_EARLY] = f"disk full after {sum(self.counts.values())} messages"
+            full = f"disk full after {sum(self.counts.values())} messages"
+            self.custom_data[ENDED_EARLY] = full
             self.close()
             raise DiskFullError(
-                f"{self.folder}: disk full after {sum(self.counts.values())} messages; "
-                "all of them are in the bag, which is closed and readable"
+                f"{self.folder}: {full}; all of them are in the bag, which is closed and readable"
             )
         if (self._max_bytes and self._file.tell() >= self._max_bytes) or (
-            self._max_span and self._last - self._first >= self._max_span
+            self._max_span and present.end - present.start >= self._max_span
         ):
             try:
                 self._close_file()
@@ -239,12 +179,6 @@ class BagWriter:
 
         A thread of its own then brings it to the disk, so that a loss of power loses only what
         came after; the caller does not wait for that. Without new messages it costs nothing.
-
-        Raises
-        ------
-        BagWriteError
-            As for `write`.
-
         """
         self._require_open()
         if self._flush_at is None:
@@ -257,15 +191,7 @@ class BagWriter:
             raise self._failure(error) from None
 
     def close(self) -> None:
-        """
-        Finish the bag: index, statistics, description. A second call does nothing.
-
-        Raises
-        ------
-        BagWriteError
-            The rest could not be written; `recover` rescues what reached the disk.
-
-        """
+        """Finish the bag: index, statistics, description. A second call does nothing."""
         if self._closed:
             return
         try:
@@ -291,18 +217,12 @@ class BagWriter:
     def _open_file(self) -> None:
         path = self.folder / f"{self.folder.name}_{len(self._files)}.mcap"
         # Room for a chunk that does not compress, the index and the descriptions.
-        self._file = _ReservingFile(path, 2 * self._chunk_size + MEBIBYTE)
+        self._file = _ReservingFile(path, 2 * self._chunk_size + _MEBIBYTE)
         self._files.append(FileInformation(path.name))
         output: Any = self._file
-        self._writer = Writer(
-            output,
-            chunk_size=self._chunk_size,
-            compression=self._compression,
-            enable_data_crcs=True,
-        )
-        self._schemas.clear()
-        self._channels.clear()
-        self._first, self._last, self._count = 2**64 - 1, 0, 0
+        self._writer = Writer(output, self._chunk_size, self._compression, enable_data_crcs=True)
+        self._schemas: dict[tuple[str, str], int] = {}  # id by type and text
+        self._channels: dict[str, int] = {}  # id by topic
         self._flush_at = None
         self._writer.start("ros2", f"gait_entrainment {LIBRARY_IDENTIFIER}")
         self._writer.add_metadata(RECORD_NAME, self._description().as_record())
@@ -312,14 +232,12 @@ class BagWriter:
         if schema not in self._schemas:
             text = topic.schema_text.encode()
             self._schemas[schema] = self._writer.register_schema(topic.type, "ros2msg", text)
+        metadata = {
+            "offered_qos_profiles": offered_qos_text(topic.qos_profiles),
+            "topic_type_hash": topic.type_hash,
+        }
         self._channels[topic.name] = self._writer.register_channel(
-            topic.name,
-            "cdr",
-            self._schemas[schema],
-            {
-                "offered_qos_profiles": offered_qos_text(topic.qos_profiles),
-                "topic_type_hash": topic.type_hash,
-            },
+            topic.name, "cdr", self._schemas[schema], metadata
         )
 
     def _close_file(self) -> None:
@@ -329,16 +247,8 @@ class BagWriter:
         self._file.sync()
 
     def _description(self) -> BagDescription:
-        if self._count:
-            self._files[-1] = FileInformation(
-                self._file.path.name, self._first, self._last, self._count
-            )
-        return BagDescription(
-            topics=tuple((topic, self.counts[topic.name]) for topic in self._topics.values()),
-            files=tuple(self._files),
-            custom_data=self.custom_data,
-            ros_distro=self.ros_distro,
-        )
+        topics = [(topic, self.counts[topic.name]) for topic in self._topics.values()]
+        return BagDescription(topics, self._files, self.custom_data, self.ros_distro)
 
     def _write_description(self) -> None:
         try:
@@ -350,7 +260,7 @@ class BagWriter:
 
 
 def _write_error(error: OSError, what: str) -> BagWriteError:
-    if error.errno in DISK_FULL:
+    if error.errno in _DISK_FULL:
         return DiskFullError(f"{what}: disk full")
     return BagWriteError(f"{what}: {first_line(error)}")
 
@@ -369,11 +279,10 @@ class _ReservingFile:
     """
 
     def __init__(self, path: Path, reserve: int) -> None:
-        self.path = path
         self.full = False
         self._size = 0
-        self._sync_thread: threading.Thread | None = None
-        self._sync_error: OSError | None = None
+        self._syncing = ThreadPoolExecutor(1)
+        self._synced: Future[None] | None = None
         self._raw = _open_new(path)
         self._reserve = tempfile.TemporaryFile(dir=path.parent, buffering=0)  # noqa: SIM115
         try:
@@ -399,7 +308,7 @@ class _ReservingFile:
 
     def make_room(self, error: OSError) -> bool:
         """Give back the space that was put aside, if the disk is full and it still is aside."""
-        if error.errno not in DISK_FULL or self.full:
+        if error.errno not in _DISK_FULL or self.full:
             return False
         self.full = True
         self._reserve.close()
@@ -412,24 +321,16 @@ class _ReservingFile:
         """Nothing is held back: every write goes to the kernel at once."""
 
     def start_sync(self) -> None:
-        """Bring the data to the disk in a thread, unless the one before still does."""
-        if self._sync_error is not None:
-            raise self._sync_error
-        if self._sync_thread is None or not self._sync_thread.is_alive():
-            self._sync_thread = threading.Thread(target=self._sync_in_thread, daemon=True)
-            self._sync_thread.start()
-
-    def _sync_in_thread(self) -> None:
-        try:
-            os.fdatasync(self._raw.fileno())
-        except OSError as error:
-            self._sync_error = error
+        """Bring the data to the disk in a thread, unless that is still under way."""
+        if self._synced is None or self._synced.done():
+            if self._synced is not None:
+                self._synced.result()  # raises what went wrong
+            self._synced = self._syncing.submit(os.fdatasync, self._raw.fileno())
 
     def sync(self) -> None:
         os.fsync(self._raw.fileno())
 
     def close(self) -> None:
-        if self._sync_thread is not None:
-            self._sync_thread.join()
+        self._syncing.shutdown()
         self._raw.close()
         self._reserve.close()

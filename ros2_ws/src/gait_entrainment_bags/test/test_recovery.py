@@ -21,7 +21,8 @@ from gait_entrainment_bags import (
     check,
     recover,
 )
-from gait_entrainment_bags.mcap_file import Chunk, McapFile
+from gait_entrainment_bags.mcap_file import McapFile
+from gait_entrainment_bags.mcap_records import Chunk
 
 NOISE = TopicInfo("/noise", "p/msg/Noise", "uint8[] bytes\n", "RIHS01_" + "1" * 64)
 
@@ -203,7 +204,8 @@ def test_topic_without_a_type_is_named(tmp_path: Path) -> None:
         writer.finish()
     found = recover(path, tmp_path / "rescued")
     assert found.counts == {"/noise": 1}
-    assert found.losses == ("/nameless: lost, its type '/nameless' is none",)
+    (loss,) = found.losses
+    assert loss == "/nameless: lost: its type '/nameless' does not read package/msg/Type"
 
 
 def test_topics_of_one_type_keep_their_own_definitions(tmp_path: Path) -> None:

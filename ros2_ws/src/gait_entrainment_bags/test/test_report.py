@@ -47,7 +47,7 @@ def test_a_slow_passage_that_looks_locked_comes_with_a_warning(simulation):
 def test_what_is_not_known_is_null_in_json():
     protocol = Protocol(baseline=2, washout=0, pulses=PulsePlan(count=1))
     nothing = analyze([], [], Side.RIGHT)
-    told = outcome_of(Simulation(protocol, (), (), (), None, math.nan, None, nothing))
+    told = outcome_of(Simulation(protocol, (), (), (), math.nan, math.nan, nothing, None, None))
     text = json.dumps(told, allow_nan=False)
     assert json.loads(text)["unperturbed_stride_period"] is None
     assert json.loads(text)["verdict"] == "undecided"

@@ -12,6 +12,8 @@ import pytest
 
 from gait_entrainment_bags import BagError, BagExistsError, BagWriter, TopicInfo, export
 
+pytest.importorskip("pyarrow", reason="tables are made with pyarrow: pip install pyarrow")
+
 TEXT = (
     "# Torque at both ankles [N m].\n"
     "uint8 LEFT=0\n"
@@ -74,11 +76,11 @@ def test_joints_become_columns_with_units(bag: Path, tmp_path: Path) -> None:
         "publish_time [ns]": "3",
         "header.stamp [ns]": "2",
         "header.frame_id": "",
-        "position.l_hip [rad]": "2.0",
+        "position.l_hip [rad]": "2",
         "position.r_hip [rad]": "0.5",
-        "velocity.l_hip [rad/s]": "4.0",
-        "velocity.r_hip [rad/s]": "1.0",
-        "effort.l_hip [N m]": "-2.0",
+        "velocity.l_hip [rad/s]": "4",
+        "velocity.r_hip [rad/s]": "1",
+        "effort.l_hip [N m]": "-2",
         "effort.r_hip [N m]": "-0.5",
     }
     assert len(rows) == 3
@@ -92,12 +94,12 @@ def test_every_kind_of_field_in_csv(bag: Path, tmp_path: Path) -> None:
             "publish_time [ns]": "8",
             "stamp [ns]": "2000000005",
             "torque.0 [N m]": "1.5",
-            "torque.1 [N m]": "-2.0",
+            "torque.1 [N m]": "-2",
             "angle [rad]": "",
             "forces [N]": "[3.0, 4.0]",
             "onsets [ns]": "[1000000001]",
             "faults": '["hot", "a,b"]',
-            "last": "True",
+            "last": "true",
             "samples": str(2**64 - 1),
             "parts": '[{"x": 1}, {"x": -1}]',
         }
@@ -177,13 +179,31 @@ def test_names_without_a_value_each_stay_in_the_table(
     assert row["stamp.sec"] == "3"
 
 
-def test_parquet_without_pyarrow_says_what_is_missing(
-    bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    "value", [0.1, 1 / 3, -0.0, 5e-324, 1e22, 123456789012345680.0, 0.1 + 0.2, math.inf]
+)
+def test_floats_in_csv_are_exact(
+    tmp_path: Path,
+    topic: Callable[..., TopicInfo],
+    joint_state: Callable[[int, list[float]], bytes],
+    value: float,
+) -> None:
+    with BagWriter(tmp_path / "walk", ros_distro="jazzy") as writer:
+        writer.add_topic(topic("/joint_states", "sensor_msgs/msg/JointState"))
+        writer.write("/joint_states", joint_state(1, [value]), 1, 1)
+    files = export(tmp_path / "walk", tmp_path / "out", "csv")
+    (row,) = rows_of(files["/joint_states"])
+    assert float(row["position.l_hip [rad]"]).hex() == value.hex()
+
+
+@pytest.mark.parametrize("format_name", ["csv", "parquet"])
+def test_without_pyarrow_the_export_says_what_is_missing(
+    bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, format_name: str
 ) -> None:
     def absent(name: str) -> Any:
         raise ImportError(name)
 
     monkeypatch.setattr("gait_entrainment_bags.tables.import_module", absent)
     with pytest.raises(BagError, match="needs pyarrow"):
-        export(bag, tmp_path / "out", "parquet")
+        export(bag, tmp_path / "out", format_name)
     assert not (tmp_path / "out").exists()

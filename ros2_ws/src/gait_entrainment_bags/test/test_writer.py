@@ -348,8 +348,8 @@ def test_disk_that_fails_in_the_background_is_reported(
     writer.add_topic(NOISE)
     writer.write("/noise", b"\0\1\0\0", 1, 1)
     writer.flush()
-    assert writer._file._sync_thread is not None
-    writer._file._sync_thread.join()
+    assert writer._file._synced is not None
+    assert isinstance(writer._file._synced.exception(), OSError)
     writer.write("/noise", b"\0\1\0\0", 2, 2)
     with pytest.raises(BagWriteError, match="Input/output error"):
         writer.flush()

@@ -1,11 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """What the launch files share: arguments, nodes in a namespace, and how a launch ends."""
 
-import threading
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +17,12 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.utilities import make_namespace_absolute, prefix_namespace
 
+from gait_entrainment.errors import EntrainmentError
 from gait_entrainment_bringup.node_list import DISPLAY, MOVED, settings_file
+from gait_entrainment_nodes.messaging.client import Client
 from gait_entrainment_nodes.messaging.environment import PACKAGE, fastdds_profiles, shared_file
 
-# Argument of a launch file: name, default (None where it must be given), what --show-args tells.
+# Argument of a launch file: name, default (None if it must be given), what --show-args says.
 Argument = tuple[str, str | None, str]
 NAMESPACE: Argument = ("namespace", "", "of all nodes and topics, for several side by side")
 PARAMETERS_FILE: Argument = (
@@ -31,11 +32,8 @@ PARAMETERS_FILE: Argument = (
 )
 RVIZ: Argument = ("rviz", "false", "show the walker in RViz: true or false")
 
-# How often a service is asked again [s].
-ASKING_PERIOD = 0.25
 
-
-class LaunchError(Exception):
+class LaunchError(EntrainmentError):
     """The launch ends with exit code 1; the message says why."""
 
 
@@ -62,7 +60,7 @@ def value(context: LaunchContext, name: str) -> str:
 
 
 def is_true(context: LaunchContext, name: str) -> bool:
-    """Return the value of an argument; LaunchError where it is neither true nor false."""
+    """Return the value of an argument; LaunchError if it is neither true nor false."""
     text = value(context, name).lower()
     if text not in ("true", "false"):
         raise LaunchError(f"{name}: {text!r}; allowed: true, false")
@@ -70,7 +68,7 @@ def is_true(context: LaunchContext, name: str) -> bool:
 
 
 def full_namespace(context: LaunchContext, namespace: str) -> str:
-    """Return a namespace from the root on, as launch files that include this one push it."""
+    """Return a namespace from the root on, below those that including launch files push."""
     pushed = context.launch_configurations.get("ros_namespace")
     return str(make_namespace_absolute(prefix_namespace(pushed, namespace)) or "/")
 
@@ -83,14 +81,14 @@ def make_node(
     **options: Any,
 ) -> Node:
     """
-    Return the action that runs a node; what is given wins over the file of parameters.
+    Return the action that runs a node; what is given wins over the parameter file.
 
-    Raises LaunchError where that file is not there: launch_ros would go on without it.
+    Raises LaunchError if that file is not there: launch_ros would go on without it.
     """
     file = value(context, "params_file")
     if not Path(file).is_file():
         raise LaunchError(f"params_file: {file}: no such file")
-    # Text stays text, also where it reads like YAML, as a protocol does.
+    # Text stays text even if it reads like YAML, as a protocol does.
     typed = {
         key: ParameterValue(item, value_type=str) if isinstance(item, str) else item
         for key, item in given.items()
@@ -107,9 +105,9 @@ def make_node(
 
 def rviz(context: LaunchContext, namespace: str, given: dict[str, Any]) -> list[Action]:
     """
-    Return RViz, where it is wanted, and the node that draws the walker.
+    Return RViz, if it is wanted, and the node that draws the walker.
 
-    ``given`` holds parameters by node name; without those of the display, something else draws.
+    ``given`` holds parameters by node name; without those of the display, the bag holds a picture.
     """
     if not is_true(context, "rviz"):
         return []
@@ -128,27 +126,26 @@ def rviz(context: LaunchContext, namespace: str, given: dict[str, Any]) -> list[
     return [make_node(context, DISPLAY, namespace, given[DISPLAY]), viewer]
 
 
-def in_background(context: LaunchContext, work: Callable[[], None]) -> None:
-    """Do work in a thread; an exception in it ends the launch with exit code 1."""
-    context.add_completion_future(context.asyncio_loop.run_in_executor(None, work))
+class _OverError(Exception):
+    """The launch has ended meanwhile."""
 
 
-def answer_of(context: LaunchContext, client: Any, request: Any, *, again: bool) -> Any:
+def in_background(context: LaunchContext, work: Callable[[Client], None]) -> None:
     """
-    Wait for the answer of a service; None where the launch ends before it comes.
+    Do work with a client in a thread, until the launch ends.
 
-    ``again``: ask again and again, since an answer is lost where the node does not know the client
-    yet. Whoever has answered once knows all clients that were made before that one.
+    An exception in it ends the launch with exit code 1.
     """
-    answered: threading.Event | None = None
-    while not context.is_shutdown:
-        if answered is None or again:
-            answered = threading.Event()
-            future = client.call_async(request)
-            future.add_done_callback(lambda _, answered=answered: answered.set())
-        if answered.wait(ASKING_PERIOD):
-            return future.result()
-    return None
+
+    def go_on() -> None:
+        if context.is_shutdown:
+            raise _OverError
+
+    def do() -> None:
+        with suppress(_OverError), Client("launch_client", each_round=go_on) as client:
+            work(client)
+
+    context.add_completion_future(context.asyncio_loop.run_in_executor(None, do))
 
 
 def ended_by(nodes: list[Node], last: set[str], over: list[Action]) -> list[Action]:
@@ -158,8 +155,8 @@ def ended_by(nodes: list[Node], last: set[str], over: list[Action]) -> list[Acti
     Parameters
     ----------
     nodes
-        None of them may end with another exit code than 0: the launch then ends with 1, and so it
-        does where one ends that should stay.
+        The launch ends with exit code 1 if one of them ends with another exit code than 0, or
+        should have stayed.
     last
         Names of the nodes that end by themselves.
     over
@@ -173,7 +170,7 @@ def ended_by(nodes: list[Node], last: set[str], over: list[Action]) -> list[Acti
             return []
         name = event.process_name.rpartition("-")[0]
         if event.returncode != 0 or name not in last:
-            # launch has no other way to an exit code than an exception, which it tells in a line.
+            # Only an exception gives launch an exit code; it prints it in one line.
             raise LaunchError(f"{name} ended with exit code {event.returncode}")
         waited_for.discard(name)
         return [] if waited_for else over

@@ -8,6 +8,8 @@ What a user may set is in config/nodes.yaml. Here is what follows from the proto
 the bag.
 """
 
+import json
+from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -17,23 +19,24 @@ import yaml
 from gait_entrainment.protocol import Protocol, read_protocol
 from gait_entrainment.robot import find_driver
 from gait_entrainment_bags import BagError, BagReader
+from gait_entrainment_bringup.provenance import provenance
 from gait_entrainment_nodes.messaging.environment import shared_file
 
 # In the order in which they are started. Executable and node have the same name.
 NODES = ("bag_recorder", "walker_sim", "perturbator", "gait_analyzer", "experiment")
-# Only looks on: started where somebody wants to see the walk, waited for by nobody.
+# Only looks on: started if somebody wants to see the walk, waited for by nobody.
 DISPLAY = "walker_display"
 # In the order in which they are stopped: torque first, the record last.
 STOP_ORDER = ("perturbator", "experiment", "walker_sim", "gait_analyzer", DISPLAY, "bag_recorder")
 # Nodes that publish what is counted at the end of a run.
 PUBLISHERS = ("walker_sim", "perturbator", "gait_analyzer", "experiment")
-# In real time promises are short, so that more can be decided late, but longer than a hiccup.
-REAL_TIME_LOOKAHEAD = 0.3
-# A real robot's torque is known only once it has been measured and promised: so much later than
-# the wall clock [s] the walker shows what it felt.
+# In real time promises are short, so that more can be decided late, but longer than a hiccup [s].
+LEAD_TIME = 0.3
+# A real robot's torque is known only once it has been measured and promised: by so much the walker
+# lags behind the wall clock to show what it felt [s].
 MEASURED_DELAY = 0.1
 
-# Names of the root that are moved into a namespace: each experiment keeps its own time.
+# Names at the root that are moved into a namespace: each experiment keeps its own time.
 MOVED = (
     "/clock",
     "/diagnostics",
@@ -43,9 +46,9 @@ MOVED = (
     "/robot_description",
     "/walker_display/markers",
 )
-# Nodes of a replay; where it is recorded, the recorder comes last.
+# Nodes of a replay; if it is recorded, the recorder comes last.
 REPLAY_NODES = ("bag_player", "gait_analyzer")
-# In a replay made anew, or of the processes that were recorded.
+# Made anew in a replay, or of the processes that were recorded.
 NOT_REPLAYED = (
     "*/gait/strides",
     "*/gait/pulse_phases",
@@ -57,7 +60,9 @@ NOT_REPLAYED = (
     "/parameter_events",
 )
 ANALYZED = ("gait_events", "perturbation/torque_profile", "walker_sim/progress")
-MEASURED = ("perturbation/pulses", "perturbator/state")  # where onsets are those measured
+MEASURED = ("perturbation/pulses", "perturbator/state")  # if onsets are those measured
+
+Parameters = dict[str, dict[str, Any]]  # by node name, then by name
 
 
 def settings_file() -> Path:
@@ -67,15 +72,15 @@ def settings_file() -> Path:
 
 def parameters(
     protocol: Protocol,
-    bag: str,
-    custom_data: str,
+    bag: Path,
     *,
-    real_time: bool,
+    real_time: bool = False,
     armed: bool = False,
     onset: str = "commanded",
-) -> dict[str, dict[str, Any]]:
+    lead_time: float = LEAD_TIME,
+) -> Parameters:
     """
-    Return the parameters of every node for one run, by node name.
+    Return the parameters of every node for one run.
 
     Parameters
     ----------
@@ -83,25 +88,21 @@ def parameters(
         What to conduct.
     bag
         Folder of the bag to record.
-    custom_data
-        JSON object that the bag keeps.
     real_time
         Real time instead of lock-step.
     armed
         Whether a real robot may deliver torque without another word.
     onset
-        Where the analyzer lets a pulse begin: "commanded" or "measured".
+        When the analyzer takes a pulse to begin: "commanded" or "measured".
+    lead_time
+        In real time: how far promised torque leads [s].
 
     """
     side = protocol.side.name.lower()
-    walker = {name: getattr(protocol.walker, name) for name in protocol.walker.__match_args__}
-    experiment: dict[str, Any] = {"participants": [node for node in NODES if node != "experiment"]}
-    if real_time:
-        experiment["longest_lookahead"] = REAL_TIME_LOOKAHEAD
     measured = real_time and not find_driver(protocol.driver).simulated
-    given = {
+    given: Parameters = {
         "walker_sim": {
-            **walker,
+            **asdict(protocol.walker),
             "first_heel_strike": side,
             "real_time": real_time,
             "acknowledged": not real_time,
@@ -114,14 +115,16 @@ def parameters(
             "armed": armed,
         },
         "gait_analyzer": {"side": side, "onset": onset},
-        "experiment": experiment,
+        "experiment": {"participants": [node for node in NODES if node != "experiment"]},
         "bag_recorder": {
-            "output": bag,
+            "output": str(bag.absolute()),
             "publishers": list(PUBLISHERS),
-            "custom_data": custom_data,
+            "custom_data": json.dumps(provenance(protocol, real_time=real_time, onset=onset)),
         },
         DISPLAY: _drawn(protocol),
     }
+    if real_time:
+        given["experiment"]["longest_lookahead"] = lead_time
     return {name: given[name] | {"use_sim_time": not real_time} for name in given}
 
 
@@ -131,8 +134,8 @@ def _drawn(protocol: Protocol) -> dict[str, Any]:
 
 
 def replay_parameters(
-    path: Path, namespace: str | None = None, listeners: int = 1
-) -> tuple[str, dict[str, dict[str, Any]]]:
+    path: Path, namespace: str | None = None, out: Path | None = None
+) -> tuple[str, Parameters]:
     """
     Return what a replay of a bag to the analyzer needs.
 
@@ -142,20 +145,20 @@ def replay_parameters(
         The bag: a folder or an ``.mcap`` file.
     namespace
         To play into, with a slash before it; None for the one that was recorded.
-    listeners
-        Subscriptions that what is analyzed must have before the first message.
+    out
+        Folder to record the replay into; None for no record.
 
     Returns
     -------
     namespace
         Of the replay, without a slash at its end; "" for the root.
     parameters
-        By node name; of the display only where the bag holds no picture of its own.
+        Of the display only if the bag holds no picture of its own.
 
     Raises
     ------
     BagError
-        where the bag cannot be read, or holds no run of this project.
+        if the bag cannot be read, or holds no run of this project.
 
     """
     with BagReader(path) as bag:
@@ -164,19 +167,21 @@ def replay_parameters(
         if recorded is None or "protocol" not in bag.custom_data:
             raise BagError(f"{path}: not a run of this project: no protocol or no gait events")
         protocol = read_protocol(bag.custom_data["protocol"])
-        onset = bag.custom_data.get("onset", "commanded")
+        custom_data = bag.custom_data
+    onset = custom_data.get("onset", "commanded")
     recorded = recorded.removesuffix("/gait_events")
     namespace = recorded if namespace is None else namespace.rstrip("/")
     moved = [name for name in topics if namespace != recorded and name.startswith(f"{recorded}/")]
     analyzed = (*ANALYZED, *MEASURED) if onset == "measured" else ANALYZED
     expected = [f"{namespace}/{n}" for n in analyzed if f"{recorded}/{n}" in topics]
-    given = {
+    given: Parameters = {
         "bag_player": {
             "bag": str(path.absolute()),
             "exclude": list(NOT_REPLAYED),
             "remap": [f"{name}:={namespace}{name.removeprefix(recorded)}" for name in moved]
             or [""],
-            "expect": expected * listeners,
+            # Once by the analyzer, and once more by the recorder.
+            "expect": expected if out is None else expected * 2,
             "use_sim_time": False,
         },
         "gait_analyzer": {
@@ -185,6 +190,13 @@ def replay_parameters(
             "use_sim_time": True,
         },
     }
+    if out is not None:
+        given["bag_recorder"] = {
+            "output": str(out.absolute()),
+            "publishers": ["gait_analyzer", "bag_player"],
+            "custom_data": json.dumps(custom_data | {"replay_of": path.name}),
+            "use_sim_time": True,
+        }
     if f"{recorded}/robot_description" not in topics:
         given[DISPLAY] = _drawn(protocol) | {"use_sim_time": True}
     return namespace, given
@@ -195,9 +207,9 @@ def bag_folder(protocol: Protocol) -> Path:
     return Path("bags") / f"{datetime.now():%Y%m%d-%H%M%S}_{protocol.name}"
 
 
-def parameter_arguments(given: dict[str, dict[str, Any]], folder: Path) -> list[str]:
+def parameter_arguments(given: Parameters, folder: Path) -> list[str]:
     """
-    Write parameters by node name into a file in a folder.
+    Write parameters into a file in a folder.
 
     Returns the arguments by which a node loads config/nodes.yaml and then that file.
     """

@@ -4,91 +4,104 @@
 """
 The processes of a run: started together, watched, and stopped together, torque first.
 
-Each process writes to a log of its own. A process that ends before its time is named with the
-last lines of its log; the others are stopped within five seconds.
+Each process writes a log of its own. If one ends before its time or falls silent, the error names
+it and quotes the end of its log; the others are stopped within five seconds.
 """
 
-import ctypes
 import os
 import signal
-import subprocess
+import tempfile
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 
-from ament_index_python.packages import get_package_prefix
-
+from gait_entrainment_bringup.node_process import start_node
 from gait_entrainment_nodes.messaging.environment import PACKAGE
+from gait_entrainment_nodes.messaging.errors import NodeError
 
-# A process has this long to stop by itself [s]; all together have less than five seconds.
+# How long a process may take to stop by itself [s]; all together take less than five seconds.
 PATIENCE = 1.5
+# How long the recorder may take to close the bag after the experiment or replay has ended [s].
+CLOSING_TIMEOUT = 15.0
 LOG_LINES = 8
-_PR_SET_PDEATHSIG = 1
 
 
 class Supervisor:
     """Runs one process per node, all in one environment; their logs go to a folder."""
 
     def __init__(self, folder: Path, environment: Mapping[str, str]) -> None:
-        self._folder = folder
+        self.folder = folder
         self._environment = dict(environment)
-        self._processes: dict[str, subprocess.Popen[bytes]] = {}
-        self._library = ctypes.CDLL(None)
+        self._processes: dict[str, BaseProcess] = {}
 
     def start(self, node: str, arguments: Sequence[str]) -> None:
-        """Start a node of the package; it gets SIGTERM should this process die."""
-        program = Path(get_package_prefix(PACKAGE)) / "lib" / PACKAGE / node
-        with self._log(node).open("wb") as log:
-            self._processes[node] = subprocess.Popen(
-                [str(program), *arguments],
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=subprocess.STDOUT,
-                env=self._environment,
-                # Ctrl-C reaches this process alone, which then stops the others in order.
-                start_new_session=True,
-                preexec_fn=self._die_with_parent,
-            )
+        """Start a node of the package; it gets SIGTERM if this process dies."""
+        module = f"{PACKAGE}.nodes.{node}"
+        process = start_node(module, arguments, self._log(node), self._environment)
+        self._processes[node] = process
 
     def ended(self) -> dict[str, int]:
         """Return the exit codes of the processes that have ended."""
-        codes = {node: process.poll() for node, process in self._processes.items()}
+        codes = {node: process.exitcode for node, process in self._processes.items()}
         return {node: code for node, code in codes.items() if code is not None}
+
+    def check(self, may_end: Collection[str]) -> dict[str, int]:
+        """
+        Return the exit codes of the processes that have ended, and may.
+
+        Raises
+        ------
+        NodeError
+            if one has failed, or has ended and is not one that may.
+
+        """
+        ended = self.ended()
+        for node, code in ended.items():
+            if code != 0 or node not in may_end:
+                raise NodeError(f"{node} ended unexpectedly with exit code {code}", node)
+        return ended
 
     def wait(self, node: str, timeout: float) -> int | None:
         """Wait for a process to end by itself; return its exit code, or None after the timeout."""
-        try:
-            return self._processes[node].wait(timeout)
-        except subprocess.TimeoutExpired:
-            return None
+        self._processes[node].join(timeout)
+        return self._processes[node].exitcode
+
+    def wait_for_record(self) -> None:
+        """Wait until the recorder has closed the bag and ended; raises NodeError if it has not."""
+        if self.wait("bag_recorder", CLOSING_TIMEOUT) != 0:
+            raise NodeError("bag_recorder did not complete the record", "bag_recorder")
+
+    def request_stop(self, nodes: Iterable[str]) -> None:
+        """Ask processes to stop, by SIGTERM, without waiting for them."""
+        for node in nodes:
+            process = self._processes.get(node)
+            if process is not None and process.is_alive():
+                process.terminate()
+                # A suspended process can only obey once it goes on.
+                os.kill(process.pid or 0, signal.SIGCONT)
 
     def stop(self, order: Sequence[str]) -> list[str]:
         """
         Stop what still runs: SIGTERM in order, SIGKILL for what does not obey.
 
-        The first in order has ended before the next is asked; the rest end side by side. Returns
-        the nodes that had to be killed. Another Ctrl-C meanwhile changes nothing: it would leave
-        a recorder at work on a bag that this process takes for given up.
+        The first has ended before the next are asked, which end side by side; then the last is
+        asked. Returns the nodes that had to be killed. Another Ctrl-C meanwhile changes nothing:
+        it would leave a recorder at work on a bag that this process believes to be abandoned.
         """
-        with _undisturbed():
-            return self._stop(order)
-
-    def _stop(self, order: Sequence[str]) -> list[str]:
-        running = [node for node in order if node in self._processes]
-        running = [node for node in running if self._processes[node].poll() is None]
+        ended = self.ended()
+        running = [node for node in order if node in self._processes and node not in ended]
         killed = []
-        for group in (running[:1], running[1:-1], running[-1:] if running[1:] else []):
-            for node in group:
-                self._processes[node].terminate()
-                # Who was suspended can only obey once it goes on.
-                self._processes[node].send_signal(signal.SIGCONT)
-            deadline = time.monotonic() + PATIENCE
-            for node in group:
-                if self.wait(node, max(deadline - time.monotonic(), 0)) is None:
-                    self._processes[node].send_signal(signal.SIGKILL)
-                    self._processes[node].wait()
-                    killed.append(node)
+        with _undisturbed():
+            for group in (running[:1], running[1:-1], running[1:][-1:]):
+                self.request_stop(group)
+                deadline = time.monotonic() + PATIENCE
+                for node in group:
+                    if self.wait(node, max(deadline - time.monotonic(), 0)) is None:
+                        self._processes[node].kill()
+                        self._processes[node].join()
+                        killed.append(node)
         return killed
 
     def last_lines(self, node: str) -> str:
@@ -100,17 +113,38 @@ class Supervisor:
         return "\n".join(f"  {node}| {line}" for line in lines[-LOG_LINES:])
 
     def _log(self, node: str) -> Path:
-        return self._folder / f"{node}.log"
+        return self.folder / f"{node}.log"
 
-    def _die_with_parent(self) -> None:
-        self._library.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
-        if os.getppid() == 1:  # the parent died before the line above
-            os.kill(os.getpid(), signal.SIGTERM)
+
+@contextmanager
+def supervised(
+    environment: Mapping[str, str],
+    order: Sequence[str],
+    remains: Callable[[], str] = lambda: "",
+) -> Iterator[Supervisor]:
+    """
+    Give a supervisor, and stop its processes in order at the end.
+
+    What fails or is interrupted meanwhile becomes a NodeError: the reason, what ``remains`` says
+    once everything has stopped, and the end of the log of the node to blame.
+    """
+    with tempfile.TemporaryDirectory(prefix="entrain_") as folder:
+        supervisor = Supervisor(Path(folder), environment)
+        try:
+            try:
+                yield supervisor
+            finally:
+                supervisor.stop(order)
+        except KeyboardInterrupt:
+            raise NodeError(f"interrupted{remains()}") from None
+        except NodeError as error:
+            lines = supervisor.last_lines(error.node)
+            raise NodeError(f"{error}{remains()}" + (f"\n{lines}" if lines else "")) from None
 
 
 @contextmanager
 def _undisturbed() -> Iterator[None]:
-    """Let neither SIGINT nor SIGTERM break in: for what has an end that is near."""
+    """Let neither SIGINT nor SIGTERM break in: for what is about to end."""
     handlers = {n: signal.signal(n, signal.SIG_IGN) for n in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield

@@ -1,29 +1,26 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """
 Perturbator and gait analyzer, for a real walker with real sensors.
 
 The sensors publish `gait_events`; pulses are asked for by `perturbator/deliver_pulse_train` and
 promised by `experiment/horizon`, see docs/launch.md. The launch file brings the perturbator up,
-and ends with exit code 1 where that fails or one of the nodes ends.
+and ends with exit code 1 if that fails or one of the nodes ends.
 """
 
+import math
 from functools import partial
-from typing import Any
 
 from launch import Action, LaunchContext, LaunchDescription
 from launch.actions import OpaqueFunction
-from launch_ros.ros_adapters import get_ros_node
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState, GetState
+from lifecycle_msgs.srv import ChangeState
 
 from gait_entrainment_bringup.launch_nodes import (
     NAMESPACE,
     PARAMETERS_FILE,
     LaunchError,
-    answer_of,
     declared,
     ended_by,
     full_namespace,
@@ -32,6 +29,7 @@ from gait_entrainment_bringup.launch_nodes import (
     make_node,
     value,
 )
+from gait_entrainment_nodes.messaging.client import Client
 
 TRANSITIONS = {
     "be configured": Transition.TRANSITION_CONFIGURE,
@@ -48,21 +46,18 @@ def nodes(context: LaunchContext) -> list[Action]:
         make_node(context, "gait_analyzer", namespace, {"side": side}),
     ]
     perturbator = f"{full_namespace(context, namespace).rstrip('/')}/perturbator"
-    node = get_ros_node(context)
-    change = node.create_client(ChangeState, f"{perturbator}/change_state")
-    state = node.create_client(GetState, f"{perturbator}/get_state")
-    in_background(context, partial(bring_up, context, change, state))
+    in_background(context, partial(bring_up, perturbator))
     return [*ended_by(made, set(), []), *made]
 
 
-def bring_up(context: LaunchContext, change: Any, state: Any) -> None:
-    """Configure and activate the perturbator; LaunchError where it refuses."""
-    answer_of(context, state, GetState.Request(), again=True)
+def bring_up(perturbator: str, client: Client) -> None:
+    """Configure and activate the perturbator; LaunchError if it refuses."""
+    service = f"{perturbator}/change_state"
+    client.service(ChangeState, service)
+    client.wait_to_be_known(perturbator, math.inf)
     for name, number in TRANSITIONS.items():
         request = ChangeState.Request(transition=Transition(id=number))
-        answer = answer_of(context, change, request, again=False)
-        if answer is None:
-            return
+        answer = client.call(ChangeState, service, request, period=math.inf, patience=math.inf)
         if not answer.success:
             raise LaunchError(f"perturbator refused to {name}; its log says why")
 

@@ -1,15 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """
 Conduct one protocol over the nodes and record it: `entrain run` as a launch file.
 
 Nodes and parameters are those of `entrain run`. The experiment brings the perturbator up, and the
-launch ends with the experiment: exit code 0 once it is over and recorded, 1 where it failed.
+launch ends with the experiment: exit code 0 once it is over and recorded, 1 if it failed.
 """
 
-import json
+from pathlib import Path
 
 from launch import Action, LaunchContext, LaunchDescription
 from launch.actions import EmitEvent, OpaqueFunction
@@ -28,20 +27,18 @@ from gait_entrainment_bringup.launch_nodes import (
     value,
 )
 from gait_entrainment_bringup.node_list import NODES, bag_folder, parameters
-from gait_entrainment_bringup.provenance import provenance
 
 
 def nodes(context: LaunchContext) -> list[Action]:
     """Make the nodes once the arguments are known: the protocol says what they are given."""
     protocol = read_protocol(value(context, "protocol") or None)
-    real_time, onset = is_true(context, "real_time"), value(context, "onset")
+    bag = value(context, "bag")
     given = parameters(
         protocol,
-        value(context, "bag") or str(bag_folder(protocol).absolute()),
-        json.dumps(provenance(protocol, real_time=real_time, onset=onset)),
-        real_time=real_time,
+        Path(bag) if bag else bag_folder(protocol),
+        real_time=is_true(context, "real_time"),
         armed=is_true(context, "arm"),
-        onset=onset,
+        onset=value(context, "onset"),
     )
     given["experiment"]["protocol"] = write_protocol(protocol)
     namespace = value(context, "namespace")
@@ -62,7 +59,7 @@ def generate_launch_description() -> LaunchDescription:
                 ("protocol", "", "protocol file (YAML); empty: the paper's example"),
                 ("real_time", "false", "at the pace of the wall clock, not in lock-step"),
                 ("arm", "false", "let a real ankle robot deliver torque at once: see safety.md"),
-                ("onset", "commanded", "where the analyzer lets a pulse begin: or measured"),
+                ("onset", "commanded", "when the analyzer takes a pulse to begin: or measured"),
                 ("bag", "", "folder of the bag; empty: bags/<time>_<name>"),
                 NAMESPACE,
                 PARAMETERS_FILE,

@@ -1,25 +1,23 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-
 """
 Play a bag to the gait analyzer, at the pace of the record or as fast as it goes.
 
 The launch ends once the bag is played and the analyzer has published all that it makes of it.
 """
 
+import math
 from pathlib import Path
 
 from launch import Action, LaunchContext, LaunchDescription
 from launch.actions import OpaqueFunction
 from launch.events import Shutdown
-from launch_ros.ros_adapters import get_ros_node
 from std_srvs.srv import Trigger
 
 from gait_entrainment_bringup.launch_nodes import (
     PARAMETERS_FILE,
     RVIZ,
-    answer_of,
     declared,
     ended_by,
     full_namespace,
@@ -29,6 +27,7 @@ from gait_entrainment_bringup.launch_nodes import (
     value,
 )
 from gait_entrainment_bringup.node_list import REPLAY_NODES, replay_parameters
+from gait_entrainment_nodes.messaging.client import Client
 
 
 def nodes(context: LaunchContext) -> list[Action]:
@@ -40,13 +39,12 @@ def nodes(context: LaunchContext) -> list[Action]:
     if value(context, "rate"):
         given["bag_player"]["rate"] = float(value(context, "rate"))
     made = [make_node(context, name, namespace or "/", given[name]) for name in REPLAY_NODES]
-    analyzer = get_ros_node(context).create_client(Trigger, f"{namespace}/gait_analyzer/finish")
 
-    def finish() -> None:
+    def finish(client: Client) -> None:
         """Let the analyzer publish its last word, then end the launch."""
+        client.call(Trigger, f"{namespace}/gait_analyzer/finish", patience=math.inf)
         over = Shutdown(reason="the bag is played and analyzed")
-        if answer_of(context, analyzer, Trigger.Request(), again=True):
-            context.asyncio_loop.call_soon_threadsafe(context.emit_event_sync, over)
+        context.asyncio_loop.call_soon_threadsafe(context.emit_event_sync, over)
 
     last_word = OpaqueFunction(function=in_background, args=[finish])
 

@@ -82,7 +82,7 @@ def test_file_lists_what_a_user_may_set_at_its_default(tmp_path):
     found = []
     for folder in (tmp_path / "with", tmp_path / "without"):
         folder.mkdir()
-        given = parameters(DEFAULT_PROTOCOL, str(folder / "bag"), "{}", real_time=False)
+        given = parameters(DEFAULT_PROTOCOL, folder / "bag")
         given["bag_player"] = replay_parameters(BAG)[1]["bag_player"]
         arguments = parameter_arguments(given, folder)
         if folder.name == "without":
@@ -97,7 +97,7 @@ def test_file_lists_what_a_user_may_set_at_its_default(tmp_path):
 
 @pytest.mark.parametrize("real_time", [False, True])
 def test_parameters_are_given_to_every_node(real_time):
-    given = parameters(DEFAULT_PROTOCOL, "/bag", "{}", real_time=real_time)
+    given = parameters(DEFAULT_PROTOCOL, Path("/bag"), real_time=real_time)
     assert set(given) == {*NODES, DISPLAY}
     walker = given["walker_sim"]
     assert walker["ankle_stiffness"] == 87.3

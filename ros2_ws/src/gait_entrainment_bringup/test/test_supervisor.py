@@ -13,32 +13,35 @@ import pytest
 from gait_entrainment_bringup import supervisor as module
 from gait_entrainment_bringup.supervisor import LOG_LINES, PATIENCE, Supervisor
 
-OBEDIENT = """#!/bin/sh
-trap 'echo "$0 stopped $(date +%s%N)"; exit 0' TERM
-echo up
-while :; do sleep 0.02; done
+OBEDIENT = """
+import signal, sys, time
+def stop(*_):
+    print(sys.argv[0], "stopped", time.time_ns(), flush=True)
+    sys.exit()
+def main():
+    signal.signal(signal.SIGTERM, stop)
+    print("up", flush=True)
+    while True: time.sleep(0.02)
 """
-STUBBORN = """#!/bin/sh
-trap '' TERM
-echo up
-while :; do sleep 0.02; done
-"""
-BROKEN = """#!/bin/sh
-for i in 1 2 3 4 5 6 7 8 9 10 11 12; do echo "line $i" >&2; done
-exit 3
+STUBBORN = OBEDIENT.replace("stop)", "signal.SIG_IGN)")
+BROKEN = """
+import sys
+def main():
+    for i in range(1, 13): print("line", i, file=sys.stderr)
+    return 3
 """
 
 
 @pytest.fixture
 def programs(tmp_path, monkeypatch):
-    """Make shell scripts that stand for the nodes of the package."""
-    folder = tmp_path / "lib" / module.PACKAGE
+    """Make modules that stand for the nodes of the package."""
+    folder = tmp_path / "stand_in" / "nodes"
     folder.mkdir(parents=True)
     scripts = {"one": OBEDIENT, "two": OBEDIENT, "three": OBEDIENT, "four": OBEDIENT}
     for name, text in {**scripts, "stubborn": STUBBORN, "broken": BROKEN}.items():
-        (folder / name).write_text(text)
-        (folder / name).chmod(0o755)
-    monkeypatch.setattr(module, "get_package_prefix", lambda _: str(tmp_path))
+        (folder / f"{name}.py").write_text(text)
+    monkeypatch.setattr(module, "PACKAGE", "stand_in")
+    monkeypatch.syspath_prepend(tmp_path)
     logs = tmp_path / "logs"
     logs.mkdir()
     supervisor = Supervisor(logs, os.environ)

@@ -74,11 +74,11 @@ class Reply:
     position: float  # [rad]
     velocity: float  # [rad/s]
     torque: float  # [N m]
-    error: int = 0  # 0 where all is well, or where the firmware tells none
+    error: int = 0  # 0 if all is well, or if the firmware does not tell
 
 
 def pack_command(command: Command, motor: AkMotor) -> bytes:
-    """Return the 8 bytes of a command; what is out of range is clamped, NaN is refused."""
+    """Return the 8 bytes of a command; values out of range are clamped, NaN is refused."""
     bits = _encode(command.position, -POSITION, POSITION, 16)
     bits = bits << 12 | _encode(command.velocity, -motor.velocity, motor.velocity, 12)
     bits = bits << 12 | _encode(command.stiffness, 0.0, STIFFNESS, 12)

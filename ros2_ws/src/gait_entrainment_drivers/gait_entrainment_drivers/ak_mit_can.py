@@ -10,17 +10,8 @@ from typing import Any
 from gait_entrainment.conventions import Side
 from gait_entrainment.robot.faults import DeviceError, Fault
 from gait_entrainment.settings import setting
-from gait_entrainment_drivers.ak_mit import (
-    ENTER,
-    EXIT,
-    FAULTS,
-    MOTORS,
-    Command,
-    Reply,
-    pack_command,
-    resolution,
-    unpack_reply,
-)
+from gait_entrainment_drivers import ak_mit
+from gait_entrainment_drivers.can_bus import send
 from gait_entrainment_drivers.can_motor import CanMotorOptions, CanMotorRobot
 from gait_entrainment_drivers.host_loop import Reading
 
@@ -29,7 +20,7 @@ from gait_entrainment_drivers.host_loop import Reading
 class AkMitCanOptions(CanMotorOptions):
     """Bus, motor and transmission."""
 
-    motor: str = setting("AK80-9", "type, which fixes the ranges", choices=tuple(MOTORS))
+    motor: str = setting("AK80-9", "type, which fixes the ranges", choices=tuple(ak_mit.MOTORS))
     motor_id: int = setting(1, "id of the motor", "", (1, 127))
 
 
@@ -41,15 +32,14 @@ class AkMitCanRobot(CanMotorRobot):
     CHECK = "mode and motor_id"
 
     def __init__(self, side: Side, options: AkMitCanOptions, seed: int) -> None:  # noqa: ARG002
-        self._motor = MOTORS[options.motor]
+        self._motor = ak_mit.MOTORS[options.motor]
         super().__init__(side, options, f"motor {options.motor_id}", self._motor.torque)
-        self._zero = pack_command(Command(), self._motor)
-        self._resolution = resolution(self._motor) * abs(options.ratio)
+        self._resolution = ak_mit.resolution(self._motor) * abs(options.ratio)
 
     def _open(self) -> None:
         self._open_bus()
         # Leaving motor mode is harmless whatever the motor is doing, and is answered.
-        reply = self._ask(lambda: self._command(EXIT), self._reply)
+        reply = self._ask(lambda: self._tell(ak_mit.EXIT), self._reply)
         if reply.error:
             raise DeviceError(
                 f"{self._name} reports: {_fault(reply.error).meaning} "
@@ -58,13 +48,13 @@ class AkMitCanRobot(CanMotorRobot):
 
     def _enable(self) -> None:
         # The motor holds its last command, also across modes: zero before and after.
-        self._command(self._zero)
-        self._ask(lambda: self._command(ENTER), self._reply)
+        self._command(0.0)
+        self._ask(lambda: self._tell(ak_mit.ENTER), self._reply)
         self._require_zero_torque(f"is it {self._options.motor}?")
 
     def _exchange(self, torque: float, patience: float) -> Reading | None:
         ratio = self._options.ratio
-        self._command(pack_command(Command(torque=torque / ratio), self._motor))
+        self._command(torque / ratio)
         reply = self._answer(self._reply, time.monotonic() + patience)
         if reply is None:
             return None
@@ -75,14 +65,17 @@ class AkMitCanRobot(CanMotorRobot):
         return Reading(measured, reply.position / ratio, faults)
 
     def _disable(self) -> None:
-        self._command(self._zero)
-        self._command(EXIT)
+        self._command(0.0)
+        self._tell(ak_mit.EXIT)
 
-    def _command(self, data: bytes) -> None:
-        self._send(self._options.motor_id, data)
+    def _command(self, torque: float) -> None:
+        self._tell(ak_mit.pack_command(ak_mit.Command(torque=torque), self._motor))
 
-    def _reply(self, message: Any) -> Reply | None:
-        reply = unpack_reply(bytes(message.data), self._motor)
+    def _tell(self, data: bytes) -> None:
+        send(self._bus, self._options.motor_id, data)
+
+    def _reply(self, message: Any) -> ak_mit.Reply | None:
+        reply = ak_mit.unpack_reply(bytes(message.data), self._motor)
         if reply is None or reply.motor_id == self._options.motor_id:
             return reply
         self._others.add(reply.motor_id)
@@ -90,4 +83,5 @@ class AkMitCanRobot(CanMotorRobot):
 
 
 def _fault(error: int) -> Fault:
-    return FAULTS.get(error, Fault(f"motor_error_{error}", f"The motor reports error {error}."))
+    unknown = Fault(f"motor_error_{error}", f"The motor reports error {error}.")
+    return ak_mit.FAULTS.get(error, unknown)

@@ -6,29 +6,20 @@
 import sys
 from collections.abc import Sequence
 
-from gait_entrainment_drivers.ak_mit import (
-    ENTER,
-    EXIT,
-    MOTORS,
-    SET_ZERO,
-    AkMotor,
-    Reply,
-    pack_reply,
-    unpack_command,
-)
-from gait_entrainment_drivers.motor_emulator import (
-    EmulatedMotor,
-    Frames,
-    emulator_parser,
-    run_emulator,
-)
+from gait_entrainment_drivers import ak_mit
+from gait_entrainment_drivers.motor_emulator import EmulatedMotor, Frames, run_emulator
 
 
 class EmulatedAkMotor(EmulatedMotor):
     """A motor that any frame feeds, and whose watchdog drops the command; it always replies."""
 
     def __init__(
-        self, motor: AkMotor, motor_id: int, bandwidth: float, timeout: float, reply_bytes: int
+        self,
+        motor: ak_mit.AkMotor,
+        motor_id: int,
+        bandwidth: float,
+        timeout: float,
+        reply_bytes: int,
     ) -> None:
         super().__init__(bandwidth, timeout)
         self.motor = motor
@@ -48,35 +39,33 @@ class EmulatedAkMotor(EmulatedMotor):
     def receive(self, data: bytes, now: float) -> bytes:
         """Obey the data of a frame at a time [s] and return those of the reply."""
         self.feed(now)
-        if data == ENTER:
+        if data == ak_mit.ENTER:
             self.enabled = True
-        elif data == EXIT:
+        elif data == ak_mit.EXIT:
             self.enabled = False
-        elif data != SET_ZERO and len(data) == 8:
-            self.command = unpack_command(data, self.motor).torque
-        reply = Reply(self.motor_id, 0.0, 0.0, self.torque, self.error)
-        return pack_reply(reply, self.motor, self._reply_bytes)
+        elif data != ak_mit.SET_ZERO and len(data) == 8:
+            self.command = ak_mit.unpack_command(data, self.motor).torque
+        reply = ak_mit.Reply(self.motor_id, 0.0, 0.0, self.torque, self.error)
+        return ak_mit.pack_reply(reply, self.motor, self._reply_bytes)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the emulator until SIGINT or SIGTERM; 1 where the bus cannot be opened."""
-    parser = emulator_parser(
-        "ak_motor_emulator", "The motor's side of a CubeMars AK motor in MIT mode, on a CAN bus."
+    """Run the emulator."""
+    return run_emulator(
+        "ak_motor_emulator",
+        "The motor's side of a CubeMars AK motor in MIT mode, on a CAN bus.",
+        lambda options: EmulatedAkMotor(
+            ak_mit.MOTORS[options.motor],
+            options.motor_id,
+            options.bandwidth,
+            options.timeout,
+            options.reply_bytes,
+        ),
+        arguments,
+        motor={"choices": ak_mit.MOTORS, "default": "AK80-9", "help": "type of the motor"},
+        motor_id={"type": int, "default": 1, "help": "1 to 127"},
+        reply_bytes={"type": int, "choices": (6, 8), "default": 8, "help": "length of a reply"},
     )
-    parser.add_argument("--motor", choices=MOTORS, default="AK80-9", help="type of the motor")
-    parser.add_argument("--motor-id", type=int, default=1, help="1 to 127")
-    parser.add_argument(
-        "--reply-bytes", type=int, choices=(6, 8), default=8, help="length of a reply"
-    )
-    options = parser.parse_args(arguments)
-    motor = EmulatedAkMotor(
-        MOTORS[options.motor],
-        options.motor_id,
-        options.bandwidth,
-        options.timeout,
-        options.reply_bytes,
-    )
-    return run_emulator(motor, parser.prog, options)
 
 
 if __name__ == "__main__":

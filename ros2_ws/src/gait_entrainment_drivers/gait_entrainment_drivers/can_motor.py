@@ -4,6 +4,7 @@
 """What drivers of a motor on a CAN bus share: options, the bus, asking until it answers."""
 
 import contextlib
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -34,7 +35,7 @@ class CanMotorOptions:
     bitrate: int = setting(1_000_000, "of the bus", "bit/s", (10_000, 1_000_000))
     ratio: float = setting(
         1.0,
-        "ankle torque per motor torque; negative where the motor turns against it",
+        "ankle torque per motor torque; negative if the motor turns against it",
         "1",
         (-20.0, 20.0),
     )
@@ -52,8 +53,8 @@ class CanMotorRobot(HostTimedRobot):
     """
     A motor whose torque is streamed to it in frames with 11-bit ids.
 
-    A subclass says how it is called in messages, opens the bus first of all in ``_open``, and
-    implements ``_enable``, ``_exchange`` and ``_disable``; ``_disable`` must bring zero torque.
+    A subclass names its protocol, opens the bus first of all in ``_open``, and implements
+    ``_enable``, ``_exchange`` and ``_disable``; ``_disable`` must bring zero torque.
 
     ``name`` is the motor's, in messages; ``motor_torque`` its peak [N m] before the transmission.
     """
@@ -69,7 +70,7 @@ class CanMotorRobot(HostTimedRobot):
         self._others: set[int] = set()  # ids of other motors that were heard
         self.capabilities = Capabilities(
             peak_torque=motor_torque * abs(options.ratio),
-            torque_rate=float("inf"),
+            torque_rate=math.inf,
             measures_torque=True,
             simulated=False,
             state_rate=options.rate,
@@ -87,33 +88,22 @@ class CanMotorRobot(HostTimedRobot):
             self._bus.shutdown()
             self._bus = None
 
-    def _send(self, identifier: int, data: bytes = b"", *, remote: bool = False) -> None:
-        import can
-
-        self._bus.send(
-            can.Message(
-                arbitration_id=identifier, data=data, is_extended_id=False, is_remote_frame=remote
-            )
-        )
-
     def _answer(self, understand: Callable[[Any], _T | None], give_up: float) -> _T | None:
         """
         Return the newest answer among the frames, waiting for the first until a time [s].
 
-        After that time none is read any more: frames may come faster than they are read.
+        After that time no frame is read: they may come faster than they are read.
         """
         newest = None
-        while True:
-            patience = give_up - time.monotonic()
-            if patience < 0:
-                return newest
+        while (patience := give_up - time.monotonic()) >= 0:
             message = self._bus.recv(patience if newest is None else 0.0)
             if message is None:
-                return newest
+                break
             if message.is_error_frame or message.is_remote_frame or message.is_extended_id:
                 continue
             answer = understand(message)
             newest = newest if answer is None else answer
+        return newest
 
     def _ask(self, ask: Callable[[], None], understand: Callable[[Any], _T | None]) -> _T:
         """Ask until there is an answer."""
@@ -132,11 +122,11 @@ class CanMotorRobot(HostTimedRobot):
         )
 
     def _require_zero_torque(self, doubt: str) -> None:
-        """Raise DeviceError where the motor, enabled, keeps showing torque at zero command."""
+        """Raise DeviceError if the motor, enabled, keeps showing torque at zero command."""
         give_up = time.monotonic() + ANSWER_TIMEOUT
         while True:
             reading = self._exchange(0.0, _ASK_PERIOD)
-            torque = float("nan") if reading is None else reading.torque
+            torque = math.nan if reading is None else reading.torque
             if abs(torque) <= 0.05 * self.capabilities.peak_torque:
                 return
             if time.monotonic() > give_up:

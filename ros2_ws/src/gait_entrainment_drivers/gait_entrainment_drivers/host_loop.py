@@ -15,9 +15,10 @@ import time
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
-from gait_entrainment.robot.contract import AnkleRobot, RobotState
+from gait_entrainment.robot import AnkleRobot, PulseTrain, RobotState, TorqueProfile
 from gait_entrainment.robot.faults import (
     DEVICE_SILENT,
     DRIVER_FAILED,
@@ -26,11 +27,9 @@ from gait_entrainment.robot.faults import (
     Fault,
     LimitError,
 )
-from gait_entrainment.robot.profile import TorqueProfile
-from gait_entrainment.robot.pulse_train import PulseTrain
 
-# Before the device is disabled it is asked for zero torque: so often, so that a lost frame does
-# not matter, and on until its torque has run down to this share of its peak, or for so long [s].
+# Before the device is disabled it is asked for zero torque this often, so that a lost frame does
+# not matter, and on until its torque has run down to this share of its peak, or for this long [s].
 _ZERO_TICKS = 5
 _RUN_DOWN_SHARE = 0.02
 _RUN_DOWN_TIME = 0.2
@@ -43,7 +42,7 @@ class Reading:
     """A device's answer to one command."""
 
     torque: float  # measured [N m], plantarflexion positive
-    angle: float  # measured [rad], plantarflexion positive; NaN where it measures none
+    angle: float  # measured [rad], plantarflexion positive; NaN if it measures none
     faults: tuple[Fault, ...] = ()
 
 
@@ -55,20 +54,10 @@ class HostTimedRobot(AnkleRobot):
     names begin with an underscore. They are called from one thread at a time: ``_open`` and
     ``_shut`` by configure and close, the others by the loop while it runs.
 
-    A state's stamp is the instant at which the command was sent; what it measured is up to one
-    round trip younger. After a fault the loop goes on and commands zero torque.
-
-    Parameters
-    ----------
-    side
-        The ankle on which the robot sits.
-    rate
-        Commands per second.
-    silence
-        Without an answer for longer than this [s] the device counts as silent.
-    lateness
-        The loop may wake up this late [s].
-
+    The loop sends ``rate`` commands per second. It may wake up ``lateness`` [s] late; without an
+    answer for longer than ``silence`` [s] the device counts as silent. After a fault it goes on
+    and commands zero torque. A state is stamped with the instant at which the command was sent;
+    what it measured is up to one round trip younger.
     """
 
     def __init__(self, side: Side, rate: float, silence: float, lateness: float) -> None:
@@ -90,7 +79,7 @@ class HostTimedRobot(AnkleRobot):
 
     @abstractmethod
     def _open(self) -> None:
-        """Connect and see that the device answers, and is the right one; may raise DeviceError."""
+        """Connect; see that the device answers and is the right one; may raise DeviceError."""
 
     @abstractmethod
     def _enable(self) -> None:
@@ -98,7 +87,7 @@ class HostTimedRobot(AnkleRobot):
 
     @abstractmethod
     def _exchange(self, torque: float, patience: float) -> Reading | None:
-        """Send a torque [N m]; return the answer, or None where none comes in time [s]."""
+        """Send a torque [N m]; return the answer, or None if there is none in time [s]."""
 
     @abstractmethod
     def _disable(self) -> None:
@@ -106,7 +95,7 @@ class HostTimedRobot(AnkleRobot):
 
     @abstractmethod
     def _shut(self) -> None:
-        """Release everything; must bear being called twice, and without ``_open``."""
+        """Release everything; may be called twice, and without ``_open``."""
 
     # The contract
 
@@ -134,21 +123,13 @@ class HostTimedRobot(AnkleRobot):
         with self._lock:
             self._train = None
             self._promised, self._states = start, []
-            # Stamps from before are of another offset, where the wall clock was set meanwhile.
+            # Earlier stamps are of another offset if the wall clock has been set since.
             self._held = self._samples[-1][1] if self._samples else 0.0
             self._samples = []
             self._offset = time.time_ns() - time.monotonic_ns()
 
     def schedule(self, train: PulseTrain) -> None:
-        """
-        Take over a train.
-
-        Raises
-        ------
-        LimitError
-            where its first onset is over already.
-
-        """
+        """Take over a train; raises LimitError if its first onset is over already."""
         late = time.monotonic_ns() + self._offset - train.first_onset
         if late > 0:
             raise LimitError(f"first_onset: is over by {late / NANOSECONDS_PER_SECOND:.3g} s")
@@ -163,22 +144,16 @@ class HostTimedRobot(AnkleRobot):
         begin = self._promised
         with self._lock:
             known = [sample for sample in self._samples if sample[0] < until]
-            # The last sample holds until a later one is known: it is told with that.
+            # The last sample holds until a later one is known: it is promised with that one.
             end = until if len(known) < len(self._samples) else known[-1][0] if known else begin
             end = max(end, begin)
             self._samples = [sample for sample in self._samples if sample[0] >= end]
-        times, torques = [begin], [self._held]
-        for stamp, torque in known:
-            if stamp <= begin:
-                torques[0] = torque
-            elif stamp < end and torque != torques[-1]:
-                times.append(stamp)
-                torques.append(torque)
-        self._held = torques[-1]
-        self._promised = end
-        train = self._train
-        onsets = train.onsets_within(begin, end) if train is not None else ()
-        return TorqueProfile(self._side, tuple(times), tuple(torques), onsets, end)
+        changes = [(begin, self._held)]
+        changes += [new for old, new in pairwise([*changes, *known]) if new[1] != old[1]]
+        onsets = self._train.onsets_within(begin, end) if self._train is not None else ()
+        profile = TorqueProfile.from_changes(self._side, begin, end, changes, onsets)
+        self._held, self._promised = profile.torques[-1], end
+        return profile
 
     def read(self) -> Sequence[RobotState]:
         """Return one state for each command that was answered, and each tick without an answer."""
@@ -228,14 +203,11 @@ class HostTimedRobot(AnkleRobot):
     def _stream(self) -> None:
         due = last_answer = time.monotonic()
         while not self._ending.is_set():
-            late = time.monotonic() - due
-            if late > self._lateness:
+            if time.monotonic() - due > self._lateness:
                 self._fault(HOST_LOOP_LATE)
             sent = time.monotonic_ns()
-            train = self._train
-            torque = 0.0
-            if train is not None and not self._halted:
-                torque = train.torque_at(sent + self._offset)
+            train = None if self._halted else self._train
+            torque = train.torque_at(sent + self._offset) if train is not None else 0.0
             # Most of the period at most: an answer that comes later is read with the next one.
             reading = self._exchange(torque, 0.8 * self._period)
             if reading is not None:
@@ -266,13 +238,13 @@ class HostTimedRobot(AnkleRobot):
             self._faults = (*self._faults, fault)
 
     def _note(self, sent: int, torque: float, reading: Reading | None) -> None:
+        stamp = sent + self._offset
         with self._lock:
-            stamp = sent + self._offset
             if not self._promised:  # nobody asks for samples until a run begins
                 self._samples, self._states = self._samples[-1:], self._states[-1:]
             if reading is not None:
                 self._samples.append((stamp, reading.torque))
-                state = RobotState(stamp, torque, reading.torque, reading.angle, self._faults)
+            if reading is not None or self._faults:
+                measured = reading or Reading(math.nan, math.nan)
+                state = RobotState(stamp, torque, measured.torque, measured.angle, self._faults)
                 self._states.append(state)
-            elif self._faults:
-                self._states.append(RobotState(stamp, torque, math.nan, math.nan, self._faults))

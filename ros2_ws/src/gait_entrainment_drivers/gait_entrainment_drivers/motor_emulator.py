@@ -4,9 +4,9 @@
 """
 The motor's side of a CAN bus as a process of its own: what the emulators share.
 
-An emulator speaks on any python-can bus that crosses processes and reproduces what a real motor
-does to its users: it holds the last command when frames stop, unless its own watchdog is switched
-on (real ones have it off by default); frames get lost; errors come up.
+An emulator speaks on any python-can bus that crosses processes and does to its users what a real
+motor does: it holds the last command when frames stop, unless its own watchdog is switched on
+(real ones have it off by default); frames get lost; errors come up.
 
 Its torque follows the command as a first-order lag. Not modelled: motion (position and velocity
 are zero), heat, supply, arbitration and load of the bus, bit errors.
@@ -19,29 +19,42 @@ import signal
 import sys
 import time
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import Any, TextIO
 
+import can
+
 from gait_entrainment.robot.faults import DeviceError
-from gait_entrainment_drivers.can_bus import open_bus
+from gait_entrainment_drivers.can_bus import open_bus, send
 
 Frames = list[tuple[int, bytes]]  # id and data of each
 
 # How often the emulator looks after itself while no frame comes [s].
 _TICK = 0.001
+# Name, type, default and meaning of what every emulator takes.
+_OPTIONS: tuple[tuple[str, Callable[[str], object], object, str], ...] = (
+    ("--interface", str, "udp_multicast", "python-can interface"),
+    ("--channel", str, "239.74.163.2", "channel of the bus"),
+    ("--port", int, 0, "UDP port of udp_multicast; 0: python-can's own"),
+    ("--bandwidth", float, 30.0, "bandwidth of the torque [Hz]"),
+    ("--timeout", float, 0.0, "the motor's own watchdog [s]; 0 is off"),
+    ("--loss", float, 0.0, "share of the frames that get lost"),
+    ("--seed", int, 0, "seed of the losses"),
+    ("--error", lambda text: int(text, 0), 0, "error that comes up"),
+    ("--error-after", float, 0.0, "from the first torque to the error [s]"),
+    ("--silent-after", float, math.inf, "from the first torque to the last answer [s]"),
+    ("--trace", Path, None, "file for time [ns], command and torque [N m], a line each"),
+)
 
 
 class EmulatedMotor(ABC):
     """
     The motor itself, without a bus: frames in, replies out, torque as a function of time.
 
-    Parameters
-    ----------
-    bandwidth
-        Of the torque [Hz].
-    timeout
-        Its own watchdog [s]: it acts when it was not fed for so long; 0 is off.
-
+    ``bandwidth`` is that of the torque [Hz]. The motor's own watchdog acts when it was not fed for
+    longer than ``timeout`` [s]; 0 switches it off.
     """
 
     def __init__(self, bandwidth: float, timeout: float) -> None:
@@ -70,81 +83,55 @@ class EmulatedMotor(ABC):
 
     @abstractmethod
     def expire(self) -> None:
-        """Act on the watchdog's having expired."""
+        """Do what the watchdog does when it expires."""
 
     @abstractmethod
     def obey(self, identifier: int, data: bytes, *, remote: bool, now: float) -> Frames:
-        """Obey a frame at a time [s] and return the replies; none where it is not addressed."""
+        """Obey a frame at a time [s] and return the replies: none if it is for another motor."""
 
     def spontaneous(self, now: float) -> Frames:  # noqa: ARG002
         """Return frames that the motor sends without being asked."""
         return []
 
 
-def emulator_parser(name: str, description: str) -> argparse.ArgumentParser:
-    """Return a command line with what every emulator takes."""
+def run_emulator(
+    name: str,
+    description: str,
+    make: Callable[[argparse.Namespace], EmulatedMotor],
+    arguments: Sequence[str] | None,
+    **more: dict[str, Any],
+) -> int:
+    """
+    Run a program that emulates a motor, until SIGINT or SIGTERM; 1 if the bus cannot be opened.
+
+    ``make`` makes the motor from the options; ``more`` are further ones, by their names, as
+    argparse takes them.
+    """
     parser = argparse.ArgumentParser(
-        prog=name,
-        description=description,
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+        name, description=description, formatter_class=argparse.ArgumentDefaultsHelpFormatter
     )
-    parser.add_argument("--interface", default="udp_multicast", help="python-can interface")
-    parser.add_argument("--channel", default="239.74.163.2", help="channel of the bus")
-    parser.add_argument(
-        "--port", type=int, default=0, help="UDP port of udp_multicast; 0: python-can's own"
-    )
-    parser.add_argument(
-        "--bandwidth", type=float, default=30.0, help="bandwidth of the torque [Hz]"
-    )
-    parser.add_argument(
-        "--timeout", type=float, default=0.0, help="the motor's own watchdog [s]; 0 is off"
-    )
-    parser.add_argument(
-        "--loss", type=float, default=0.0, help="share of the frames that get lost"
-    )
-    parser.add_argument("--seed", type=int, default=0, help="seed of the losses")
-    parser.add_argument(
-        "--error", type=lambda text: int(text, 0), default=0, help="error that comes up"
-    )
-    parser.add_argument(
-        "--error-after", type=float, default=0.0, help="from the first torque to the error [s]"
-    )
-    parser.add_argument(
-        "--silent-after", type=float, help="from the first torque on it answers no more [s]"
-    )
-    parser.add_argument(
-        "--trace", type=Path, help="file for time [ns], command and torque [N m], a line each"
-    )
-    return parser
-
-
-def run_emulator(motor: EmulatedMotor, name: str, options: argparse.Namespace) -> int:
-    """Run a motor on its bus until SIGINT or SIGTERM; 1 where the bus cannot be opened."""
+    for option, kind, default, meaning in _OPTIONS:
+        parser.add_argument(option, type=kind, default=default, help=meaning)
+    for option, settings in more.items():
+        parser.add_argument("--" + option.replace("_", "-"), **settings)
+    options = parser.parse_args(arguments)
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, _end)
+        signal.signal(number, signal.default_int_handler)
     try:
         bus = open_bus(options.interface, options.channel, 1_000_000, options.port)
     except DeviceError as error:
         print(f"{name}: {error}", file=sys.stderr)
         return 1
     print(f"{name}: ready", flush=True)
-    with bus:
-        trace = options.trace.open("w", buffering=1) if options.trace else None
-        try:
-            _serve(bus, motor, options, trace)
-        except KeyboardInterrupt:
-            pass
-        finally:
-            if trace is not None:
-                trace.close()
+    trace = options.trace.open("w", buffering=1) if options.trace else nullcontext()
+    with bus, trace as file, suppress(KeyboardInterrupt):
+        _serve(bus, make(options), options, file)
     return 0
 
 
 def _serve(
-    bus: Any, motor: EmulatedMotor, options: argparse.Namespace, trace: TextIO | None
+    bus: can.BusABC, motor: EmulatedMotor, options: argparse.Namespace, trace: TextIO | None
 ) -> None:
-    import can
-
     chance = random.Random(options.seed)
     torque_since: float | None = None
     while True:
@@ -164,12 +151,8 @@ def _serve(
             remote = message.is_remote_frame
             data = bytes(message.data)
             replies += motor.obey(message.arbitration_id, data, remote=remote, now=now)
-        if options.silent_after is not None and under_torque > options.silent_after:
+        if under_torque > options.silent_after:
             continue
         for identifier, data in replies:
             if chance.random() >= options.loss:
-                bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
-
-
-def _end(*_: object) -> None:
-    raise KeyboardInterrupt
+                send(bus, identifier, data)

@@ -5,8 +5,8 @@
 ODrive axes by CANSimple, on the wire.
 
 An 11-bit id is the node's id and a command: ``node << 5 | command``. Numbers are little-endian,
-torque and estimates 32-bit floats. What an axis tells, it tells when asked by a remote frame, and
-the heartbeat also by itself, every 100 ms unless it is set otherwise.
+torque and estimates 32-bit floats. An axis answers remote frames; its heartbeat it also sends by
+itself, every 100 ms unless it is set otherwise.
 """
 
 import math
@@ -20,6 +20,9 @@ SET_MODE, SET_TORQUE, CLEAR_ERRORS, TORQUES = 0x0B, 0x0E, 0x18, 0x1C
 IDLE, CLOSED_LOOP = 1, 8
 # Control mode torque, input mode passthrough.
 TORQUE_MODE = bytes.fromhex("01000000 01000000")
+STATE = struct.Struct("<I")  # data of SET_STATE
+TORQUE = struct.Struct("<f")  # data of SET_TORQUE [N m]
+PAIR = struct.Struct("<ff")  # data of ENCODER [rev, rev/s] and of TORQUES [target, estimate, N m]
 WATCHDOG_EXPIRED, STOP_REQUESTED = 0x01000000, 0x02000000
 # By error bit; firmware 0.6.
 FAULTS = {
@@ -40,10 +43,10 @@ DISARMED = Fault("motor_disarmed", "The ODrive has left closed-loop control by i
 
 @dataclass(frozen=True)
 class Heartbeat:
-    """What an axis tells of itself."""
+    """How an axis is."""
 
-    error: int  # bits; 0 where all is well
-    state: int  # IDLE, CLOSED_LOOP, or one that no torque comes in
+    error: int  # bits; 0 if all is well
+    state: int  # IDLE, CLOSED_LOOP, or one in which there is no torque
 
 
 def frame_id(node: int, command: int) -> int:
@@ -51,31 +54,16 @@ def frame_id(node: int, command: int) -> int:
     return node << 5 | command
 
 
-def pack_state(state: int) -> bytes:
-    """Return the data of SET_STATE."""
-    return struct.pack("<I", state)
-
-
 def pack_torque(torque: float, peak: float) -> bytes:
     """Return the data of SET_TORQUE [N m], clamped to +/- a peak; NaN is refused."""
     if math.isnan(torque):
         raise ValueError("NaN cannot be sent to a motor")
-    return struct.pack("<f", min(max(torque, -peak), peak))
-
-
-def unpack_torque(data: bytes) -> float:
-    """Return the torque of SET_TORQUE [N m]."""
-    return float(struct.unpack("<f", data)[0])
-
-
-def pack_pair(first: float, second: float) -> bytes:
-    """Return the data of ENCODER [rev, rev/s] or TORQUES [target, estimate, N m]."""
-    return struct.pack("<ff", first, second)
+    return TORQUE.pack(min(max(torque, -peak), peak))
 
 
 def unpack_pair(data: bytes) -> tuple[float, float] | None:
     """Return the two floats of ENCODER or TORQUES; None for a frame of another length."""
-    return struct.unpack("<ff", data) if len(data) == 8 else None
+    return PAIR.unpack(data) if len(data) == PAIR.size else None
 
 
 def pack_heartbeat(heartbeat: Heartbeat) -> bytes:

@@ -6,33 +6,8 @@
 import sys
 from collections.abc import Sequence
 
-from gait_entrainment_drivers.motor_emulator import (
-    EmulatedMotor,
-    Frames,
-    emulator_parser,
-    run_emulator,
-)
-from gait_entrainment_drivers.odrive import (
-    CLEAR_ERRORS,
-    CLOSED_LOOP,
-    ENCODER,
-    HEARTBEAT,
-    IDLE,
-    SET_MODE,
-    SET_STATE,
-    SET_TORQUE,
-    STOP,
-    STOP_REQUESTED,
-    TORQUE_MODE,
-    TORQUES,
-    WATCHDOG_EXPIRED,
-    Heartbeat,
-    frame_id,
-    pack_heartbeat,
-    pack_pair,
-    pack_state,
-    unpack_torque,
-)
+from gait_entrainment_drivers import odrive
+from gait_entrainment_drivers.motor_emulator import EmulatedMotor, Frames, run_emulator
 
 _HEARTBEAT_PERIOD = 0.1  # [s]
 
@@ -53,9 +28,9 @@ class EmulatedOdrive(EmulatedMotor):
             self.enabled = False
 
     def expire(self) -> None:
-        """Report the watchdog where torque was possible."""
+        """Report the watchdog if torque was possible."""
         if self.enabled:
-            self.error |= WATCHDOG_EXPIRED
+            self.error |= odrive.WATCHDOG_EXPIRED
 
     def obey(self, identifier: int, data: bytes, *, remote: bool, now: float) -> Frames:
         """Obey a frame; only questions, which are remote frames, are answered."""
@@ -65,45 +40,47 @@ class EmulatedOdrive(EmulatedMotor):
         self.advance(now)
         if remote:
             return self._tell(command)
-        if command == SET_TORQUE:
+        if command == odrive.SET_TORQUE:
             self.feed(now)
-            if self._mode == TORQUE_MODE:
-                self.command = unpack_torque(data)
-        elif command == SET_MODE:
+            if self._mode == odrive.TORQUE_MODE:
+                (self.command,) = odrive.TORQUE.unpack(data)
+        elif command == odrive.SET_MODE:
             self._mode = data
-        elif command == SET_STATE:
-            self.enabled = data == pack_state(CLOSED_LOOP) and not self.error
-        elif command == CLEAR_ERRORS:
+        elif command == odrive.SET_STATE:
+            self.enabled = data == odrive.STATE.pack(odrive.CLOSED_LOOP) and not self.error
+        elif command == odrive.CLEAR_ERRORS:
             self.error = 0
-        elif command == STOP:
-            self.error |= STOP_REQUESTED
+        elif command == odrive.STOP:
+            self.error |= odrive.STOP_REQUESTED
         return []
 
     def spontaneous(self, now: float) -> Frames:
-        """Return the heartbeat where it is due."""
+        """Return the heartbeat if it is due."""
         if now - self._beat_at < _HEARTBEAT_PERIOD:
             return []
         self._beat_at = now
-        return self._tell(HEARTBEAT)
+        return self._tell(odrive.HEARTBEAT)
 
     def _tell(self, what: int) -> Frames:
-        told = {
-            HEARTBEAT: pack_heartbeat(
-                Heartbeat(self.error, CLOSED_LOOP if self.enabled else IDLE)
+        answers = {
+            odrive.HEARTBEAT: odrive.pack_heartbeat(
+                odrive.Heartbeat(self.error, odrive.CLOSED_LOOP if self.enabled else odrive.IDLE)
             ),
-            ENCODER: pack_pair(0.0, 0.0),
-            TORQUES: pack_pair(self.command, self.torque),
+            odrive.ENCODER: odrive.PAIR.pack(0.0, 0.0),
+            odrive.TORQUES: odrive.PAIR.pack(self.command, self.torque),
         }
-        return [(frame_id(self._node, what), told[what])] if what in told else []
+        return [(odrive.frame_id(self._node, what), answers[what])] if what in answers else []
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the emulator until SIGINT or SIGTERM; 1 where the bus cannot be opened."""
-    parser = emulator_parser("odrive_emulator", "An ODrive axis by CANSimple, on a CAN bus.")
-    parser.add_argument("--node-id", type=int, default=0, help="0 to 62")
-    options = parser.parse_args(arguments)
-    motor = EmulatedOdrive(options.node_id, options.bandwidth, options.timeout)
-    return run_emulator(motor, parser.prog, options)
+    """Run the emulator."""
+    return run_emulator(
+        "odrive_emulator",
+        "An ODrive axis by CANSimple, on a CAN bus.",
+        lambda options: EmulatedOdrive(options.node_id, options.bandwidth, options.timeout),
+        arguments,
+        node_id={"type": int, "default": 0, "help": "0 to 62"},
+    )
 
 
 if __name__ == "__main__":

@@ -15,6 +15,8 @@ and a test that takes the fixture ``ankle_robot_check`` runs once for each drive
         ankle_robot_check()
 
 A driver that applies real torque is skipped unless ``--arm-ankle-robot`` is given.
+
+The kit is imported where it is used, so that a pytest that checks no driver does not wait for it.
 """
 
 from collections.abc import Callable
@@ -46,8 +48,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Make one test of each driver and check."""
     if _FIXTURE not in metafunc.fixturenames:
         return
-    # Loaded here, so that a pytest that checks no driver does not wait for the kit.
-    from gait_entrainment_drivers.conformance import CHECKS
+    from gait_entrainment_drivers.conformance.checks import CHECKS
 
     config = metafunc.config
     drivers = [*config.getini("ankle_robots"), *config.getoption("--ankle-robot")]
@@ -58,9 +59,9 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 @pytest.fixture
 def ankle_robot_check(request: pytest.FixtureRequest) -> Callable[[], None]:
-    """Return a function that runs one check of one driver and fails where a promise is broken."""
+    """Return a function that runs one check of one driver and fails if a promise is broken."""
     from gait_entrainment.robot.drivers import find_driver
-    from gait_entrainment_drivers.conformance import run_check
+    from gait_entrainment_drivers.conformance.bench import DriverBench, run_check
 
     text, check = request.param
     driver = find_driver(text)
@@ -68,7 +69,7 @@ def ankle_robot_check(request: pytest.FixtureRequest) -> Callable[[], None]:
         pytest.skip(f"{driver.name} applies real torque: say --arm-ankle-robot")
 
     def run() -> None:
-        result = run_check(check, driver)
+        result = run_check(check, DriverBench(driver))
         if result.broken:
             pytest.fail(f"{result.promise} Broken: {result.broken}", pytrace=False)
 

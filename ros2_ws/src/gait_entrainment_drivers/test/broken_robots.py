@@ -115,7 +115,9 @@ class GoesOnAfterCancelling(IdealAnkleRobot):
 
 
 class DeafAfterCancelling(IdealAnkleRobot):
-    cancelled = False
+    def begin(self, start):
+        super().begin(start)
+        self.cancelled = False
 
     def cancel(self):
         super().cancel()
@@ -152,6 +154,11 @@ class StopBlocks(IdealAnkleRobot):
 class TakesTrainsAfterAStop(IdealAnkleRobot):
     def stop(self):
         self._train = None
+
+
+class GoesOnAfterDeactivating(IdealAnkleRobot):
+    def deactivate(self):
+        pass
 
 
 class RemembersItsTrain(IdealAnkleRobot):
@@ -253,6 +260,7 @@ BROKEN = [
     (StopRaises, "stopping_in_every_state", "raised OSError"),
     (CloseRaises, "stopping_in_every_state", "raised OSError"),
     (TakesTrainsAfterAStop, "stopping_in_every_state", "delivered a train"),
+    (GoesOnAfterDeactivating, "deactivating", "after deactivating"),
     (RemembersItsTrain, "new_run", "run before"),
     (RemembersItsTrain, "reconnecting", "after reconnecting"),
     (DoesNotAdjoin, "idle", "does not adjoin"),

@@ -15,8 +15,9 @@ import pytest
 from gait_entrainment.commands import main
 from gait_entrainment.robot import find_driver
 from gait_entrainment.robot.drivers import OWN_DRIVERS, Driver
-from gait_entrainment_drivers import conformance
-from gait_entrainment_drivers.conformance import CHECKS, Tolerances, run_check, run_checks
+from gait_entrainment_drivers.conformance import checks
+from gait_entrainment_drivers.conformance.bench import DriverBench, Tolerances, run_check
+from gait_entrainment_drivers.conformance.checks import CHECKS
 
 from .broken_robots import BROKEN
 from .emulator_process import emulator
@@ -25,18 +26,23 @@ from .emulator_process import emulator
 PATIENT = Tolerances(onset=0.25, zero_within=1.0, call=0.1, slowest_call=2.0, impulse=0.6)
 
 
+def run_checks(text, tolerances=None):
+    bench = DriverBench(find_driver(text), tolerances)
+    return [run_check(check, bench) for check in CHECKS]
+
+
 @pytest.mark.parametrize(
     "text", ["ideal", "emulated", "emulated:bandwidth=8,delay=0.03,noise=0.2,state_rate=1000"]
 )
 def test_the_simulated_drivers_keep_every_promise(text):
-    results = list(run_checks(find_driver(text)))
+    results = run_checks(text)
     assert [result for result in results if not result.kept] == []
     assert len(results) == len(CHECKS)
 
 
 def test_the_can_driver_keeps_every_promise():
     with emulator() as text:
-        results = list(run_checks(find_driver(text), PATIENT))
+        results = run_checks(text, PATIENT)
     assert [result for result in results if not result.kept] == []
     figures = {result.check: result.figures for result in results}
     assert figures["timing"]["median_ms"] > 0
@@ -48,7 +54,7 @@ def test_the_can_driver_keeps_every_promise():
 )
 def test_a_broken_driver_is_caught(broken, check, words):
     driver = Driver("broken", broken, broken.Options())
-    result = run_check(getattr(conformance, check), driver)
+    result = run_check(getattr(checks, check), DriverBench(driver))
     assert re.search(words, result.broken), result.broken
     assert "\n" not in result.broken
 
@@ -64,7 +70,7 @@ def test_silence_that_nobody_notices_is_caught(monkeypatch):
 
     monkeypatch.setattr(GuardedRobot, "_watch", lambda _: None)
     with emulator() as text:
-        result = run_check(conformance.stale_commands, find_driver(text), PATIENT)
+        result = run_check(checks.stale_commands, DriverBench(find_driver(text), PATIENT))
     assert "silence was not noticed" in result.broken
 
 
@@ -150,5 +156,5 @@ def test_the_plugin_leaves_real_torque_alone(tmp_path):
 
 def test_tolerances_are_the_labs_own():
     strict = replace(Tolerances(), onset=0.001)
-    result = run_check(conformance.timing, find_driver("emulated"), strict)
+    result = run_check(checks.timing, DriverBench(find_driver("emulated"), strict))
     assert "allowed: -2.0 to +1.0 ms" in result.broken

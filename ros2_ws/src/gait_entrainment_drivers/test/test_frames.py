@@ -30,14 +30,14 @@ from gait_entrainment_drivers.odrive import (
     ENCODER,
     HEARTBEAT,
     IDLE,
+    PAIR,
+    STATE,
     STOP,
     TORQUE_MODE,
     TORQUES,
     Heartbeat,
     frame_id,
     pack_heartbeat,
-    pack_pair,
-    pack_state,
 )
 from gait_entrainment_drivers.odrive_can import OdriveCanOptions, OdriveCanRobot
 from gait_entrainment_drivers.odrive_emulator import EmulatedOdrive
@@ -113,9 +113,9 @@ def test_angle_and_torque_are_the_ankles(ratio):
     wire.motor = Telling([(0, pack_reply(Reply(1, 1.5, 0.0, 0.0), AK, 8))])
     assert robot._exchange(0.0, 0.01).angle == pytest.approx(1.5 / ratio, abs=1e-3 / abs(ratio))
     robot, wire = odrive(ratio)
-    estimates = pack_pair(0.25, 0.0)  # a quarter of a turn
+    estimates = PAIR.pack(0.25, 0.0)  # a quarter of a turn
     wire.motor = Telling(
-        [(frame_id(0, ENCODER), estimates), (frame_id(0, TORQUES), pack_pair(7.0, 2.0))]
+        [(frame_id(0, ENCODER), estimates), (frame_id(0, TORQUES), PAIR.pack(7.0, 2.0))]
     )
     reading = robot._exchange(7.0, 0.01)
     assert reading.angle == pytest.approx(math.pi / 2 / ratio)
@@ -178,7 +178,7 @@ def test_frames_that_are_no_data_frames_of_the_motor_are_no_answer(make):
     answer = pack_reply(Reply(1, 0.0, 0.0, 9.0), AK, 8)
     identifier = 0
     if make is odrive:
-        answer, identifier = pack_pair(9.0, 9.0), frame_id(0, TORQUES)
+        answer, identifier = PAIR.pack(9.0, 9.0), frame_id(0, TORQUES)
     for kind in ("is_extended_id", "is_remote_frame", "is_error_frame"):
         flags = {"is_extended_id": False, kind: True}
         data = b"" if kind == "is_remote_frame" else answer
@@ -200,11 +200,11 @@ def test_a_motor_with_torque_at_zero_command_is_switched_off_and_named(make, tor
         frames = [(0, pack_reply(Reply(1, 0.0, 0.0, torque), AK, 8))]
     else:
         closed = pack_heartbeat(Heartbeat(0, CLOSED_LOOP))
-        frames = [(frame_id(0, HEARTBEAT), closed), (frame_id(0, TORQUES), pack_pair(0.0, torque))]
+        frames = [(frame_id(0, HEARTBEAT), closed), (frame_id(0, TORQUES), PAIR.pack(0.0, torque))]
     wire.motor = Telling(frames)
     with pytest.raises(DeviceError, match=r"at zero command: is it (AK80-9|calibrated)\?"):
         robot.activate()
-    assert wire.sent[-1] == (EXIT if make is ak else pack_state(IDLE))
+    assert wire.sent[-1] == (EXIT if make is ak else STATE.pack(IDLE))
 
 
 def test_what_the_manual_says():

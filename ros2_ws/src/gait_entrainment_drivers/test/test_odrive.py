@@ -13,27 +13,27 @@ from hypothesis import strategies as st
 from gait_entrainment_drivers.odrive import (
     CLOSED_LOOP,
     HEARTBEAT,
+    PAIR,
     SET_TORQUE,
+    STATE,
+    TORQUE,
     TORQUE_MODE,
     TORQUES,
     Heartbeat,
     faults_of,
     frame_id,
     pack_heartbeat,
-    pack_pair,
-    pack_state,
     pack_torque,
     unpack_heartbeat,
     unpack_pair,
-    unpack_torque,
 )
 
 
 def test_golden_bytes():
     assert pack_torque(10.0, 18.0).hex(" ") == "00 00 20 41"
-    assert pack_state(CLOSED_LOOP).hex(" ") == "08 00 00 00"
+    assert STATE.pack(CLOSED_LOOP).hex(" ") == "08 00 00 00"
     assert TORQUE_MODE.hex(" ") == "01 00 00 00 01 00 00 00"
-    assert pack_pair(10.0, -10.0).hex(" ") == "00 00 20 41 00 00 20 c1"
+    assert PAIR.pack(10.0, -10.0).hex(" ") == "00 00 20 41 00 00 20 c1"
     assert pack_heartbeat(Heartbeat(0x01000000, 8)).hex(" ") == "00 00 00 01 08 00 00 00"
 
 
@@ -47,7 +47,7 @@ def test_ids_of_the_first_and_the_last_node():
 @pytest.mark.parametrize("sign", [-1, 1])
 @pytest.mark.parametrize("beyond", [1.0, 1.5, math.inf])
 def test_both_ends_of_the_torque_keep_their_sign(sign, beyond):
-    assert unpack_torque(pack_torque(sign * 18.0 * beyond, 18.0)) == sign * 18.0
+    assert TORQUE.unpack(pack_torque(sign * 18.0 * beyond, 18.0))[0] == sign * 18.0
 
 
 def test_nan_is_not_sent():
@@ -61,11 +61,11 @@ floats = st.floats(width=32, allow_nan=False)
 @settings(derandomize=True, deadline=None, max_examples=200)
 @given(floats, floats, st.integers(0, 2**32 - 1), st.integers(0, 255))
 def test_any_value_arrives(first, second, error, state):
-    assert unpack_pair(pack_pair(first, second)) == (first, second)
+    assert unpack_pair(PAIR.pack(first, second)) == (first, second)
     heartbeat = Heartbeat(error, state)
     assert unpack_heartbeat(pack_heartbeat(heartbeat)) == heartbeat
     clamped = min(max(first, -18.0), 18.0)
-    assert unpack_torque(pack_torque(first, 18.0)) == clamped
+    assert TORQUE.unpack(pack_torque(first, 18.0))[0] == clamped
     assert struct.unpack("<f", pack_torque(first, 18.0)) == (clamped,)
     assert len(faults_of(error)) == error.bit_count()
 

@@ -9,7 +9,8 @@ import pytest
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.robot import DeviceError, find_driver
-from gait_entrainment_drivers.conformance import CHECKS, run_check
+from gait_entrainment_drivers.conformance.bench import DriverBench, run_check
+from gait_entrainment_drivers.conformance.checks import CHECKS
 from gait_entrainment_drivers.odrive import (
     CLEAR_ERRORS,
     CLOSED_LOOP,
@@ -18,13 +19,13 @@ from gait_entrainment_drivers.odrive import (
     SET_MODE,
     SET_STATE,
     SET_TORQUE,
+    STATE,
     STOP,
     STOP_REQUESTED,
     TORQUE_MODE,
     WATCHDOG_EXPIRED,
     Heartbeat,
     frame_id,
-    pack_state,
     pack_torque,
     unpack_heartbeat,
 )
@@ -55,7 +56,7 @@ def robot_on(driver):
 def test_the_kit_finds_the_promises_kept(name):
     check = next(check for check in CHECKS if check.__name__ == name)
     with axis("--timeout", "0.9", "--loss", "0.01") as driver:
-        result = run_check(check, find_driver(driver), PATIENT)
+        result = run_check(check, DriverBench(find_driver(driver), PATIENT))
     assert result.kept, result.broken
 
 
@@ -110,7 +111,7 @@ class Axis(EmulatedOdrive):
     def push(self, now):
         self.tell(SET_MODE, TORQUE_MODE, now)
         self.tell(SET_TORQUE, pack_torque(10.0, 18.0), now)
-        self.tell(SET_STATE, pack_state(CLOSED_LOOP), now)
+        self.tell(SET_STATE, STATE.pack(CLOSED_LOOP), now)
 
 
 def test_the_emulated_axis_holds_its_command_unless_its_watchdog_is_on():
@@ -125,7 +126,7 @@ def test_the_emulated_axis_holds_its_command_unless_its_watchdog_is_on():
     assert held.torque == pytest.approx(10.0)
     assert guarded.torque == pytest.approx(0.0)
     assert guarded.heartbeat(101.0) == Heartbeat(WATCHDOG_EXPIRED, IDLE)
-    guarded.tell(SET_STATE, pack_state(CLOSED_LOOP), 101.0)
+    guarded.tell(SET_STATE, STATE.pack(CLOSED_LOOP), 101.0)
     assert guarded.heartbeat(101.0).state == IDLE  # refused until errors are cleared
     guarded.tell(CLEAR_ERRORS, bytes(1), 101.0)
     guarded.push(101.0)

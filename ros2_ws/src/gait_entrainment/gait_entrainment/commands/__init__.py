@@ -11,7 +11,7 @@ that name in the same package:
     DESCRIPTION, EXAMPLES     what ``entrain NAME --help`` says
     add_options(parser)       adds the options
     run(options) -> int       does it and returns the exit code; a command of several actions has
-                              none, but sets it as a default of each action's parser
+                              none, but sets it, and ``prog``, as defaults of each action's parser
 
 Whatever a command raises as an EntrainmentError is printed here, in one line.
 """
@@ -35,11 +35,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return 0 if it is done, 1 if it failed, 2 for wrong usage."""
     words = sys.argv[1:] if arguments is None else list(arguments)
     name = words[0] if words else ""
+    prog = f"entrain {name}"
     try:
         options = make_parser(name).parse_args(words)
+        prog = getattr(options, "prog", prog)
         return int(options.run(options))
     except EntrainmentError as error:
-        print(f"entrain {name}: {error}", file=sys.stderr)
+        print(f"{prog}: {error}", file=sys.stderr)
         return error.exit_code
     except ModuleNotFoundError as error:
         package = (error.name or "").partition(".")[0]
@@ -49,11 +51,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
             file=sys.stderr,
         )
     except KeyboardInterrupt:
-        print(f"entrain {name}: interrupted", file=sys.stderr)
+        print(f"{prog}: interrupted", file=sys.stderr)
     except BrokenPipeError:
         pass
     except OSError as error:  # such as a folder that cannot be written
-        print(f"entrain {name}: {error}", file=sys.stderr)
+        print(f"{prog}: {error}", file=sys.stderr)
     return 1
 
 

@@ -22,6 +22,7 @@ from gait_entrainment import geometry
 from gait_entrainment.parameters import WalkerParameters
 
 Floats = NDArray[np.float64]
+Stamps = NDArray[np.int64]
 
 # Gauss-Legendre nodes of one panel of double stance, and of a whole single stance. At Table 1 the
 # Legendre coefficients of the whole unperturbed double stance fall by 3 each, so 20 nodes leave
@@ -44,8 +45,7 @@ BOUNDED_PULSE = 0.25
 # The bounds that clear a segment without a search are minima on a grid of this many points. What
 # they must leave is far above what a minimum between two points can hide.
 BOUND_POINTS = 1025
-BOUND_MARGIN = 1e-3
-"""Of the weight, and of the squared rate g / L."""
+BOUND_MARGIN = 1e-3  # of the weight, and of the squared rate g / L
 
 # Constants are made in extended precision where the machine has it: an error in the last bit of a
 # constant would add up over the steps, one of the arithmetic averages out.
@@ -54,53 +54,47 @@ PI: Any = Extended("3.14159265358979323846264338327950288")
 
 
 class Model(Protocol):
-    """Constants of one walker. Positions in double stance are psi, in single stance -theta."""
+    """
+    Constants of one walker. Positions in double stance are psi, in single stance -theta.
+
+    In single stance, and in what gravity does, theta counts from the vertical; in the linkage from
+    the normal of the ground. Only on a slope do the two differ. `apex` is the squared rate that
+    the walker would have at the apex; a hold is the force on the leading or stance leg without the
+    centrifugal part of `apex`.
+    """
 
     mass: float
     leg_length: float
     foot_length: float
-    separation: float
+    toe_separation: float
     gravity: float
-    stiffness: float
+    ankle_stiffness: float
     max_plantarflexion: float
     double_stance_start: float
     strike_position: float
     toe_off_position: float
-    swing_hip: float
-    """Angle of the trailing leg at toe-off."""
-    swing_hip_slope: float
-    """Its rate at toe-off, and next the ankle's, per unit of progress through single stance."""
-    swing_ankle_slope: float
-    per_energy: float
-    """Squared rate per energy, 2 / (m L^2)."""
-    per_drop: float
-    """Squared rate per relative height, 2 g / L."""
-    strike_gain: float
-    """Squared rate at heel strike over that at the apex: `per_drop` times the drop."""
-    restitution: float
-    """Squared rate after a collision over that before it."""
-    start_apex: float
-    """`apex` right after a collision in the period-one gait."""
-    toe_off_half_sine: float
-    """sin(theta / 2)^2 at toe-off."""
-    strike_hold: float
-    """Force on the stance leg right before heel strike, but for the centrifugal part of apex."""
-    rule: Floats
-    """Gauss-Legendre panel, rows: nodes, weights, and what gives the last two coefficients."""
-    whole_double_stance: Floats
-    """The unperturbed double stance, rows: gain in squared rate since heel strike, weights."""
-    whole_double_stance_apex: float
-    """From this `apex` on up that quadrature has converged."""
-    whole_single_stance: Floats
-    """The same for a whole single stance."""
+    swing_hip: float  # angle of the trailing leg at toe-off
+    swing_hip_slope: float  # its rate there, per unit of progress through single stance
+    swing_ankle_slope: float  # and that of the ankle
+    per_energy: float  # squared rate per energy, 2 / (m L^2)
+    per_drop: float  # squared rate per relative height, 2 g / L
+    strike_gain: float  # squared rate right before heel strike over that at the apex
+    start_gain: float  # the same right after it: uphill the new leading leg leans further
+    slope_sine: float  # of the angle by which the ground rises
+    slope_cosine: float
+    restitution: float  # squared rate after a collision over that before it
+    start_apex: float  # `apex` right after a collision in the period-one gait
+    toe_off_half_sine: float  # sin(theta / 2)^2 at toe-off
+    strike_hold: float  # right before heel strike
+    rule: Floats  # Gauss-Legendre, rows: nodes, weights, weights of the last two coefficients
+    whole_double_stance: Floats  # unperturbed, rows: gain in squared rate, weights
+    whole_double_stance_apex: float  # from this `apex` on up that quadrature has converged
+    whole_single_stance: Floats  # the same for a whole single stance
     whole_single_stance_apex: float
-    least_gain: float
-    """Least gain in squared rate over the unperturbed double stance."""
-    least_hold: float
-    """Least force on the leading leg over double stance, but for the centrifugal part of apex."""
+    least_gain: float  # least gain in squared rate over the unperturbed double stance
+    least_hold: float  # over the unperturbed double stance
     bounded_pulse: float
-    bounded_hold: float
-    """The same with a pulse of `bounded_pulse` from heel strike on."""
+    bounded_hold: float  # the least with a pulse of `bounded_pulse` from heel strike on
 
 
 # One record in memory, of which the compiled functions hand on the address only.
@@ -153,102 +147,117 @@ def _converged_apex(whole: Floats, rule: Floats) -> float:
     return float(apexes[first]) if first < apexes.size else float("inf")
 
 
-def make_model(p: WalkerParameters) -> Model:
-    """Work out the constants of a walker."""
-    alpha, end = Extended(p.leg_angle), Extended(p.max_plantarflexion)
-    start = PI / 2 - alpha
-    separation = 2 * p.leg_length * np.sin(alpha) - p.foot_length
-    peak_torque = geometry.spring_torque(start, p.ankle_stiffness, end)
-    per_energy = 2 / Extended(p.mass * p.leg_length**2)
-    per_drop = 2 * p.gravity / Extended(p.leg_length)
-    push_off = geometry.torque_work(end - start, peak_torque, p.ankle_stiffness)
-    strike_gain = per_drop * geometry.drop(np.sin(alpha), np.cos(alpha))
-    restitution = np.cos(2 * alpha) ** 2
+class _Extended:
+    """The parameters of a walker on a slope, and functions of the trailing ankle's angle psi."""
 
-    # Functions of the ankle's angle over double stance.
+    def __init__(self, p: WalkerParameters, slope: float) -> None:
+        self.rise = Extended(slope)
+        self.mass, self.gravity, self.ankle_stiffness = p.mass, p.gravity, p.ankle_stiffness
+        self.leg_length, self.foot_length = p.leg_length, p.foot_length
+        self.alpha, self.max_plantarflexion = Extended(p.leg_angle), Extended(p.max_plantarflexion)
+        self.start = PI / 2 - self.alpha
+        self.toe_separation = 2 * p.leg_length * np.sin(self.alpha) - p.foot_length
+        self.per_energy = 2 / Extended(p.mass * p.leg_length**2)
+        self.per_drop = 2 * p.gravity / Extended(p.leg_length)
 
-    def leg_sine(psi: Any) -> Any:
-        return geometry.leg_sine(np.cos(psi), p.leg_length, p.foot_length, separation)
+    def leg_sine(self, psi: Any) -> Any:
+        return geometry.leg_sine(self, np.cos(psi))
 
-    def transmission(psi: Any) -> Any:
-        cosine = np.sqrt(1 - leg_sine(psi) ** 2)
-        return geometry.leg_per_ankle(np.sin(psi), cosine, p.foot_length, separation)
+    def transmission(self, psi: Any) -> Any:
+        cosine = np.sqrt(1 - self.leg_sine(psi) ** 2)
+        return geometry.leg_per_ankle(self, np.sin(psi), cosine)
 
-    def gain(psi: Any) -> Any:
+    def lean(self, psi: Any) -> tuple[Any, Any]:
+        """Sine and cosine of the leading leg's angle from the vertical."""
+        sine, up, along = self.leg_sine(psi), np.cos(self.rise), np.sin(self.rise)
+        cosine = np.sqrt(1 - sine**2)
+        return sine * up + cosine * along, cosine * up - sine * along
+
+    def work(self, psi: Any) -> Any:
+        """Work of the spring from heel strike to psi [J]."""
+        peak = geometry.spring_torque(self, self.start)
+        return geometry.torque_work(psi - self.start, peak, self.ankle_stiffness)
+
+    def gain(self, psi: Any) -> Any:
         """Squared rate at psi, unperturbed, less `apex` at heel strike."""
-        sine = leg_sine(psi)
-        work = geometry.torque_work(psi - start, peak_torque, p.ankle_stiffness)
-        return per_energy * work + per_drop * geometry.drop(sine, np.sqrt(1 - sine**2))
+        fall = geometry.drop(*self.lean(psi))
+        return self.per_energy * self.work(psi) + self.per_drop * fall
 
-    def hold(psi: Any, pulse: float) -> Any:
+    def hold(self, psi: Any, pulse: float) -> Any:
         """Leading-leg force with a pulse on since heel strike, if `apex` was zero there."""
-        sine = leg_sine(psi)
-        arm = geometry.unloading_arm(np.sin(psi), sine, p.leg_length, p.foot_length, separation)
-        torque = pulse + geometry.spring_torque(psi, p.ankle_stiffness, end)
-        squared_rate = gain(psi) + per_energy * pulse * (psi - start)
-        carried = geometry.pendulum_force(
-            np.sqrt(1 - sine**2), squared_rate, p.mass, p.gravity, p.leg_length
-        )
-        return carried - arm * torque
+        torque = pulse + geometry.spring_torque(self, psi)
+        squared_rate = self.gain(psi) + self.per_energy * pulse * (psi - self.start)
+        carried = geometry.pendulum_force(self, self.lean(psi)[1], squared_rate)
+        return carried - geometry.unloading_arm(self, np.sin(psi), self.leg_sine(psi)) * torque
 
-    grid = np.linspace(float(start), float(end), BOUND_POINTS)
-    weight = p.mass * p.gravity
+
+def make_model(p: WalkerParameters, slope: float = 0.0) -> Model:
+    """
+    Work out the constants of a walker on ground that rises by `slope` [rad].
+
+    A slope turns gravity against ground and linkage and changes nothing else. It is an extension
+    of the paper; samples of the walker are those of level ground.
+    """
+    body = _Extended(p, slope)
+    alpha, start, end, per_drop = body.alpha, body.start, body.max_plantarflexion, body.per_drop
+    rise = body.rise
+    strike_gain = per_drop * geometry.drop(np.sin(alpha - rise), np.cos(alpha - rise))
+    start_gain = per_drop * geometry.drop(np.sin(alpha + rise), np.cos(alpha + rise))
+    restitution = np.cos(2 * alpha) ** 2
+    after_strike = body.per_energy * body.work(end) * restitution / (1 - restitution)
     pulse = BOUNDED_PULSE * p.peak_torque
+    grid = np.linspace(float(start), float(end), BOUND_POINTS)
+    spare_force = BOUND_MARGIN * (p.mass * p.gravity)
 
     # Whole stances, at the nodes of a fixed quadrature.
-    rule = _gauss_legendre(PANEL_NODES)
+    rule, single_rule = _gauss_legendre(PANEL_NODES), _gauss_legendre(SINGLE_STANCE_NODES)
     half = 0.5 * (end - start)
     psi = start + half + half * rule[NODES]
-    double_stance = np.array([gain(psi), half * rule[WEIGHTS] * transmission(psi)])
-    single_rule = _gauss_legendre(SINGLE_STANCE_NODES)
-    toe_off_sine = leg_sine(end)
+    double_stance = np.array([body.gain(psi), half * rule[WEIGHTS] * body.transmission(psi)])
+    toe_off_sine = body.leg_sine(end)
     toe_off = np.arcsin(toe_off_sine)
     half = 0.5 * (alpha + toe_off)
-    theta = toe_off - half + half * single_rule[NODES]
-    single_stance = np.array(
-        [per_drop * geometry.drop(np.sin(theta), np.cos(theta)), half * single_rule[WEIGHTS]]
-    )
+    theta = toe_off - half + half * single_rule[NODES] + rise
+    fallen = per_drop * geometry.drop(np.sin(theta), np.cos(theta))
+    single_stance = np.array([fallen, half * single_rule[WEIGHTS]])
 
     # The display path of the swing leg (docs/model.md) starts with the posture and the rates at
     # toe-off, here per unit of progress through single stance.
-    lengths = (p.leg_length, p.foot_length, separation)
-    reach = geometry.trailing_reach(np.cos(end), p.leg_length, p.foot_length)
-    hip_per_ankle = geometry.trailing_leg_per_ankle(
-        end, toe_off_sine, transmission(end), reach, *lengths
-    )
-    ankle_slope = 2 * half / transmission(end)
+    turn, reach = body.transmission(end), geometry.trailing_reach(body, np.cos(end))
+    hip_per_ankle = geometry.trailing_leg_per_ankle(body, end, toe_off_sine, turn, reach)
     return _record(
         mass=p.mass,
         leg_length=p.leg_length,
         foot_length=p.foot_length,
-        separation=separation,
+        toe_separation=body.toe_separation,
         gravity=p.gravity,
-        stiffness=p.ankle_stiffness,
+        ankle_stiffness=p.ankle_stiffness,
         max_plantarflexion=end,
         double_stance_start=start,
-        strike_position=alpha,
-        toe_off_position=-toe_off,
-        swing_hip=geometry.trailing_leg_angle(end, toe_off_sine, *lengths),
-        swing_hip_slope=hip_per_ankle * ankle_slope,
-        swing_ankle_slope=ankle_slope,
-        per_energy=per_energy,
+        strike_position=alpha - rise,
+        toe_off_position=-toe_off - rise,
+        swing_hip=geometry.trailing_leg_angle(body, end, toe_off_sine),
+        swing_hip_slope=hip_per_ankle * (2 * half / turn),
+        swing_ankle_slope=2 * half / turn,
+        per_energy=body.per_energy,
         per_drop=per_drop,
         strike_gain=strike_gain,
+        start_gain=start_gain,
+        slope_sine=np.sin(rise),
+        slope_cosine=np.cos(rise),
         restitution=restitution,
-        start_apex=per_energy * push_off * restitution / (1 - restitution) - strike_gain,
-        toe_off_half_sine=0.5 * geometry.drop(toe_off_sine, np.cos(toe_off)),
-        strike_hold=geometry.pendulum_force(
-            np.cos(alpha), strike_gain, p.mass, p.gravity, p.leg_length
-        ),
+        start_apex=after_strike - strike_gain + (strike_gain - start_gain) / (1 - restitution),
+        toe_off_half_sine=0.5 * geometry.drop(body.lean(end)[0], np.cos(toe_off + rise)),
+        strike_hold=geometry.pendulum_force(body, np.cos(alpha - rise), strike_gain),
         rule=rule,
         whole_double_stance=double_stance,
         whole_double_stance_apex=_converged_apex(double_stance, rule),
         whole_single_stance=single_stance,
         whole_single_stance_apex=max(0.0, _converged_apex(single_stance, single_rule)),
-        least_gain=gain(grid).min() - BOUND_MARGIN * p.gravity / p.leg_length,
-        least_hold=hold(grid, 0.0).min() - BOUND_MARGIN * weight,
+        least_gain=body.gain(grid).min() - BOUND_MARGIN * p.gravity / p.leg_length,
+        least_hold=body.hold(grid, 0.0).min() - spare_force,
         bounded_pulse=pulse,
-        bounded_hold=hold(grid, pulse).min() - BOUND_MARGIN * weight,
+        bounded_hold=body.hold(grid, pulse).min() - spare_force,
     )
 
 
@@ -262,4 +271,4 @@ def start_apex(model: Any, speed: float | None) -> float:
         return float(model["start_apex"])
     if not 0.0 < speed < float("inf"):
         raise ValueError(f"initial_speed {speed} m/s is not a positive, finite number")
-    return float((speed / model["leg_length"]) ** 2 - model["strike_gain"])
+    return float((speed / model["leg_length"]) ** 2 - model["start_gain"])

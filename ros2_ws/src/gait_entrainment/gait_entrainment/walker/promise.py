@@ -1,15 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a walker knows of one ankle's perturbation: torque changes, promised so far."""
+"""What a walker knows about the torque of one ankle robot: its changes, promised so far."""
 
+import itertools
 import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from gait_entrainment.walker.model import Floats
-from gait_entrainment.walker.trajectory import Stamps
+from gait_entrainment.walker.model import Floats, Stamps
 
 # Before all time: the first entry, torque zero, so that every instant has an entry before it.
 EVER = -(2**62)
@@ -23,7 +23,6 @@ class PromisedTorque:
     """
 
     def __init__(self) -> None:
-        """Begin with nothing promised."""
         self.valid_until = 0
         self._changes = [EVER]
         self._torques = [0.0]
@@ -37,42 +36,39 @@ class PromisedTorque:
         reached: int,
     ) -> int:
         """
-        Append pieces, torques[i] from times[i] on, the last until `valid_until`.
+        Append pieces; arguments, result and errors as those of `Walker.extend_torque`.
 
-        What lies before `reached`, where the walker already is, comes too late and is left out;
-        returns how many nanoseconds of the promise that is. Raises ValueError where the pieces are
-        out of order, not finite, or contradict what was promised.
+        What lies before `reached`, where the walker already is, comes too late and is left out.
         """
-        borders = [int(t) for t in times]
-        if len(borders) != len(torques):
+        borders = [*(int(t) for t in times), valid_until]
+        if len(borders) - 1 != len(torques):
             raise ValueError(
-                f"{len(borders)} times for {len(torques)} torques; one each is needed"
+                f"{len(borders) - 1} times for {len(torques)} torques; one each is needed"
             )
-        ends = [*borders[1:], valid_until][: len(borders)]
-        if any(start >= end for start, end in zip(borders, ends, strict=True)):
-            raise ValueError(f"times {borders} up to {valid_until} ns are not increasing")
-        if borders and borders[0] < self.valid_until:
-            raise ValueError(
-                f"torque from {borders[0]} ns contradicts the promise up to {self.valid_until} ns"
-            )
+        if any(start >= end for start, end in itertools.pairwise(borders)):
+            raise ValueError(f"times {borders[:-1]} up to {valid_until} ns are not increasing")
         if not all(math.isfinite(torque) for torque in torques):
             raise ValueError(f"torques {list(torques)} are not all finite")
-        if valid_until < self.valid_until:
+        promised = self.valid_until
+        if valid_until < promised:
             raise ValueError(
-                f"valid_until {valid_until} ns is before the promise up to {self.valid_until} ns"
+                f"valid_until {valid_until} ns is before the promise up to {promised} ns"
             )
-        late = max(0, min(reached, valid_until) - self.valid_until)
-        if self._changes[-1] == self.valid_until and self.valid_until >= reached:
+        if borders[0] < promised:
+            raise ValueError(
+                f"torque from {borders[0]} ns contradicts the promise up to {promised} ns"
+            )
+        if self._changes[-1] == promised >= reached:
             # The zero past the old promise has not been walked through: it was provisional.
             self._pop()
-        if not borders or borders[0] > self.valid_until:
-            self._change(max(self.valid_until, reached), 0.0)
-        for start, end, torque in zip(borders, ends, torques, strict=True):
+        if borders[0] > promised:
+            self._change(max(promised, reached), 0.0)
+        for start, end, torque in zip(borders, borders[1:], torques, strict=False):
             if end > reached:
                 self._change(max(start, reached), float(torque))
         self._change(max(valid_until, reached), 0.0)
         self.valid_until = valid_until
-        return late
+        return max(0, min(reached, valid_until) - promised)
 
     def cut(self, at: int, reached: int) -> None:
         """Void the promise from `at` on, or from `reached` if that is later: torque zero."""

@@ -10,48 +10,29 @@ import numpy as np
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side, nanoseconds
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.robot import TorqueProfile
+from gait_entrainment.walker.model import Stamps
 from gait_entrainment.walker.sampling import Samples
 from gait_entrainment.walker.walker import Ending, Transition, Walker
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """What happened in one stretch of a run."""
+    """What happened in one stretch of a run: what was walked in one go."""
 
     transitions: list[Transition]  # gait events in it
-    sample_times: np.ndarray  # [ns since the start of the run], shape (n,), int64
-    samples: Samples | None  # at those instants; None where there are none
+    sample_times: Stamps  # [ns since the start of the run], (n,)
+    samples: Samples | None  # at those instants; None if there are none
 
 
 class WalkerRun:
     """
-    Walks one run and keeps account of what a node must report.
+    Walks one run and keeps the account that a node must report.
+
+    Heel strike 0, at time 0, is that of ``first_heel_strike``. There are ``sample_rate`` samples
+    per second; 0 samples at the gait events, None not at all.
 
     How a run is cut into stretches changes neither events nor samples: the grid of samples is
     fixed, and the walker's state is only ever computed from the last switching instant.
-
-    Parameters
-    ----------
-    parameters
-        The walker.
-    first_heel_strike
-        Leg of heel strike 0, at time 0.
-    sample_rate
-        Samples per second; 0 samples at the gait events, None not at all.
-
-    Attributes
-    ----------
-    reached
-        Instant up to which everything has been walked [ns since the start of the run].
-    events, samples
-        Gait events and samples so far.
-    late
-        Length of promised torque that came after its instant [ns], and so was not walked.
-    starved
-        Length of stretches walked without torque for want of a promise [ns].
-    ended
-        Whether the run is over; ``ending`` says how the walker ended it, if it did.
-
     """
 
     def __init__(
@@ -61,32 +42,28 @@ class WalkerRun:
         self._sampled = sample_rate is not None
         self._period = NANOSECONDS_PER_SECOND / sample_rate if sample_rate else None
         self._promised = 0
-        self.reached = 0
-        self.events = 0
-        self.samples = 0
-        self.late = 0
-        self.starved = 0
-        self.ended = False
+        self.reached = 0  # everything up to this instant has been walked [ns]
+        self.events = 0  # gait events so far
+        self.samples = 0  # samples so far
+        self.late = 0  # promised torque that came after its instant and was not walked [ns]
+        self.starved = 0  # walked without torque for want of a promise [ns]
+        self.ended = False  # whether the run is over
 
     @property
     def ending(self) -> Ending | None:
-        """How the walker ended the run by itself: a fall or a fly-off."""
+        """How the walker ended the run by itself, if it did: a fall or a fly-off."""
         return self._walker.ending
 
     @property
     def next_sample(self) -> int:
-        """Instant of the next sample of the grid [ns]; far away where there is no grid."""
+        """Instant of the next sample of the grid [ns]; far away if there is no grid."""
         return 2**62 if self._period is None else round(self.samples * self._period)
 
     def accept(self, profile: TorqueProfile) -> int:
         """
         Take a promise; return how much of it [ns] came too late to be walked.
 
-        Raises
-        ------
-        ProfileError
-            if it does not adjoin the one before, or breaks its contract in another way.
-
+        Raises ProfileError if it does not adjoin the one before, or is not as a profile must be.
         """
         if not profile.has_length:
             return 0
@@ -102,7 +79,7 @@ class WalkerRun:
         return late
 
     def stop(self, stamp: int) -> None:
-        """End all torque at an instant [ns], or now where that is over."""
+        """End all torque at an instant [ns], or now if that is over."""
         self._walker.cut_torque(max(stamp, self.reached))
 
     def advance(self, until: int, last: bool = False) -> Stretch:
@@ -113,19 +90,20 @@ class WalkerRun:
         ending = self._walker.ending
         self.reached = until if ending is None else min(nanoseconds(ending.time), until)
         self.ended = last or ending is not None
-        times = self._sample_times(transitions, self.reached)
+        times = np.array(self._sample_times(transitions), np.int64)
         self.events += len(transitions)
-        self.samples += len(times)
-        return Stretch(transitions, times, self._walker.sample(times) if len(times) else None)
+        self.samples += times.size
+        return Stretch(transitions, times, self._walker.sample(times) if times.size else None)
 
-    def _sample_times(self, transitions: list[Transition], until: int) -> np.ndarray:
-        """Return the instants of the samples that are due before ``until`` [ns]."""
+    def _sample_times(self, transitions: list[Transition]) -> list[int]:
+        """Return the instants [ns] of the samples that are due."""
         if not self._sampled:
-            return np.empty(0, np.int64)
+            return []
         if self._period is None:
-            return np.array([t.stamp for t in transitions], np.int64)
-        # Torque at ``until`` itself belongs to the next promise.
-        end = self.samples
-        while round(end * self._period) < until:
-            end += 1
-        return np.array([round(k * self._period) for k in range(self.samples, end)], np.int64)
+            return [transition.stamp for transition in transitions]
+        # Torque at ``reached`` itself belongs to the next promise.
+        times, number = [], self.samples
+        while (instant := round(number * self._period)) < self.reached:
+            times.append(instant)
+            number += 1
+        return times

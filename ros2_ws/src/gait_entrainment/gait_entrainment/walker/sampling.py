@@ -20,27 +20,21 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from gait_entrainment.walker import linkage
 from gait_entrainment.walker.compiled import compiled
-from gait_entrainment.walker.linkage import (
-    leg_per_ankle,
-    trailing_force,
-    trailing_leg_angle,
-    trailing_leg_per_ankle,
-    trailing_reach,
-)
 from gait_entrainment.walker.location import position_at
-from gait_entrainment.walker.model import Floats, Model
+from gait_entrainment.walker.model import Floats, Model, Stamps
 from gait_entrainment.walker.segment import (
-    DOUBLE_STANCE,
-    WORK_SHAPE,
+    WORK_SIZE,
     Log,
     Segment,
+    Stance,
     effective_torque,
     leading_force,
     leg_sine_at,
     squared_rate,
 )
-from gait_entrainment.walker.trajectory import Stamps
+from gait_entrainment.walker.trajectory import Torques
 from gait_entrainment.walker.transitions import NANO
 
 # Places in an array of joints: hip or ankle, plus the side.
@@ -57,28 +51,17 @@ class Samples:
     plantarflexion positive. Pairs are [left, right]; world x forward, z up.
     """
 
-    position: Floats
-    """(n, 4) joint angles [rad]."""
-    velocity: Floats
-    """(n, 4) joint velocities [rad/s]."""
-    effort: Floats
-    """(n, 4) joint torques [N m]: hips zero, ankles the effective plantarflexion torque."""
-    intrinsic_torque: Floats
-    """(n, 2) torque of the ankle spring [N m]: k (mu - psi) while that leg trails, else 0."""
-    delivered_torque: Floats
-    """(n, 2) torque that the ankle robot delivers [N m], whether it acts or not."""
-    effective_torque: Floats
-    """(n, 2) part of it that acts [N m]: ankle effort less intrinsic torque."""
-    ground_reaction: Floats
-    """(n, 2, 2) ground reaction on each leg, [left, right] x [x, z] [N]."""
-    force: Floats
-    """(n, 2) its magnitude: F_A of the trailing, F_B of the leading or stance leg [N]."""
-    double_stance: NDArray[np.bool_]
-    """(n,) whether both feet are on the ground."""
-    leading: NDArray[np.int64]
-    """(n,) side of the leading leg, in single stance the stance leg."""
-    unloaded: NDArray[np.bool_]
-    """(n,) whether a negative pulse keeps the trailing foot unloaded in double stance."""
+    position: Floats  # (n, 4) joint angles [rad]
+    velocity: Floats  # (n, 4) joint velocities [rad/s]
+    effort: Floats  # (n, 4) joint torques [N m]: hips zero, ankles intrinsic plus effective
+    intrinsic_torque: Floats  # (n, 2) of the ankle spring [N m]: k (mu - psi) if trailing, else 0
+    delivered_torque: Floats  # (n, 2) by the ankle robot [N m], whether it acts or not
+    effective_torque: Floats  # (n, 2) the part of it that acts [N m]
+    ground_reaction: Floats  # (n, 2, 2) on each leg, [left, right] x [x, z] [N]
+    force: Floats  # (n, 2) its magnitude: F_A of the trailing leg, F_B of the other one [N]
+    double_stance: NDArray[np.bool_]  # (n,) whether both feet are on the ground
+    leading: NDArray[np.int64]  # (n,) side of the leading leg, in single stance the stance leg
+    unloaded: NDArray[np.bool_]  # (n,) a negative pulse keeps the trailing foot unloaded
 
 
 # One sample: what the compiled functions fill in of Samples.
@@ -107,30 +90,23 @@ def samples_from(table: Any) -> Samples:
 
 
 @compiled
-def fill_samples(
-    model: Model,
-    log: Log,
-    times: Stamps,
-    changes: Stamps,
-    torques: Floats,
-    right: int,
-    table: Any,
-) -> None:
+def fill_samples(model: Model, log: Log, times: Stamps, robot: Torques, table: Any) -> None:
     """Fill in `table` (n,) of SAMPLE, zero before, with the walker at `times` [ns]."""
-    work = np.empty(WORK_SHAPE)
+    work = np.empty(WORK_SIZE)
     rows = np.searchsorted(log["after"], times)
-    left_changes = np.searchsorted(changes[:right], times)
-    right_changes = np.searchsorted(changes[right:], times)
+    right = robot.right
+    left_changes = np.searchsorted(robot.changes[:right], times)
+    right_changes = np.searchsorted(robot.changes[right:], times)
     for i in range(times.size):
         row = table[i]
-        row.delivered_torque[0] = torques[left_changes[i] - 1]
-        row.delivered_torque[1] = torques[right + right_changes[i] - 1]
+        row.delivered_torque[0] = robot.torques[left_changes[i] - 1]
+        row.delivered_torque[1] = robot.torques[right + right_changes[i] - 1]
         segment = log[rows[i] - 1]
         elapsed = (times[i] - segment.stamp) / NANO - segment.rest
         position = position_at(model, work, segment, elapsed)
-        row.double_stance = segment.stance == DOUBLE_STANCE
+        row.double_stance = segment.stance == Stance.DOUBLE
         row.leading = segment.leading
-        if segment.stance == DOUBLE_STANCE:
+        if segment.stance == Stance.DOUBLE:
             fill_double_stance(model, segment, position, row)
         else:
             fill_single_stance(model, segment, position, row)
@@ -158,29 +134,27 @@ def fill_double_stance(model: Model, segment: Segment, position: float, row: Any
     sine = leg_sine_at(model, segment.stance, position)
     cosine = math.sqrt(1.0 - sine * sine)
     sin_ankle = math.sin(position)
-    slope = leg_per_ankle(sin_ankle, cosine, model.foot_length, model.separation)
-    reach = trailing_reach(math.cos(position), model.leg_length, model.foot_length)
+    slope = linkage.leg_per_ankle(model, sin_ankle, cosine)
+    reach = linkage.trailing_reach(model, math.cos(position))
     rate = math.sqrt(max(0.0, squared_rate(model, segment, position)))
     velocity = rate / slope
     fill_leading_leg(model, segment, position, sine, -rate, row)
 
-    row.position[HIP + trailing] = trailing_leg_angle(
-        position, sine, model.leg_length, model.foot_length, model.separation
-    )
-    row.velocity[HIP + trailing] = velocity * trailing_leg_per_ankle(
-        position, sine, slope, reach, model.leg_length, model.foot_length, model.separation
-    )
+    hip_per_ankle = linkage.trailing_leg_per_ankle(model, position, sine, slope, reach)
+    row.position[HIP + trailing] = linkage.trailing_leg_angle(model, position, sine)
+    row.velocity[HIP + trailing] = velocity * hip_per_ankle
     row.position[ANKLE + trailing] = position - 0.5 * math.pi
     row.velocity[ANKLE + trailing] = velocity
 
     torque = max(0.0, effective_torque(segment, position))
-    intrinsic = model.stiffness * (model.max_plantarflexion - position)
+    intrinsic = linkage.spring_torque(model, position)
     row.intrinsic_torque[trailing] = intrinsic
     row.unloaded = segment.stiffness == 0.0
     row.effective_torque[trailing] = -intrinsic if row.unloaded else segment.perturbation
-    force = trailing_force(torque, sin_ankle, reach, model.leg_length, model.foot_length)
+    force = linkage.trailing_force(model, torque, sin_ankle, reach)
     row.force[trailing] = force
-    row.ground_reaction[trailing, 0] = force * (model.separation - model.leg_length * sine) / reach
+    ahead = model.toe_separation - model.leg_length * sine
+    row.ground_reaction[trailing, 0] = force * ahead / reach
     row.ground_reaction[trailing, 1] = force * model.leg_length * cosine / reach
 
 

@@ -19,16 +19,8 @@ from typing import Any, Final, Protocol
 
 import numpy as np
 
+from gait_entrainment.walker import linkage
 from gait_entrainment.walker.compiled import compiled
-from gait_entrainment.walker.linkage import (
-    ankle_cosine,
-    drop,
-    leg_per_ankle,
-    leg_sine,
-    pendulum_force,
-    torque_work,
-    unloading_arm,
-)
 from gait_entrainment.walker.model import (
     NODES,
     PANEL_NODES,
@@ -40,65 +32,48 @@ from gait_entrainment.walker.model import (
     Model,
 )
 
-# The compiled functions read plain integers; the enumerations name them for everyone else.
-DOUBLE_STANCE: Final = 0
-SINGLE_STANCE: Final = 1
-
 
 class Stance(IntEnum):
     """What the walker stands on: both feet, or one."""
 
-    DOUBLE = DOUBLE_STANCE
-    SINGLE = SINGLE_STANCE
+    DOUBLE = 0
+    SINGLE = 1
 
 
-HEEL_STRIKE: Final = 0
-TOE_OFF: Final = 1
-TORQUE_CHANGE: Final = 2
-UNLOADING: Final = 3
-FALL: Final = 4
-FLY_OFF: Final = 5
+class Switch(IntEnum):
+    """What ends a segment and begins the next one; the last two end the walk."""
+
+    HEEL_STRIKE = 0
+    TOE_OFF = 1
+    TORQUE_CHANGE = 2
+    UNLOADING = 3
+    FALL = 4
+    FLY_OFF = 5
 
 
 class Segment(Protocol):
     """A record of SEGMENT, which the compiled functions change in place."""
 
-    stamp: int
-    """Start: whole nanoseconds since the start of the run,"""
-    rest: float
-    """and what is left of it [s], at most half a nanosecond."""
-    after: int
-    """Torque changes later than this stamp are still to come."""
-    began: int
-    """The switch that began it."""
-    ends: int
-    """The switch that ends it if the perturbation stays as it is."""
+    stamp: int  # start, whole nanoseconds since the start of the run
+    rest: float  # and what is left of it [s], at most half a nanosecond
+    after: int  # torque changes later than this stamp are still to come
+    began: int  # the switch that began it
+    ends: int  # the switch that ends it if the perturbation stays as it is
     stance: int
-    leading: int
-    """Side of the leading leg, in single stance the stance leg."""
-    step: int
-    """Number of the step in progress."""
+    leading: int  # side of the leading leg, in single stance the stance leg
+    step: int  # number of the step in progress
     position: float
-    apex: float
-    """Squared rate at the apex without further torque [1/s^2] (see `model`)."""
-    perturbation: float
-    """Torque of the ankle robot on the trailing ankle [N m]."""
-    torque: float
-    """Effective ankle torque at the start [N m],"""
-    stiffness: float
-    """and by how much it falls off [N m/rad]."""
-    end: float
-    """Position of the end."""
-    duration: float
-    """Time to the end [s]."""
-    shortfall: float
-    """What lacks at a fall [J] or fly-off [N]."""
+    apex: float  # squared rate at the apex without further torque [1/s^2] (see `model`)
+    perturbation: float  # torque of the ankle robot on the trailing ankle [N m]
+    torque: float  # effective ankle torque at the start [N m]
+    stiffness: float  # and by how much it falls off [N m/rad]
+    end: float  # position of the end
+    duration: float  # time to the end [s]
+    shortfall: float  # what is missing at a fall [J] or fly-off [N]
 
 
 SEGMENT = np.dtype([(name, kind) for name, kind in Segment.__annotations__.items()])
-
-Log = Any
-"""An array of SEGMENT, the segments of a stretch in order."""
+Log = Any  # an array of SEGMENT, the segments of a stretch in order
 
 # Widest panel [rad]: keeps the Taylor series of `panel` to rounding.
 PANEL_WIDTH: Final = 1.6
@@ -114,9 +89,8 @@ SMOOTH_CHANGE: Final = 0.1
 # Longest a segment may take [s]: where a stall is approached along a tangent, it takes forever.
 LONGEST: Final = 1e6
 
-# Rows of the work space, one column for each node: from TIME on, what quadratures fill.
-TIME: Final = 0
-WORK_SHAPE: Final = (3, max(PANEL_NODES, SINGLE_STANCE_NODES))
+# Of the work space in which quadratures put the integrand at the nodes.
+WORK_SIZE: Final = max(PANEL_NODES, SINGLE_STANCE_NODES)
 
 
 @compiled
@@ -129,41 +103,50 @@ def effective_torque(segment: Segment, position: float) -> float:
 def gained_apex(model: Model, segment: Segment, position: float) -> float:
     """`apex` at a position of the segment: the start's, and the torque's work."""
     rotation = position - segment.position
-    work = torque_work(rotation, segment.torque, segment.stiffness)
+    work = linkage.torque_work(rotation, segment.torque, segment.stiffness)
     return segment.apex + model.per_energy * work
 
 
 @compiled
 def leg_sine_at(model: Model, stance: int, position: float) -> float:
     """sin(theta) of the leading leg."""
-    if stance == SINGLE_STANCE:
+    if stance == Stance.SINGLE:
         return -math.sin(position)
-    return leg_sine(math.cos(position), model.leg_length, model.foot_length, model.separation)
+    return linkage.leg_sine(model, math.cos(position))
+
+
+@compiled
+def leaned(model: Model, sine: float, cosine: float) -> tuple[float, float]:
+    """Sine and cosine of an angle from the vertical, from those off the ground's normal."""
+    up, along = model.slope_cosine, model.slope_sine
+    return sine * up + cosine * along, cosine * up - sine * along
+
+
+@compiled
+def lean_at(model: Model, stance: int, position: float) -> tuple[float, float]:
+    """Sine and cosine of the leading leg's angle from the vertical."""
+    sine = leg_sine_at(model, stance, position)
+    cosine = math.sqrt(1.0 - sine * sine)
+    if stance == Stance.SINGLE:
+        return sine, cosine
+    return leaned(model, sine, cosine)
 
 
 @compiled
 def squared_rate(model: Model, segment: Segment, position: float) -> float:
     """theta_dot^2 at a position of the segment, from energy; negative beyond a stall."""
-    sine = leg_sine_at(model, segment.stance, position)
-    fall = drop(sine, math.sqrt(1.0 - sine * sine))
+    fall = linkage.drop(*lean_at(model, segment.stance, position))
     return gained_apex(model, segment, position) + model.per_drop * fall
 
 
 @compiled
 def leading_force(model: Model, segment: Segment, position: float) -> float:
-    """Ground reaction F_B [N] of the leading leg, along the leg; negative where it would pull."""
-    sine = leg_sine_at(model, segment.stance, position)
-    force = pendulum_force(
-        math.sqrt(1.0 - sine * sine),
-        squared_rate(model, segment, position),
-        model.mass,
-        model.gravity,
-        model.leg_length,
-    )
-    if segment.stance == DOUBLE_STANCE:
-        arm = unloading_arm(
-            math.sin(position), sine, model.leg_length, model.foot_length, model.separation
-        )
+    """Ground reaction F_B [N] of the leading leg, along the leg; negative if it would pull."""
+    square = squared_rate(model, segment, position)
+    force = linkage.pendulum_force(model, lean_at(model, segment.stance, position)[1], square)
+    if segment.stance == Stance.DOUBLE:
+        sine = leg_sine_at(model, segment.stance, position)
+        arm = linkage.unloading_arm(model, math.sin(position), sine)
         force -= arm * effective_torque(segment, position)
     return force
 
@@ -176,27 +159,26 @@ def motion(model: Model, segment: Segment, position: float) -> tuple[float, floa
     In single stance the position, in double stance sin(theta): psi itself speeds up twentyfold.
     theta_ddot is half the derivative of theta_dot^2 by theta.
     """
-    if segment.stance == SINGLE_STANCE:
+    if segment.stance == Stance.SINGLE:
         rate = math.sqrt(max(0.0, squared_rate(model, segment, position)))
         return position, rate, 0.5 * model.per_drop * math.sin(position)
     cos_ankle = math.cos(position)
-    sine = leg_sine(cos_ankle, model.leg_length, model.foot_length, model.separation)
+    sine = linkage.leg_sine(model, cos_ankle)
     cosine = math.sqrt(1.0 - sine * sine)
     sin_ankle = math.sqrt(1.0 - cos_ankle * cos_ankle)
-    slope = leg_per_ankle(sin_ankle, cosine, model.foot_length, model.separation)
-    square = gained_apex(model, segment, position) + model.per_drop * drop(sine, cosine)
-    square = max(0.0, square)
+    slope = linkage.leg_per_ankle(model, sin_ankle, cosine)
+    square = max(0.0, squared_rate(model, segment, position))
     push = model.per_energy * effective_torque(segment, position) / slope
-    acceleration = 0.5 * (model.per_drop * sine - push)
+    acceleration = 0.5 * (model.per_drop * leaned(model, sine, cosine)[0] - push)
     return sine, -cosine * math.sqrt(square), cosine * acceleration - sine * square
 
 
 @compiled
 def position_of(model: Model, stance: int, coordinate: float) -> float:
     """Position where the coordinate of `motion` has this value."""
-    if stance == SINGLE_STANCE:
+    if stance == Stance.SINGLE:
         return coordinate
-    cosine = ankle_cosine(coordinate, model.leg_length, model.foot_length, model.separation)
+    cosine = linkage.ankle_cosine(model, coordinate)
     return math.acos(max(-1.0, min(1.0, cosine)))
 
 
@@ -210,7 +192,7 @@ def panel(
     The integrand is (d theta / d psi) / theta_dot. Its sines and cosines come from those of the
     middle and a short Taylor series, in a loop that runs in vector registers.
     """
-    nodes, time = model.rule[NODES], work[TIME]
+    nodes = model.rule[NODES]
     middle, half = 0.5 * (start + end), 0.5 * (end - start)
     sin_middle, cos_middle = math.sin(middle), math.cos(middle)
     rotation = middle - segment.position
@@ -219,12 +201,13 @@ def panel(
         s, c = short_sine(x), short_cosine(x)
         sin_ankle = sin_middle * c + cos_middle * s
         cos_ankle = cos_middle * c - sin_middle * s
-        sine = leg_sine(cos_ankle, model.leg_length, model.foot_length, model.separation)
+        sine = linkage.leg_sine(model, cos_ankle)
         cosine = math.sqrt(1.0 - sine * sine)
-        gain = torque_work(rotation + x, segment.torque, segment.stiffness)
-        square = segment.apex + model.per_energy * gain + model.per_drop * drop(sine, cosine)
-        slope = leg_per_ankle(sin_ankle, cosine, model.foot_length, model.separation)
-        time[i] = slope / math.sqrt(square)
+        gain = linkage.torque_work(rotation + x, segment.torque, segment.stiffness)
+        fall = linkage.drop(*leaned(model, sine, cosine))
+        square = segment.apex + model.per_energy * gain + model.per_drop * fall
+        slope = linkage.leg_per_ankle(model, sin_ankle, cosine)
+        work[i] = slope / math.sqrt(square)
     return weighed(model, work, half)
 
 
@@ -238,32 +221,33 @@ def stall_panel(
     In u the integrand is smooth. The squared rate is what it gains from the stall, where it is
     zero, back to psi; from the energy its last digits would be lost.
     """
-    time = work[TIME]
     middle, half = 0.5 * (start + end), 0.5 * (end - start)
     stall_torque = effective_torque(segment, segment.end)
-    stall_sine = leg_sine_at(model, DOUBLE_STANCE, segment.end)
+    stall_sine = leg_sine_at(model, Stance.DOUBLE, segment.end)
     stall_cosine = math.sqrt(1.0 - stall_sine * stall_sine)
     for i in range(PANEL_NODES):
         u = middle + half * model.rule[NODES, i]
         back = u * u
         position = segment.end - back
-        sine = leg_sine_at(model, DOUBLE_STANCE, position)
+        sine = leg_sine_at(model, Stance.DOUBLE, position)
         cosine = math.sqrt(1.0 - sine * sine)
         rise = 2.0 * math.sin(segment.end - 0.5 * back) * math.sin(0.5 * back)
-        rise *= model.foot_length / model.separation * (sine + stall_sine)
-        gain = torque_work(-back, stall_torque, segment.stiffness)
-        square = model.per_energy * gain + model.per_drop * rise / (cosine + stall_cosine)
-        slope = leg_per_ankle(math.sin(position), cosine, model.foot_length, model.separation)
-        time[i] = -2.0 * u * slope / math.sqrt(square)
+        ahead = model.per_drop * model.slope_sine * model.foot_length / model.toe_separation * rise
+        rise *= model.foot_length / model.toe_separation * (sine + stall_sine)
+        level = model.per_drop * rise / (cosine + stall_cosine)
+        gain = linkage.torque_work(-back, stall_torque, segment.stiffness)
+        square = model.per_energy * gain + model.slope_cosine * level + ahead
+        slope = linkage.leg_per_ankle(model, math.sin(position), cosine)
+        work[i] = -2.0 * u * slope / math.sqrt(square)
     return weighed(model, work, half)
 
 
 @compiled
 def weighed(model: Model, work: Floats, half: float) -> tuple[float, bool]:
     """Integral from the integrand at the nodes, and whether its last coefficients are small."""
-    rule, time = model.rule, work[TIME]
-    total = dot(rule[WEIGHTS], time)
-    tail = abs(dot(rule[TAILS], time)) + abs(dot(rule[TAILS + 1], time))
+    rule = model.rule
+    total = dot(rule[WEIGHTS], work)
+    tail = abs(dot(rule[TAILS], work)) + abs(dot(rule[TAILS + 1], work))
     return half * total, tail < 0.5 * TAIL_TOLERANCE * abs(total)
 
 
@@ -331,7 +315,7 @@ def double_stance_time(
     model: Model, work: Floats, segment: Segment, start: float, end: float
 ) -> float:
     """Time [s] from one position of double stance to a later one, in panels that converge."""
-    to_stall = segment.ends == FALL
+    to_stall = segment.ends == Switch.FALL
     widest = PANEL_WIDTH
     if to_stall:
         start = math.sqrt(max(0.0, segment.end - start))

@@ -18,19 +18,11 @@ import numpy as np
 
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment.walker.model import Floats, make_model, start_apex
+from gait_entrainment.walker.model import Floats, Stamps, make_model, start_apex
 from gait_entrainment.walker.promise import PromisedTorque
 from gait_entrainment.walker.sampling import SAMPLE, Samples, fill_samples, samples_from
-from gait_entrainment.walker.segment import (
-    FALL,
-    HEEL_STRIKE,
-    SEGMENT,
-    TOE_OFF,
-    Log,
-    Stance,
-    leg_sine_at,
-)
-from gait_entrainment.walker.trajectory import ENDED, SWITCHED, Stamps, advance, start_walking
+from gait_entrainment.walker.segment import SEGMENT, Log, Stance, Switch, leg_sine_at
+from gait_entrainment.walker.trajectory import ENDED, SWITCHED, Torques, advance, start_walking
 from gait_entrainment.walker.transitions import clock, seconds
 
 
@@ -59,21 +51,20 @@ class EndingKind(str, Enum):
 @dataclass(frozen=True)
 class Ending:
     """
-    Where and why the walk ended: the model's reported limit, not an error.
+    Where and why the walk ended: a limit of the model, not an error.
 
-    `side` is the leading leg, `angle` its lean theta [rad] (positive: mass behind the foot).
-    `missing` is, for a fall, the energy [J] that lacks to get over the rest of the phase; for a
-    fly-off, the force [N] with which the leg would have to pull at most in the rest of the phase.
-    Both take the perturbation as staying what it was.
+    What is missing is the energy [J] to get over the rest of the stance for a fall; for a fly-off
+    the force [N] with which the leg would have to pull at most in the rest of the stance. Both
+    hold if the perturbation stays as it was.
     """
 
     kind: EndingKind
     stance: Stance
-    side: Side
+    side: Side  # of the leading leg
     step: int
-    time: float
-    stamp: int
-    angle: float
+    time: float  # [s]
+    stamp: int  # [ns]
+    angle: float  # lean theta of the leading leg [rad], positive with the mass behind the foot
     missing: float
 
     @property
@@ -137,14 +128,13 @@ class Walker:
 
         torques[i] [N m] holds from times_ns[i] to the next, the last to `valid_until_ns`; before
         the first, and without any, the torque is zero. Returns how many nanoseconds of the promise
-        came too late, for a stretch that the walker has gone through with zero torque.
+        came too late: the walker has gone through them with zero torque.
 
-        Raises ValueError where the pieces are out of order, not finite, or contradict an earlier
+        Raises ValueError if the pieces are out of order, not finite, or contradict an earlier
         promise.
         """
-        return self._promises[side].extend(
-            times_ns, torques, int(valid_until_ns), self.time_reached
-        )
+        promise = self._promises[side]
+        return promise.extend(times_ns, torques, int(valid_until_ns), self.time_reached)
 
     def cut_torque(self, at_ns: int) -> None:
         """Stop: void both ankles' promises from `at_ns` on, but not before `time_reached`."""
@@ -164,46 +154,41 @@ class Walker:
             raise ValueError(f"the walker is at {self.time_reached} ns, past {until_ns} ns")
         self._forget()
         self._sampled_from = self.time_reached
-        perturbation = self._perturbation()
-        outcome = SWITCHED
+        robot, until, outcome = self._torques(), int(until_ns), SWITCHED
         while outcome == SWITCHED:
             if self._count == self._log.size:
                 self._log = np.concatenate([self._log, np.zeros_like(self._log)])
-            self._count, outcome = advance(
-                self._model, self._log, self._count, *perturbation, int(until_ns)
-            )
-        self.time_reached = int(until_ns)
+            self._count, outcome = advance(self._model, self._log, self._count, robot, until)
+        self.time_reached = until
         if outcome == ENDED:
             self.ending = self._describe_ending(self._log[self._count - 1])
             self.time_reached = self.ending.stamp
         fresh = self._log[self._announced : self._count]
         self._announced = self._count
-        return [_transition(row) for row in fresh if row["began"] in (HEEL_STRIKE, TOE_OFF)]
+        events = (Switch.HEEL_STRIKE, Switch.TOE_OFF)
+        return [_transition(row) for row in fresh if row["began"] in events]
 
     def sample(self, times_ns: Stamps) -> Samples:
         """
-        Sample the stretch that the last `advance` went through, both its ends included.
+        Sample what the last `advance` went through, both its ends included.
 
         `times_ns` (n,) are stamps [ns] in any order. Raises ValueError for one outside.
         """
         times = np.ascontiguousarray(times_ns, np.int64)
-        if (
-            times.size
-            and not self._sampled_from <= times.min() <= times.max() <= self.time_reached
-        ):
+        first, last = self._sampled_from, self.time_reached
+        if times.size and not first <= times.min() <= times.max() <= last:
             raise ValueError(
                 f"samples from {times.min()} to {times.max()} ns are not all within the last"
-                f" stretch, {self._sampled_from} to {self.time_reached} ns"
+                f" stretch, {first} to {last} ns"
             )
         table = np.zeros(times.size, SAMPLE)
-        fill_samples(self._model, self._log[: self._count], times, *self._perturbation(), table)
+        fill_samples(self._model, self._log[: self._count], times, self._torques(), table)
         return samples_from(table)
 
-    def _perturbation(self) -> tuple[Stamps, Floats, int]:
-        """Torque changes of both ankles, as `trajectory` wants them."""
+    def _torques(self) -> Torques:
         left, right = (promise.arrays() for promise in self._promises)
         changes, torques = (np.concatenate(pair) for pair in zip(left, right, strict=True))
-        return changes, torques, left[0].size
+        return Torques(changes, torques, left[0].size)
 
     def _forget(self) -> None:
         """Keep of the log and the torque only what the coming stretch and its samples need."""
@@ -220,7 +205,7 @@ class Walker:
         stamp, rest = clock(last["stamp"], last["rest"], last["duration"])
         sine = leg_sine_at(self._model, last["stance"], last["end"])
         return Ending(
-            kind=EndingKind.FALL if last["ends"] == FALL else EndingKind.FLY_OFF,
+            kind=EndingKind.FALL if last["ends"] == Switch.FALL else EndingKind.FLY_OFF,
             stance=Stance(last["stance"]),
             side=Side(last["leading"]),
             step=int(last["step"]),
@@ -233,7 +218,7 @@ class Walker:
 
 def _transition(segment: Any) -> Transition:
     """Event that began a segment. A heel strike closes the step before the one in progress."""
-    struck = segment["began"] == HEEL_STRIKE
+    struck = segment["began"] == Switch.HEEL_STRIKE
     leading, step = Side(segment["leading"]), int(segment["step"])
     return Transition(
         time=seconds(segment["stamp"], segment["rest"]),

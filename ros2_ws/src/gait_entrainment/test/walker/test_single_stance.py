@@ -15,7 +15,7 @@ from scipy.special import elliprf
 
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.walker.model import make_model
-from gait_entrainment.walker.segment import SEGMENT, WORK_SHAPE, short_cosine, short_sine
+from gait_entrainment.walker.segment import SEGMENT, WORK_SIZE, short_cosine, short_sine
 from gait_entrainment.walker.single_stance import carlson_rf, pendulum_time, turning_point
 from gait_entrainment.walker.transitions import look_ahead_single_stance, whole_time
 
@@ -68,7 +68,7 @@ def test_time_to_the_turning_point(apex):
 
 
 def test_whole_single_stance_is_the_pendulums_time_from_its_least_apex_on():
-    work = np.empty(WORK_SHAPE)
+    work = np.empty(WORK_SIZE)
     start, end = float(MODEL["toe_off_position"]), float(MODEL["strike_position"])
     least = float(MODEL["whole_single_stance_apex"])
     # The period-one gait, at 0.77 / s^2, must be on the quick side.
@@ -79,7 +79,7 @@ def test_whole_single_stance_is_the_pendulums_time_from_its_least_apex_on():
 
 
 def test_slow_single_stance_takes_the_closed_form():
-    work, segment = np.empty(WORK_SHAPE), np.zeros(1, SEGMENT)[0]
+    work, segment = np.empty(WORK_SIZE), np.zeros(1, SEGMENT)[0]
     apex = 0.01
     segment["stance"], segment["position"], segment["apex"] = 1, MODEL["toe_off_position"], apex
     look_ahead_single_stance(MODEL, segment, work)

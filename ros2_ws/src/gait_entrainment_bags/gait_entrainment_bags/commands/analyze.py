@@ -5,10 +5,12 @@
 
 import argparse
 import json
-import sys
 from pathlib import Path
 
 from gait_entrainment.commands.outcome_options import add_outcome_options
+from gait_entrainment.outcome import summary, timing_summary
+from gait_entrainment_bags.figures import draw_figures
+from gait_entrainment_bags.recorded_run import messages_line, read_run, recorded_outcome
 
 DESCRIPTION = "Analyze a bag anew, and hold the result against what was published live."
 EXAMPLES = """examples:
@@ -27,46 +29,29 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Analyze and print; 1 where the bag cannot be analyzed, 2 where there is none."""
-    # Imported here: other commands do without the readers.
-    from gait_entrainment.outcome import summary, timing_summary
-    from gait_entrainment_bags import BagError
-    from gait_entrainment_bags.recorded_run import messages_line, read_run, recorded_outcome
-
-    if not options.bag.exists():
-        print(f"entrain analyze: {options.bag}: no such file or folder", file=sys.stderr)
-        return 2
+    """Analyze and print."""
+    drawn = options.figures is not None
+    recorded = read_run(options.bag, torques=drawn, onset=options.onset)
     figures: list[Path] = []
-    try:
-        drawn = options.figures is not None
-        recorded = read_run(options.bag, torques=drawn, onset=options.onset)
-        if drawn:
-            from gait_entrainment_bags.figures import draw_figures
-
-            options.figures.mkdir(parents=True, exist_ok=True)
-            figures = draw_figures(recorded, options.figures)
-    except (BagError, OSError) as error:
-        print(f"entrain analyze: {error}", file=sys.stderr)
-        return 1
+    if drawn:
+        options.figures.mkdir(parents=True, exist_ok=True)
+        figures = draw_figures(recorded, options.figures)
+    differences = recorded.differences
     outcome = recorded_outcome(recorded, options.bag) | {
         "ended_early": recorded.ended_early or None,
-        "as_published_live": (None if recorded.differences is None else not recorded.differences),
-        "differences": list(recorded.differences or ()),
+        "as_published_live": None if differences is None else not differences,
+        "differences": list(differences or ()),
     }
     if options.json:
         print(json.dumps(outcome))
         return 0
     for line in (summary(outcome), *timing_summary(outcome["pulse_timing"])):
         print(line)
-    print(f"live analysis    {_comparison(recorded.differences)}")
+    comparison = "none was recorded" if differences is None else "the same to the last bit"
+    if differences:
+        comparison = f"differs: {'; '.join(differences)}"
+    print(f"live analysis    {comparison}")
     print(messages_line(recorded))
     for figure in figures:
         print(f"figure           {figure}")
     return 0
-
-
-def _comparison(differences: tuple[str, ...] | None) -> str:
-    """Say how the analysis compares with what the analyzer published during the run."""
-    if differences is None:
-        return "none was recorded"
-    return f"differs: {'; '.join(differences)}" if differences else "the same to the last bit"

@@ -5,13 +5,15 @@
 
 import argparse
 import json
-import sys
 from dataclasses import asdict
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import Any
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
+from gait_entrainment_bags.checks import Severity, check
+from gait_entrainment_bags.reader import info, require_bag
+from gait_entrainment_bags.recovery import recover
+from gait_entrainment_bags.tables import FORMATS, export
 
 DESCRIPTION = "Look into bags, check them, rescue them, make tables of them."
 EXAMPLES = """examples:
@@ -20,20 +22,30 @@ EXAMPLES = """examples:
   entrain bag recover bags/broken bags/rescued   after a crash
   entrain bag export bags/paper_example tables --format parquet
 """
-_INFO_EXAMPLES = """examples:
+_BAG = "folder or .mcap file"
+# What each action does, with examples.
+_INFO = """Say what is in a bag, from its index.
+
+examples:
   entrain bag info bags/paper_example
   entrain bag info recording_0.mcap --json
 """
-_CHECK_EXAMPLES = """examples:
+_CHECK = """Print one line for each rule that is broken, and which reader stumbles over it.
+
+examples:
   entrain bag check bags/paper_example
   entrain bag check bags/*/ --json               one JSON object per bag, one per line
 
-Exit code 1 where a rule is broken that makes a reader fail; warnings alone give 0.
+Exit code 1 if a rule is broken that makes a reader fail; warnings alone give 0.
 """
-_RECOVER_EXAMPLES = """examples:
+_RECOVER = """Write all that can be read into a new bag, and say what is missing.
+
+examples:
   entrain bag recover bags/broken bags/rescued   into a new bag; the old one is left as it is
 """
-_EXPORT_EXAMPLES = """examples:
+_EXPORT = """Write one table per topic, with units; needs pyarrow.
+
+examples:
   entrain bag export bags/paper_example tables
   entrain bag export bags/paper_example tables --format parquet --topics /gait/strides
 """
@@ -42,95 +54,35 @@ _EXPORT_EXAMPLES = """examples:
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     actions = parser.add_subparsers(required=True, metavar="ACTION")
-
-    info = _add_parser(
-        actions,
-        "info",
-        "what is in a bag",
-        "Say what is in a bag, from its index.",
-        _INFO_EXAMPLES,
-    )
-    _add_bag(info)
-    info.set_defaults(run=_guarded("info", _info))
-
-    check = _add_parser(
-        actions,
-        "check",
-        "rules of rosbag2 that a bag breaks",
-        "Print one line for each rule that is broken, and which reader stumbles over it.",
-        _CHECK_EXAMPLES,
-    )
-    check.add_argument("bags", type=Path, nargs="+", metavar="BAG", help="folders or .mcap files")
-    check.add_argument("--json", action="store_true", help="print one JSON object per bag")
-    check.set_defaults(run=_guarded("check", _check))
-
-    recover = _add_parser(
-        actions,
-        "recover",
-        "rescue what can be read of a broken bag",
-        "Write all that can be read into a new bag, and say what is missing.",
-        _RECOVER_EXAMPLES,
-    )
-    _add_bag(recover)
-    recover.add_argument("out", type=Path, metavar="OUT", help="folder to make")
-    recover.set_defaults(run=_guarded("recover", _recover))
-
-    export = _add_parser(
-        actions,
-        "export",
-        "a table per topic",
-        "Write one table per topic, with units; Parquet needs pyarrow.",
-        _EXPORT_EXAMPLES,
-    )
-    _add_bag(export)
-    export.add_argument("out", type=Path, metavar="OUT", help="folder to make")
-    export.add_argument("--format", choices=("csv", "parquet"), default="csv", help="default: csv")
-    export.add_argument("--topics", nargs="+", metavar="TOPIC", help="default: all with messages")
-    export.set_defaults(run=_guarded("export", _export))
-
-
-def _add_parser(
-    commands: Any, name: str, help_text: str, description: str, examples: str
-) -> argparse.ArgumentParser:
-    parser: argparse.ArgumentParser = commands.add_parser(
-        name,
-        help=help_text,
-        description=description,
-        epilog=examples,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    return parser
-
-
-def _add_bag(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("bag", type=Path, metavar="BAG", help="folder or .mcap file")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
-
-
-def _guarded(name: str, action: Any) -> Any:
-    """Return an action that answers what is wrong with one line; 2 for a path that is wrong."""
-
-    def run(options: argparse.Namespace) -> int:
-        # Imported here: other commands do without the readers.
-        from gait_entrainment_bags import BagError, BagExistsError
-
-        paths = options.bags if name == "check" else [options.bag]
-        for path in paths:
-            if not path.exists():
-                print(f"entrain bag {name}: {path}: no such file or folder", file=sys.stderr)
-                return 2
-        try:
-            return int(action(options))
-        except BagError as error:
-            print(f"entrain bag {name}: {error}", file=sys.stderr)
-            return 2 if isinstance(error, BagExistsError) else 1
-
-    return run
+    for name, run, purpose, text in (
+        ("info", _info, "what is in a bag", _INFO),
+        ("check", _check, "rules of rosbag2 that a bag breaks", _CHECK),
+        ("recover", _recover, "rescue what can be read of a broken bag", _RECOVER),
+        ("export", _export, "a table per topic", _EXPORT),
+    ):
+        description, _, examples = text.partition("\n\n")
+        action = actions.add_parser(
+            name,
+            help=purpose,
+            description=description,
+            epilog=examples,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        action.set_defaults(run=run, prog=action.prog)
+        if name == "check":
+            action.add_argument("bags", type=Path, nargs="+", metavar="BAG", help=_BAG)
+        else:
+            action.add_argument("bag", type=Path, metavar="BAG", help=_BAG)
+        if name in ("recover", "export"):
+            action.add_argument("out", type=Path, metavar="OUT", help="folder to make")
+        if name == "export":
+            action.add_argument("--format", choices=FORMATS, default="csv", help="default: csv")
+            default = "default: all with messages"
+            action.add_argument("--topics", nargs="+", metavar="TOPIC", help=default)
+        action.add_argument("--json", action="store_true", help="print one JSON object per bag")
 
 
 def _info(options: argparse.Namespace) -> int:
-    from gait_entrainment_bags import info
-
     found = info(options.bag)
     if options.json:
         topics = [
@@ -159,8 +111,8 @@ def _info(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> int:
-    from gait_entrainment_bags import Severity, check
-
+    for bag in options.bags:
+        require_bag(bag)
     broken = False
     for bag in options.bags:
         findings = check(bag)
@@ -179,13 +131,10 @@ def _check(options: argparse.Namespace) -> int:
 
 
 def _recover(options: argparse.Namespace) -> int:
-    from gait_entrainment_bags import recover
-
     recovery = recover(options.bag, options.out)
     count = sum(recovery.counts.values())
     if options.json:
-        told = asdict(recovery) | {"folder": str(options.out), "messages": count}
-        print(json.dumps(told))
+        print(json.dumps(asdict(recovery) | {"folder": str(options.out), "messages": count}))
         return 0
     print(f"{count} messages rescued into {options.out}")
     if recovery.last:
@@ -198,8 +147,6 @@ def _recover(options: argparse.Namespace) -> int:
 
 
 def _export(options: argparse.Namespace) -> int:
-    from gait_entrainment_bags import export
-
     files = export(options.bag, options.out, options.format, options.topics)
     if options.json:
         print(json.dumps({topic: str(file) for topic, file in files.items()}))

@@ -79,6 +79,7 @@ def test_recover_says_what_is_missing(capsys, bag, tmp_path):
 
 
 def test_export_makes_tables(capsys, bag, tmp_path):
+    pytest.importorskip("pyarrow")
     code, out, err = entrain(capsys, "export", bag, tmp_path / "tables")
     assert (code, err) == (0, "")
     assert out == f"/a: {tmp_path / 'tables' / 'a.csv'}\n"
@@ -100,6 +101,8 @@ def test_export_makes_tables(capsys, bag, tmp_path):
     ],
 )
 def test_what_cannot_be_done_is_one_line(capsys, bag, tmp_path, arguments, expected, words):
+    if arguments[0] == "export":
+        pytest.importorskip("pyarrow")
     (tmp_path / "empty.mcap").touch()
     paths = {
         "BAG": bag,

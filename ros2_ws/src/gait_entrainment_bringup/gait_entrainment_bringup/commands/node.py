@@ -9,17 +9,16 @@ import sys
 import tempfile
 from pathlib import Path
 
-from gait_entrainment.protocol import ProtocolError, write_protocol
-from gait_entrainment.robot import DeviceError, LimitError
-from gait_entrainment_bringup.commands.run import (
+from gait_entrainment.protocol import write_protocol
+from gait_entrainment_bringup.node_list import NODES, bag_folder, parameter_arguments
+from gait_entrainment_bringup.run_options import (
     add_run_options,
     check_driver,
     check_output,
     checked_protocol,
     chosen_parameters,
 )
-from gait_entrainment_bringup.node_list import NODES, bag_folder, parameter_arguments
-from gait_entrainment_nodes.messaging.domain import DomainError, wanted_domain
+from gait_entrainment_nodes.messaging.domain import wanted_domain
 from gait_entrainment_nodes.messaging.environment import PACKAGE, set_environment
 
 DESCRIPTION = (
@@ -43,22 +42,18 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the node to its end; 1 where it failed, 2 for a protocol or an option that is wrong."""
-    try:
-        domain = wanted_domain() or 0
-        protocol = checked_protocol(options)
-        bag = options.out or bag_folder(protocol)
-        if options.node == "perturbator":
-            check_driver(protocol.driver, options)
-        if options.node == "bag_recorder":
-            check_output(bag)
-    except (DomainError, ProtocolError, LimitError, DeviceError) as error:
-        print(f"entrain node: {error}", file=sys.stderr)
-        return 2 if isinstance(error, ProtocolError) else 1
+    """Run the node to its end and return its exit code."""
+    domain = wanted_domain() or 0
+    protocol = checked_protocol(options)
+    bag = options.out or bag_folder(protocol)
+    if options.node == "perturbator":
+        check_driver(protocol.driver, options)
+    if options.node == "bag_recorder":
+        check_output(bag)
     set_environment(domain)
-    parameters = chosen_parameters(protocol, bag, options)
-    parameters["experiment"]["protocol"] = write_protocol(protocol)
+    given = chosen_parameters(protocol, bag, options)
+    given["experiment"]["protocol"] = write_protocol(protocol)
     with tempfile.TemporaryDirectory(prefix="entrain_") as folder:
-        arguments = parameter_arguments({options.node: parameters[options.node]}, Path(folder))
+        arguments = parameter_arguments({options.node: given[options.node]}, Path(folder))
         sys.argv = [options.node, *arguments]
         return int(importlib.import_module(f"{PACKAGE}.nodes.{options.node}").main())

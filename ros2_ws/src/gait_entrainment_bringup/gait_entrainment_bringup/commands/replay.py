@@ -6,23 +6,18 @@
 import argparse
 import json
 import signal
-import sys
-import tempfile
 from pathlib import Path
 
+from gait_entrainment.errors import UsageError
 from gait_entrainment.outcome import outcome_of, summary
-from gait_entrainment.protocol import ProtocolError
-from gait_entrainment_bags import BagError, BagReader
+from gait_entrainment.settings import Setting
+from gait_entrainment_bags import BagReader
 from gait_entrainment_bags.recorded_run import RecordedRun, read_run
-from gait_entrainment_bringup.commands.run import check_output, is_utf8
-from gait_entrainment_bringup.node_list import (
-    MOVED,
-    REPLAY_NODES,
-    parameter_arguments,
-    replay_parameters,
-)
-from gait_entrainment_bringup.supervisor import Supervisor
-from gait_entrainment_nodes.messaging.domain import DomainError, claimed_domain
+from gait_entrainment_bringup.node_list import MOVED, parameter_arguments, replay_parameters
+from gait_entrainment_bringup.node_process import prepare
+from gait_entrainment_bringup.run_options import check_output, is_utf8
+from gait_entrainment_bringup.supervisor import supervised
+from gait_entrainment_nodes.messaging.domain import claimed_domain
 from gait_entrainment_nodes.messaging.environment import set_environment
 
 DESCRIPTION = "Play a bag to the gait analyzer, and compare with what was recorded live."
@@ -32,96 +27,62 @@ EXAMPLES = """examples:
   entrain replay bags/mine --out bags/again      records the replay, with the new results
   ROS_DOMAIN_ID=42 entrain replay bags/mine --rate 2
 
-Exit code 1 where the results differ from those that were recorded, or the replay failed.
+Exit code 1 if the results differ from those that were recorded, or the replay failed.
 """
-# After the replay has ended, the recorder has this long to close the bag [s].
-CLOSING_TIMEOUT = 15.0
 STOP_ORDER = ("bag_player", "gait_analyzer", "bag_recorder")
+_RATE = Setting("seconds of the bag per second", least=0, least_excluded=True)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     parser.add_argument("bag", type=Path, metavar="BAG", help="folder or .mcap file")
     parser.add_argument(
-        "--rate", type=float, help="seconds of the bag per second; default: as fast as it goes"
+        "--rate", metavar="FLOAT", help=f"{_RATE.meaning}; default: as fast as it goes"
     )
     parser.add_argument("--out", type=Path, help="record the replay into this folder")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Replay and print; 1 where it failed or the results differ, 2 for a wrong option."""
-    wrong = ""
+    """Replay and print; 1 if the results differ."""
     if not options.bag.exists():
-        wrong = f"{options.bag}: no such file or folder"
-    elif options.rate is not None and not 0 < options.rate < float("inf"):
-        wrong = f"--rate: {options.rate:g}; allowed: above 0; without it, as fast as it goes"
-    elif not is_utf8(options.bag):
-        wrong = f"{str(options.bag)!a}: allowed: a name in UTF-8"
-    elif options.out is not None:
-        try:
-            check_output(options.out)
-        except ProtocolError as error:
-            wrong = str(error)
-    if wrong:
-        print(f"entrain replay: {wrong}", file=sys.stderr)
-        return 2
+        raise UsageError(f"{options.bag}: no such file or folder")
+    if not is_utf8(options.bag):
+        raise UsageError(f"{str(options.bag)!a}: allowed: a name in UTF-8")
+    if options.rate is not None:
+        options.rate = _RATE.parse("--rate", options.rate)
+    if options.out is not None:
+        check_output(options.out)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    # Imported here, so that a mistake is answered without waiting for rclpy.
-    from gait_entrainment_bringup.replay_client import ReplayError
-
-    try:
-        recorded = read_run(options.bag, torques=False)
-        with claimed_domain() as domain:
-            results = replay(options, domain)
-        return report(options, recorded, results)
-    except KeyboardInterrupt:
-        print("entrain replay: interrupted", file=sys.stderr)
-    except (ReplayError, DomainError, BagError) as error:
-        print(f"entrain replay: {error}", file=sys.stderr)
-    return 1
+    recorded = read_run(options.bag, torques=False)
+    with claimed_domain() as domain:
+        results = replay(options, domain)
+    return report(options, recorded, results)
 
 
 def replay(options: argparse.Namespace, domain: int) -> dict[str, list[bytes]]:
     """Start the nodes, play the bag, stop the nodes; return the results by topic."""
-    from gait_entrainment_bringup.replay_client import ReplayClient, ReplayError
-
     environment = set_environment(domain)
-    recorder = options.out is not None
-    # The analyzer listens, and where the replay is recorded the recorder.
-    listeners = 2 if recorder else 1
-    namespace, parameters = replay_parameters(options.bag, listeners=listeners)
-    parameters["bag_player"] |= {"rate": options.rate or 0.0, "start_paused": True}
-    if recorder:
-        with BagReader(options.bag) as bag:
-            custom_data = bag.custom_data | {"replay_of": options.bag.name}
-        parameters["bag_recorder"] = {
-            "output": str(options.out.absolute()),
-            "publishers": ["gait_analyzer", "bag_player"],
-            "custom_data": json.dumps(custom_data),
-            "use_sim_time": True,
-        }
-    with tempfile.TemporaryDirectory(prefix="entrain_") as folder:
-        common = parameter_arguments(parameters, Path(folder))
-        remaps = [f"__ns:={namespace}", *(f"{name}:={name[1:]}" for name in MOVED)]
-        moved = [word for remap in remaps for word in ("-r", remap)] if namespace else []
-        supervisor = Supervisor(Path(folder), environment)
-        client: ReplayClient | None = None
-        try:
-            for node in (*REPLAY_NODES, *(["bag_recorder"] if recorder else [])):
-                supervisor.start(node, [*common, *moved])
-            client = ReplayClient(supervisor, namespace, listeners=listeners)
+    prepare()
+    # Not before: it loads ROS, while what the nodes need is loaded, too.
+    from gait_entrainment_bringup.replay_client import ReplayClient
+
+    namespace, given = replay_parameters(options.bag, out=options.out)
+    given["bag_player"] |= {"rate": options.rate or 0.0, "start_paused": True}
+    remaps = [f"__ns:={namespace}", *(f"{name}:={name[1:]}" for name in MOVED)]
+    moved = [word for remap in remaps for word in ("-r", remap)] if namespace else []
+    with supervised(environment, STOP_ORDER) as supervisor:
+        arguments = [*parameter_arguments(given, supervisor.folder), *moved]
+        for node in STOP_ORDER:
+            if node in given:
+                supervisor.start(node, arguments)
+        recorded = options.out is not None
+        client = ReplayClient(supervisor, namespace, recorded=recorded)
+        with client:
             client.play(quiet=options.json)
-            if recorder and supervisor.wait("bag_recorder", CLOSING_TIMEOUT) != 0:
-                raise ReplayError(
-                    "bag_recorder did not complete the record\n"
-                    + supervisor.last_lines("bag_recorder")
-                )
-            return client.results
-        finally:
-            if client is not None:
-                client.close()
-            supervisor.stop(STOP_ORDER)
+        if recorded:
+            supervisor.wait_for_record()
+    return client.results
 
 
 def report(

@@ -5,19 +5,18 @@
 
 import argparse
 import json
-import math
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict
 from importlib.metadata import entry_points
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.robot import DeviceError, Driver, LimitError, driver_names, find_driver
-from gait_entrainment.settings import Setting, settings_of
-
-if TYPE_CHECKING:
-    from gait_entrainment_drivers.conformance import Result
+from gait_entrainment.errors import EntrainmentError
+from gait_entrainment.robot import DeviceError, LimitError, driver_names, find_driver
+from gait_entrainment.settings import settings_of
+from gait_entrainment_drivers.conformance.bench import DriverBench, Result, Tolerances, run_check
+from gait_entrainment_drivers.conformance.checks import CHECKS
 
 # Where the check of a running node is found: it needs ROS, which this package does not know.
 NODE_CHECK = "gait_entrainment.node_check"
@@ -38,16 +37,18 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "list",
         help="every driver that is installed",
         description="List every driver that is installed, and its options: NAME=DEFAULT, unit,"
-        " meaning, range.",
+        " meaning, what is allowed.",
     )
-    listing.add_argument("--json", action="store_true", help="print one JSON object")
     listing.set_defaults(run=list_drivers)
     check = actions.add_parser(
         "check",
         help="the conformance kit",
         description="Hold a driver, or a node, against every promise of the contract"
-        " (docs/drivers.md). Exit code 1 where one is broken.",
+        " (docs/drivers.md). Exit code 1 if one is broken.",
     )
+    check.set_defaults(run=check_driver)
+    for action in (listing, check):
+        action.add_argument("--json", action="store_true", help="print one JSON object")
     checked = check.add_mutually_exclusive_group(required=True)
     checked.add_argument("driver", nargs="?", metavar="NAME[:OPTION=VALUE,...]", help="driver")
     checked.add_argument(
@@ -61,24 +62,17 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         default="right",
         help="ankle of the node's robot (default right)",
     )
-    check.add_argument(
-        "--real-time",
-        action="store_true",
-        help="the node holds a real robot: check it by the wall clock",
-    )
-    check.add_argument(
-        "--arm",
-        action="store_true",
-        help="let a real device deliver torque; nobody may wear it",
-    )
+    for name, meaning in (
+        ("--real-time", "the node holds a real robot: check it by the wall clock"),
+        ("--arm", "let a real device deliver torque; nobody may wear it"),
+    ):
+        check.add_argument(name, action="store_true", help=meaning)
     check.add_argument(
         "--torque",
         type=float,
         default=8.0,
         help="height of the pulses [N m], up to 30 (default 8)",
     )
-    check.add_argument("--json", action="store_true", help="print one JSON object")
-    check.set_defaults(run=check_driver)
 
 
 def list_drivers(options: argparse.Namespace) -> int:
@@ -92,59 +86,65 @@ def list_drivers(options: argparse.Namespace) -> int:
         for option in description["options"]:
             unit = f" {option['unit']}" if option["unit"] not in ("", "1") else ""
             default = f"{option['name']}={option['default']}{unit}"
-            print(f"    {default}  {option['meaning']}{_allowed(option)}")
+            print(f"    {default}  {option['meaning']}; {option['allowed']}")
     return 0
 
 
-def check_driver(options: argparse.Namespace) -> int:
-    """Run the conformance kit; 1 where a promise is broken or there is no such driver."""
-    from gait_entrainment_drivers.conformance import Tolerances, run_checks
-
-    if options.node is not None:
-        return check_node(options)
+def _description(name: str) -> dict[str, Any]:
     try:
-        driver = find_driver(options.driver)
-        refuse_unarmed(driver, options.arm)
-        if not 0 < options.torque <= 30:
-            raise LimitError(f"--torque: {options.torque:g} N m; allowed: above 0 and at most 30")
-        if not driver.simulated:
-            # Without this, a device that is not there would break every promise alike.
-            with driver.make(Side.RIGHT) as robot:
-                robot.configure()
-    except (LimitError, DeviceError) as error:
-        print(f"entrain driver: {error}", file=sys.stderr)
-        return 1
-    results = run_checks(driver, Tolerances(torque=options.torque))
-    return report(options.driver, results, options.json)
+        robot = find_driver(name).robot
+    except EntrainmentError as error:
+        return {"summary": str(error), "options": []}
+    text = (robot.__doc__ or "").strip()
+    if not text or text.startswith("See the module"):
+        text = (sys.modules[robot.__module__].__doc__ or "").strip()
+    options = [
+        {
+            "name": name,
+            "default": getattr(robot.Options, name),
+            "meaning": told.meaning,
+            "unit": told.unit,
+            "allowed": told.allowed,
+            **({"choices": told.choices} if told.choices else {}),
+            **({"range": (told.least, told.most)} if told.kind in (int, float) else {}),
+        }
+        for name, told in settings_of(robot.Options).items()
+    ]
+    return {"summary": text.partition("\n")[0], "options": options}
 
 
-def check_node(options: argparse.Namespace) -> int:
-    """Run the kit on a running node; the code that speaks ROS is in another package."""
-    from gait_entrainment_drivers.conformance import Tolerances
+def check_driver(options: argparse.Namespace) -> int:
+    """Run the conformance kit on a driver or a node; 1 if a promise is broken."""
+    if not 0 < options.torque <= 30:
+        raise LimitError(f"--torque: {options.torque:g} N m; allowed: above 0 and at most 30")
+    tolerances = Tolerances(torque=options.torque)
+    if options.node is not None:
+        return _report(options.node, _check_node(options, tolerances), options.json)
+    driver = find_driver(options.driver)
+    if not driver.simulated:
+        if not options.arm:
+            raise LimitError(
+                f"{driver.name} applies real torque: see that nobody wears it, then say --arm"
+            )
+        # Without this, a device that is not there would break every promise alike.
+        with driver.make(Side.RIGHT) as robot:
+            robot.configure()
+    bench = DriverBench(driver, tolerances)
+    results = (run_check(check, bench) for check in CHECKS)
+    return _report(options.driver, results, options.json)
 
+
+def _check_node(options: argparse.Namespace, tolerances: Tolerances) -> Iterator[Result]:
     found = list(entry_points(group=NODE_CHECK))
     if not found:
-        print(
-            "entrain driver: --node needs the package gait_entrainment_nodes, and ROS",
-            file=sys.stderr,
-        )
-        return 1
-    results = found[0].load()(
-        options.node,
-        Side[options.side.upper()],
-        Tolerances(torque=options.torque),
-        real_time=options.real_time,
-        arm=options.arm,
-    )
-    try:
-        return report(options.node, results, options.json)
-    except DeviceError as error:
-        print(f"entrain driver: {error}", file=sys.stderr)
-        return 1
+        raise DeviceError("--node needs the package gait_entrainment_nodes, and ROS")
+    check: Callable[..., Iterator[Result]] = found[0].load()
+    side, real_time = Side[options.side.upper()], options.real_time
+    return check(options.node, side, tolerances, real_time=real_time, arm=options.arm)
 
 
-def report(name: str, results: Iterable["Result"], as_json: bool) -> int:
-    """Print the results as they come; 1 where a promise is broken."""
+def _report(name: str, results: Iterable[Result], as_json: bool) -> int:
+    """Print the results as they come; return the exit code."""
     done = []
     for result in results:
         done.append(result)
@@ -158,52 +158,10 @@ def report(name: str, results: Iterable["Result"], as_json: bool) -> int:
             )
     broken = sum(not result.kept for result in done)
     if as_json:
-        content = {"checked": name, "broken": broken}
-        print(json.dumps(content | {"checks": [asdict(result) for result in done]}))
+        checks = [asdict(result) for result in done]
+        print(json.dumps({"checked": name, "broken": broken, "checks": checks}))
     else:
         print(f"{name}: {len(done) - broken} promises kept, {broken} broken")
     if broken:
         print(f"entrain driver: {name} breaks {broken} promises", file=sys.stderr)
     return 1 if broken else 0
-
-
-def refuse_unarmed(driver: Driver, armed: bool) -> None:
-    """Raise LimitError where a device outside simulation has not been armed by the user."""
-    if not (driver.simulated or armed):
-        raise LimitError(
-            f"{driver.name} applies real torque: see that nobody wears it, then say --arm"
-        )
-
-
-def _allowed(option: dict[str, Any]) -> str:
-    if "choices" in option:
-        return f"; one of {', '.join(option['choices'])}"
-    if "range" not in option:
-        return ""
-    low, high = option["range"]
-    return f"; {low:g} to {high:g}" if high < math.inf else f"; {low:g} or more"
-
-
-def _told(setting: Setting) -> dict[str, Any]:
-    told: dict[str, Any] = {"meaning": setting.meaning, "unit": setting.unit}
-    if setting.choices:
-        return told | {"choices": setting.choices}
-    return told if setting.kind is str else told | {"range": (setting.least, setting.most)}
-
-
-def _description(name: str) -> dict[str, Any]:
-    try:
-        robot = find_driver(name).robot
-    except (LimitError, DeviceError) as error:
-        return {"summary": str(error), "options": []}
-    module = sys.modules[robot.__module__]
-    text = (robot.__doc__ or "").strip()
-    if not text or text.startswith("See the module"):
-        text = (module.__doc__ or "").strip()
-    return {
-        "summary": text.splitlines()[0] if text else "",
-        "options": [
-            {"name": name, "default": getattr(robot.Options, name), **_told(told)}
-            for name, told in settings_of(robot.Options).items()
-        ],
-    }

@@ -5,16 +5,16 @@
 
 import argparse
 import sys
-import time
+from contextlib import suppress
 
-from gait_entrainment_nodes.messaging.domain import DomainError, wanted_domain
-
-# An answer may be lost while the node does not know yet who asks [s].
-ASK_AGAIN = 0.5
+from gait_entrainment_msgs.srv import Ready
+from gait_entrainment_nodes.messaging.client import Client
+from gait_entrainment_nodes.messaging.domain import wanted_domain
+from gait_entrainment_nodes.messaging.environment import set_environment
 
 DESCRIPTION = (
     "Ask ~/ready of nodes in ROS_DOMAIN_ID. Exit code 0 once each has answered that it is "
-    "ready, 1 where one has not: the reason is on standard error."
+    "ready, 1 if one has not: the reason is on standard error."
 )
 
 
@@ -27,51 +27,22 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Ask every node until all are ready; 1 after the timeout, 2 for what is no name of a node."""
-    # Imported here: other commands do without ROS.
-    import rclpy
-    from rclpy.exceptions import InvalidServiceNameException
-    from rclpy.experimental import EventsExecutor
-    from rclpy.node import Node
-    from rclpy.signals import SignalHandlerOptions
+    """Ask every node until all are ready; 1 if they are not in time."""
+    set_environment(wanted_domain() or 0)
+    with Client("entrain_ready") as client:
+        questions = {
+            name: client.ask(Ready, f"{name}/ready", accept=lambda answer: answer.ready)
+            for name in options.nodes
+        }
 
-    from gait_entrainment_msgs.srv import Ready
-    from gait_entrainment_nodes.messaging.environment import set_environment
+        def all_ready() -> bool:
+            answers = [question.answer() for question in questions.values()]  # each is asked
+            return all(answers)
 
-    try:
-        set_environment(wanted_domain() or 0)
-    except DomainError as error:
-        print(f"entrain ready: {error}", file=sys.stderr)
-        return 1
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    asker = Node("entrain_ready", enable_rosout=False, start_parameter_services=False)
-    executor = EventsExecutor()
-    executor.add_node(asker)
-    waiting = dict.fromkeys(options.nodes, "does not answer")
-    give_up = time.monotonic() + options.timeout
-    try:
-        clients = {name: asker.create_client(Ready, f"{name}/ready") for name in options.nodes}
-        while waiting and time.monotonic() < give_up:
-            asked = {n: clients[n].call_async(Ready.Request()) for n in waiting}
-            again = time.monotonic() + ASK_AGAIN
-            while time.monotonic() < min(again, give_up) and not all(
-                call.done() for call in asked.values()
-            ):
-                executor.spin_once(timeout_sec=0.05)
-            for name, call in asked.items():
-                if call.done() and call.result().ready:
-                    del waiting[name]
-                elif call.done():
-                    waiting[name] = f"waits for {call.result().waiting_for}"
-    except InvalidServiceNameException as error:
-        print(f"entrain ready: {' '.join(str(error).split())}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        pass  # who did not answer until now is named
-    finally:
-        executor.shutdown()
-        asker.destroy_node()
-        rclpy.try_shutdown()
-    for name, reason in waiting.items():
+        with suppress(KeyboardInterrupt):  # what is known by then is told
+            client.wait(all_ready, options.timeout)
+    waiting = {name: q.latest for name, q in questions.items() if not q.accepted}
+    for name, answer in waiting.items():
+        reason = f"waits for {answer.waiting_for}" if answer else "does not answer"
         print(f"entrain ready: {name} {reason}", file=sys.stderr)
     return 1 if waiting else 0

@@ -8,23 +8,25 @@ import json
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
 
+from std_srvs.srv import Trigger
+
+from gait_entrainment_nodes.messaging.client import Client, Question
 from gait_entrainment_nodes.messaging.domain import DomainError, domains_in_use, wanted_domain
 
-# For so long perturbators are looked for [s]; and, in a domain where a run should be, until one is
-# found and all have answered, but no longer than this.
+# How long to look for perturbators [s]; in a domain that a run has claimed, until one is found and
+# all have answered, but no longer than this.
 DISCOVERY = 2.0
 PATIENCE = 6.0
-# Where nodes are that were started one by one, without a run that claims a domain.
+# The domain of nodes that were started one by one, without a run that claims a domain.
 DEFAULT_DOMAIN = 0
-# A stop service is a perturbator's where the same node takes pulse trains.
+# A stop service belongs to a perturbator if the same node takes pulse trains.
 STOP, TRAIN = "/stop", "/deliver_pulse_train/_action/send_goal"
 
 DESCRIPTION = (
-    "Call the stop service of every perturbator: in ROS_DOMAIN_ID where it is set, else in "
-    "every domain in which a run of this machine goes on. Latched until it was cleaned up and "
-    "configured again. No substitute for a switch in the hand: see docs/safety.md."
+    "Call the stop service of every perturbator: in ROS_DOMAIN_ID if it is set, else in "
+    "every domain in which a run of this machine goes on. Latched until the perturbator is "
+    "cleaned up and configured again. No substitute for a switch in the hand: see docs/safety.md."
 )
 
 
@@ -34,7 +36,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Stop everything; 1 where nothing was found, or a stop was not confirmed."""
+    """Stop everything; 1 if nothing was found, or a stop was not confirmed."""
     try:
         wanted = wanted_domain()
     except DomainError as error:
@@ -63,40 +65,21 @@ def run(options: argparse.Namespace) -> int:
 
 
 def stop_all(domain: int, patience: float) -> dict[str, str | None]:
-    """Call every stop service in a domain; return the answers, None where no stop is confirmed."""
-    # Imported here: other commands do without ROS.
-    import rclpy
-    from rclpy.context import Context
-    from rclpy.experimental import EventsExecutor
-    from rclpy.node import Node
-    from std_srvs.srv import Trigger
+    """Call every stop service in a domain; return the answers, None if no stop is confirmed."""
+    calls: dict[str, Question] = {}
+    look_until = time.monotonic() + DISCOVERY
 
-    context = Context()
-    rclpy.init(args=[], context=context, domain_id=domain)
-    node = Node(f"entrain_stop_{domain}", context=context)
-    executor = EventsExecutor(context=context)
-    executor.add_node(node)
-    clients: dict[str, Any] = {}
-    calls: dict[str, Any] = {}
-    begun = time.monotonic()
-    try:
-        # Called as soon as it is seen: what is found first need not wait for what comes later.
-        while (waited := time.monotonic() - begun) < patience:
-            services = {name for name, _ in node.get_service_names_and_types()}
+    with Client(f"entrain_stop_{domain}", domain=domain) as client:
+
+        def all_answered() -> bool:
+            """Call each service as soon as it is seen; what comes later may take its time."""
+            services = {name for name, _ in client.node.get_service_names_and_types()}
             stops = {s.removesuffix(TRAIN) + STOP for s in services if s.endswith(TRAIN)}
-            for name in (stops & services) - set(clients):
-                clients[name] = node.create_client(Trigger, name)
-            for name, client in clients.items():
-                if name not in calls and client.service_is_ready():
-                    calls[name] = client.call_async(Trigger.Request())
-            executor.spin_once(timeout_sec=0.02)
-            answered = sum(call.done() for call in calls.values())
-            if waited > DISCOVERY and clients and answered == len(clients):
-                break
-        answered = {name: call.result() for name, call in calls.items() if call.done()}
-        confirmed = {name: answer.message for name, answer in answered.items() if answer.success}
-        return {f"domain {domain} {name}": confirmed.get(name) for name in clients}
-    finally:
-        executor.shutdown()
-        node.destroy_node()
-        rclpy.try_shutdown(context=context)
+            for name in (stops & services) - calls.keys():
+                calls[name] = client.ask(Trigger, name)
+            answers = [call.answer() for call in calls.values()]
+            return bool(answers) and all(answers) and time.monotonic() > look_until
+
+        client.wait(all_answered, patience)
+    answers = {f"domain {domain} {name}": call.accepted for name, call in calls.items()}
+    return {name: a.message if a and a.success else None for name, a in answers.items()}

@@ -8,20 +8,22 @@ import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from gait_entrainment.errors import EntrainmentError
+
 # Domains whose ports lie below those that Linux gives to other connections.
 DOMAINS = range(1, 102)
 # The largest domain that DDS can give ports to.
 LARGEST_DOMAIN = 232
-# Under which name claims are made.
+# The beginning of the names of all claims.
 CLAIMS = "gait_entrainment/domain"
 
 
-class DomainError(RuntimeError):
-    """No domain can be had; the message says what to do."""
+class DomainError(EntrainmentError):
+    """There is no domain to be had; the message says what to do."""
 
 
 def wanted_domain() -> int | None:
-    """Return ROS_DOMAIN_ID, None where it is unset; DomainError where it is no domain."""
+    """Return ROS_DOMAIN_ID, None if it is unset; DomainError if it is not a domain."""
     wanted = os.environ.get("ROS_DOMAIN_ID")
     if wanted is not None and not (wanted.isdigit() and int(wanted) <= LARGEST_DOMAIN):
         raise DomainError(
@@ -33,16 +35,16 @@ def wanted_domain() -> int | None:
 @contextmanager
 def claimed_domain() -> Iterator[int]:
     """
-    Claim a ROS domain for the time of a run: ROS_DOMAIN_ID where it is set, else a free one.
+    Claim a ROS domain for the time of a run: ROS_DOMAIN_ID if it is set, else a free one.
 
     A claim is the name of an abstract Unix socket. Such names belong to the network namespace,
-    and so do the ports by which runs would hear each other: it holds between users and between
-    containers that share a network, and ends with the process, however that ends.
+    and so do the ports by which runs would hear each other: a claim holds between users and
+    between containers that share a network, and ends with the process, however that ends.
 
     Raises
     ------
     DomainError
-        where ROS_DOMAIN_ID is not a domain, or is claimed by another run.
+        if ROS_DOMAIN_ID is not a domain, or another run has claimed it or all domains.
 
     """
     wanted = wanted_domain()
@@ -60,7 +62,7 @@ def claimed_domain() -> Iterator[int]:
 
 
 def domains_in_use() -> list[int]:
-    """Return the domains in which runs of this machine go on."""
+    """Return the domains that runs on this machine have claimed."""
     claimed = []
     for domain in range(LARGEST_DOMAIN + 1):
         claim = _claim(domain)
@@ -72,7 +74,7 @@ def domains_in_use() -> list[int]:
 
 
 def _claim(domain: int) -> socket.socket | None:
-    """Return the socket whose name is the claim on a domain, None where another holds it."""
+    """Return the socket whose name is the claim on a domain, None if another process holds it."""
     claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     try:
         claim.bind(f"\0{CLAIMS}/{domain}")

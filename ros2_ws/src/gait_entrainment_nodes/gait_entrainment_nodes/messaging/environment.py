@@ -12,22 +12,24 @@ PACKAGE = "gait_entrainment_nodes"
 
 
 def shared_file(package: str, name: str) -> Path:
-    """Return the path of a file that a package has installed for all."""
+    """Return the path of a file that a package has installed in its share folder."""
     return Path(get_package_share_directory(package)) / name
 
 
 def fastdds_profiles() -> Path:
-    """Return the profiles of Fast DDS that a run needs: the file says what for."""
+    """Return the Fast DDS profiles that a run needs; the file says what for."""
     return shared_file(PACKAGE, "config/fastdds.xml")
 
 
 def set_environment(domain: int) -> dict[str, str]:
     """
-    Put this process into a ROS domain, and return the environment for those that it starts.
+    Put this process into a ROS domain; return the environment for the processes it starts.
 
-    What the user has set stays: the range of discovery, the profiles of Fast DDS.
+    The range of discovery and the Fast DDS profiles stay as the user has set them.
     """
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     os.environ.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(fastdds_profiles()))
+    # No node has large matrices: threads for them take longer to start than they save.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ["ROS_DOMAIN_ID"] = str(domain)
     return dict(os.environ)

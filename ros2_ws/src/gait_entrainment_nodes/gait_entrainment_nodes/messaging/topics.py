@@ -21,6 +21,7 @@ from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
+from gait_entrainment import topic_names
 from gait_entrainment_msgs import msg
 
 # Nothing may be lost: a writer waits for its slowest reader instead of overwriting.
@@ -63,34 +64,31 @@ class Topic(NamedTuple):
     qos: QoSProfile = EVERY_MESSAGE
 
 
-JOINT_STATES = Topic("joint_states", JointState)
-GAIT_EVENTS = Topic("gait_events", msg.GaitEvent)
-ANKLE_TORQUE = Topic("ankle_torque", msg.AnkleTorque)
-GROUND_REACTION = (
-    Topic("ground_reaction/left", WrenchStamped),
-    Topic("ground_reaction/right", WrenchStamped),
-)
-WALKER_PROGRESS = Topic("walker_sim/progress", msg.Progress)
-WALKER_TIMING = Topic("walker_sim/timing", msg.WalkerTiming)
-CLOCK = Topic("/clock", ClockMessage)
+JOINT_STATES = Topic(topic_names.JOINT_STATES, JointState)
+GAIT_EVENTS = Topic(topic_names.GAIT_EVENTS, msg.GaitEvent)
+ANKLE_TORQUE = Topic(topic_names.ANKLE_TORQUE, msg.AnkleTorque)
+GROUND_REACTION = tuple(Topic(name, WrenchStamped) for name in topic_names.GROUND_REACTION)
+WALKER_PROGRESS = Topic(topic_names.WALKER_PROGRESS, msg.Progress)
+WALKER_TIMING = Topic(topic_names.WALKER_TIMING, msg.WalkerTiming)
+CLOCK = Topic(topic_names.CLOCK, ClockMessage)
 
-TORQUE_PROFILE = Topic("perturbation/torque_profile", msg.TorqueProfile)
-PULSES = Topic("perturbation/pulses", msg.TorquePulse)
-ROBOT_STATE = Topic("perturbator/state", msg.AnkleRobotState)
-TROUBLE = Topic("perturbator/trouble", msg.Trouble)
+TORQUE_PROFILE = Topic(topic_names.TORQUE_PROFILE, msg.TorqueProfile)
+PULSES = Topic(topic_names.PULSES, msg.TorquePulse)
+ROBOT_STATE = Topic(topic_names.ROBOT_STATE, msg.AnkleRobotState)
+TROUBLE = Topic(topic_names.TROUBLE, msg.Trouble)
 
-HORIZON = Topic("experiment/horizon", msg.Horizon)
-EXPERIMENT_STATE = Topic("experiment/state", msg.ExperimentState, LATEST_STATE)
+HORIZON = Topic(topic_names.HORIZON, msg.Horizon)
+EXPERIMENT_STATE = Topic(topic_names.EXPERIMENT_STATE, msg.ExperimentState, LATEST_STATE)
 
-STRIDES = Topic("gait/strides", msg.Stride)
-PULSE_PHASES = Topic("gait/pulse_phases", msg.PulsePhase)
-ENTRAINMENT = Topic("gait/entrainment", msg.Entrainment, LATEST_STATE)
+STRIDES = Topic(topic_names.STRIDES, msg.Stride)
+PULSE_PHASES = Topic(topic_names.PULSE_PHASES, msg.PulsePhase)
+ENTRAINMENT = Topic(topic_names.ENTRAINMENT, msg.Entrainment, LATEST_STATE)
 
-RECORDER_PROGRESS = Topic("bag_recorder/progress", msg.Progress)
-PUBLISHED_COUNTS = Topic("published_counts", msg.PublishedCounts)
-DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, DIAGNOSTICS_QOS)
+RECORDER_PROGRESS = Topic(topic_names.RECORDER_PROGRESS, msg.Progress)
+PUBLISHED_COUNTS = Topic(topic_names.PUBLISHED_COUNTS, msg.PublishedCounts)
+DIAGNOSTICS = Topic(topic_names.DIAGNOSTICS, DiagnosticArray, DIAGNOSTICS_QOS)
 
 # tf2 has one topic for a whole system; instances differ in their frames.
-TF = Topic("/tf", TFMessage, DRAWING)
-ROBOT_DESCRIPTION = Topic("robot_description", String, LATEST_DESCRIPTION)
-MARKERS = Topic("walker_display/markers", MarkerArray, DRAWING)
+TF = Topic(topic_names.TF, TFMessage, DRAWING)
+ROBOT_DESCRIPTION = Topic(topic_names.ROBOT_DESCRIPTION, String, LATEST_DESCRIPTION)
+MARKERS = Topic(topic_names.MARKERS, MarkerArray, DRAWING)

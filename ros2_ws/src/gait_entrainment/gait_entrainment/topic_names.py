@@ -1,0 +1,44 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+The names of the topics, without ROS: for the nodes that publish them and for readers of bags.
+
+Names are relative, so that a namespace or a remapping moves a whole experiment, except for those
+that others expect at the root. Types and quality of service are in
+``gait_entrainment_nodes/messaging/topics.py``.
+"""
+
+# Of the walker.
+JOINT_STATES = "joint_states"
+GAIT_EVENTS = "gait_events"
+ANKLE_TORQUE = "ankle_torque"
+GROUND_REACTION = ("ground_reaction/left", "ground_reaction/right")
+WALKER_PROGRESS = "walker_sim/progress"
+WALKER_TIMING = "walker_sim/timing"
+CLOCK = "/clock"
+
+# Of the robot.
+TORQUE_PROFILE = "perturbation/torque_profile"
+PULSES = "perturbation/pulses"
+ROBOT_STATE = "perturbator/state"
+TROUBLE = "perturbator/trouble"
+
+# Of the experiment.
+HORIZON = "experiment/horizon"
+EXPERIMENT_STATE = "experiment/state"
+
+# Of the analyzer.
+STRIDES = "gait/strides"
+PULSE_PHASES = "gait/pulse_phases"
+ENTRAINMENT = "gait/entrainment"
+
+# Of the recorder, and of every node.
+RECORDER_PROGRESS = "bag_recorder/progress"
+PUBLISHED_COUNTS = "published_counts"
+DIAGNOSTICS = "/diagnostics"
+
+# Of the display.
+TF = "/tf"
+ROBOT_DESCRIPTION = "robot_description"
+MARKERS = "walker_display/markers"

@@ -1,0 +1,64 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What came of a run: the outcome, how well time was kept, the figures, read from the bag."""
+
+import json
+from pathlib import Path
+
+from gait_entrainment.outcome import summary, timing_summary
+from gait_entrainment.topic_names import WALKER_TIMING
+from gait_entrainment_bags import BagReader
+from gait_entrainment_bags.figures import draw_figures
+from gait_entrainment_bags.recorded_run import messages_line, read_run, recorded_outcome
+
+
+def report(bag: Path, *, figures: bool, as_json: bool) -> None:
+    """Print the outcome of a recorded run, as lines or as one JSON object; draw its figures."""
+    recorded = read_run(bag, torques=figures)
+    outcome = recorded_outcome(recorded, bag) | walker_timing(bag)
+    drawn = draw_figures(recorded, bag) if figures else []
+    if as_json:
+        print(json.dumps(outcome))
+        return
+    for line in (summary(outcome), *timing_summary(outcome["pulse_timing"])):
+        print(line)
+    if (factor := outcome["real_time_factor"]) is not None:
+        print(f"speed            {factor:.0f} times real time")
+    if late := outcome.get("publish_lateness_ms"):
+        print(
+            f"real time        samples published {late['p50']:.2f} ms after they were due"
+            f" (median), {late['p99']:.2f} ms (99 %), {late['worst']:.2f} ms (worst)"
+        )
+    promises = outcome.get("promises", {})
+    if promises.get("late_stretches") or promises.get("starved_stretches"):
+        print(
+            f"promises         of perturbator: {promises['late_stretches']:.0f} late by"
+            f" {promises['late_ms']:.1f} ms in all, {promises['starved_stretches']:.0f} stretches"
+            f" of {promises['starved_ms']:.1f} ms walked without torque: not reproducible"
+        )
+    print(messages_line(recorded))
+    print(f"bag              {bag}")
+    for figure in drawn:
+        print(f"figure           {figure}")
+
+
+def walker_timing(bag: Path) -> dict[str, dict[str, float]]:
+    """Return what the outcome says of how well the walker kept time, from its last word on it."""
+    with BagReader(bag) as reader:
+        names = [name for name in reader.topics if name.endswith(f"/{WALKER_TIMING}")]
+        told = [message for _, message in reader.decoded(names)][-1:]
+    timing = {}
+    for walker in told:
+        if walker.samples:
+            timing["publish_lateness_ms"] = {
+                name: 1e3 * getattr(walker, f"publish_late_{name}")
+                for name in ("p50", "p99", "worst")
+            }
+        timing["promises"] = {
+            "late_stretches": walker.late_stretches,
+            "late_ms": 1e3 * walker.late,
+            "starved_stretches": walker.starved_stretches,
+            "starved_ms": 1e3 * walker.starved,
+        }
+    return timing

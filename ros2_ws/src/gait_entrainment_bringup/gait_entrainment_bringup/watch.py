@@ -1,0 +1,66 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""While a client waits: who has ended before its time, who has fallen silent."""
+
+import time
+from collections.abc import Collection
+
+from gait_entrainment_bringup.supervisor import Supervisor
+from gait_entrainment_msgs.srv import Ready
+from gait_entrainment_nodes.messaging.client import Client
+from gait_entrainment_nodes.messaging.errors import NodeError
+
+# How often a node is asked for a sign of life [s].
+ASKING_PERIOD = 0.5
+# A pause between two looks that is so long [s] says that this process was held up itself.
+HELD_UP = 1.0
+
+
+class Watch:
+    """
+    Called in each round of a client, ends its waiting by a NodeError that names the culprit.
+
+    Parameters
+    ----------
+    client
+        Asks for signs of life.
+    supervisor
+        Whose processes may not fail.
+    may_end
+        Nodes that end by themselves; others may not.
+    asked
+        Nodes that are asked for signs of life from their first answer on.
+    silence
+        How long they may owe one [s].
+
+    """
+
+    def __init__(
+        self,
+        client: Client,
+        supervisor: Supervisor,
+        *,
+        may_end: Collection[str],
+        asked: Collection[str],
+        silence: float,
+    ) -> None:
+        self._supervisor, self._may_end, self._silence = supervisor, may_end, silence
+        self._signs = {
+            node: client.ask(Ready, f"{node}/ready", accept=lambda _: False, period=ASKING_PERIOD)
+            for node in asked
+        }
+        self._looked_at = self._since = time.monotonic()
+
+    def __call__(self) -> None:
+        """Look once."""
+        ended = self._supervisor.check(self._may_end)
+        now = time.monotonic()
+        if now - self._looked_at > HELD_UP:
+            self._since = now
+        self._looked_at = now
+        for node, sign in self._signs.items():
+            sign.answer()
+            answered = sign.latest is not None and node not in ended
+            if answered and now - max(sign.answered_at, self._since) > self._silence:
+                raise NodeError(f"{node} has been silent for {self._silence:g} s", node)

@@ -1,0 +1,385 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+The promises of an ankle robot: each check is a function whose docstring is the promise.
+
+A check is given a bench with an unconfigured robot on it. It returns if the promise is kept, and
+raises BrokenPromiseError, with one sentence, if it is not.
+"""
+
+import itertools
+import math
+import time
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from dataclasses import fields, is_dataclass
+
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, nanoseconds
+from gait_entrainment.robot import DeviceError, DeviceLimits, MeasuredOnsets
+from gait_entrainment.robot.faults import EXPERIMENT_SILENT
+from gait_entrainment.robot.timing import lateness_ms, quantile
+from gait_entrainment_drivers.conformance.bench import (
+    POLL,
+    Bench,
+    BrokenPromiseError,
+    DriverBench,
+    require,
+)
+
+
+def construction(bench: DriverBench) -> None:
+    """Constructing a driver sets its side, options and capabilities."""
+    able = bench.robot.capabilities
+    require(able.peak_torque > 0, f"capabilities.peak_torque is {able.peak_torque:g} N m.")
+    require(able.torque_rate > 0, f"capabilities.torque_rate is {able.torque_rate:g} N m/s.")
+    rated = 0 <= able.state_rate < math.inf
+    require(rated, f"capabilities.state_rate is {able.state_rate:g} Hz.")
+    options = bench.driver.options
+    require(is_dataclass(options), "Options is no dataclass.")
+    for option in fields(options):
+        explained = "setting" in option.metadata
+        require(explained, f"The option {option.name} does not tell its meaning and unit.")
+
+
+def lifecycle(bench: Bench) -> None:
+    """Configure, activate, begin, deactivate and close work in this order, twice over."""
+    for _ in range(2):
+        bench.start()
+        bench.run(0.1)
+        bench.robot.deactivate()
+        bench.require_no_faults("Deactivating failed")
+        bench.robot.close()
+        bench.require_no_faults("Closing failed")
+
+
+def order(bench: Bench) -> None:
+    """Nothing is done before its turn: no train without configure, activate, arm and begin."""
+    for name, step in bench.steps():
+        bench.require_refused(bench.train(), f"before {name}")
+        if name in ("configure", "activate"):
+            _require_device_error(
+                lambda: bench.robot.promise(bench.now + bench.stretch),
+                f"Torque was promised before {name}.",
+            )
+        step()
+    bench.run(0.4)
+    bench.require_no_torque("without a train that was accepted")
+
+
+def idle(bench: Bench) -> None:
+    """Without a train there is no torque and no fault."""
+    bench.start()
+    bench.run(1.0)
+    bench.require_no_torque("without a train")
+    bench.require_no_faults("Without a train there was a fault")
+    bench.figures |= _distribution("answer_", [1e3 * s for s in bench.promise_times])
+
+
+def pulses(bench: Bench) -> None:
+    """Every pulse is delivered once, at its onset, with its impulse and sign."""
+    for sign in (1, -1):
+        bench.start()
+        train = bench.schedule(count=3, torque=sign * bench.height)
+        bench.run(bench.lead + 3 * train.period + 0.1)
+        bench.require_no_faults("Delivering pulses led to a fault")
+        bench.require_delivered(train)
+        asked, share = train.torque * train.duration, bench.tolerances.impulse
+        for onset in bench.onsets:
+            got = bench.impulse(onset - 1, onset + nanoseconds(train.period) - 1)
+            require(
+                abs(got - asked) <= share * abs(asked),
+                f"A pulse of {asked:.3g} N m s had {got:.3g} N m s; allowed: "
+                f"{100 * share:.0f} % off.",
+            )
+        bench.robot.close()
+
+
+def cuts(bench: Bench) -> None:
+    """What is delivered does not depend on how it is asked for."""
+    if not bench.simulated:  # the torque of a real device is never the same twice
+        return
+    delivered = []
+    for instants in ((1_500_000_000,), (100_000_000, 100_000_000, 250_000_001, 1_500_000_000)):
+        bench.renew()
+        bench.start()
+        begin = bench.now
+        bench.schedule(count=3)
+        for instant in instants:
+            bench.advance(begin + instant)
+        pieces = [(start - begin, torque) for start, _, torque in bench.pieces]
+        changes = itertools.pairwise([(0, 0.0), *pieces])
+        delivered.append([new for old, new in changes if new[1] != old[1]])
+        bench.robot.close()
+    require(
+        delivered[0] == delivered[1],
+        "The same seed and train gave another torque when asked in pieces.",
+    )
+
+
+def at_limits(bench: DriverBench) -> None:
+    """A pulse at the limits is delivered without a fault."""
+    bench.start()
+    # Full torque is for a device on its own: a real one gets what its user asked for.
+    top = bench.largest_torque if bench.simulated else bench.height
+    duration = min(bench.longest_pulse, bench.limits.impulse / top)
+    bench.schedule(torque=top, duration=duration, period=2 * duration)
+    bench.run(bench.lead + duration + 0.2)
+    bench.require_no_faults(f"{top:g} N m for {duration:g} s led to a fault")
+    reached = bench.largest_since(0)
+    within = 0.9 * top <= reached <= (1 + bench.limits.overshoot) * top
+    require(within, f"A pulse of {top:g} N m reached {reached:.3g} N m.")
+
+
+def beyond_limits(bench: Bench) -> None:
+    """A train beyond a limit, late, overlapping, or with NaN is refused and changes nothing."""
+    bench.start()
+    bench.run(0.1)
+    for changes in (
+        {"torque": math.nextafter(bench.largest_torque, math.inf)},
+        {"torque": -1.01 * bench.largest_torque},
+        {"torque": math.nan},
+        {"torque": math.inf},
+        {"duration": 0.0},
+        {"duration": math.nan},
+        {"duration": 1.01 * bench.longest_pulse, "period": 10 * bench.longest_pulse},
+        {"period": math.nan, "count": 2},
+        {"period": 0.15, "count": 2},
+        {"count": 0},
+        {"side": bench.side.other},
+        {"first_onset": bench.promised_until - 1},
+    ):
+        bench.require_refused(bench.train(**changes), f"with {changes}")
+    bench.run(bench.lead + 0.3)
+    bench.require_no_faults("Refusing a train led to a fault")
+    bench.require_no_torque("although every train was refused")
+
+
+def one_at_a_time(bench: Bench) -> None:
+    """A second train is refused while one is under way, and does not disturb it."""
+    bench.start()
+    train = bench.schedule(count=2)
+    bench.run(bench.lead + 0.05)
+    bench.require_refused(bench.train(), "while another one was under way")
+    bench.run(2 * train.period)
+    count = len(bench.onsets)
+    require(count == 2, f"{count} of 2 pulses came after a second train was refused.")
+
+
+def cancelling(bench: Bench) -> None:
+    """After cancelling in mid-pulse the torque is zero, and another train is delivered."""
+    bench.start()
+    since = bench.run_into_pulse()
+    bench.robot.cancel()
+    bench.run(0.5)
+    bench.require_zero(since, "cancelling")
+    bench.require_torque("cancelling")
+
+
+def stopping_in_mid_pulse(bench: Bench) -> None:
+    """After a stop from elsewhere in mid-pulse, torque is zero until closed and configured."""
+    bench.start()
+    since = bench.run_into_pulse()
+    bench.stop()
+    bench.run(0.5)
+    bench.require_zero(since, "the stop")
+    bench.require_refused(bench.train(), "after the stop")
+    bench.robot.deactivate()
+    _require_device_error(
+        bench.robot.activate, "Activating was possible while the stop was latched."
+    )
+    bench.robot.close()
+    bench.start()
+    bench.schedule()
+
+
+def stopping_in_every_state(bench: Bench) -> None:
+    """Stop and close raise in no state; after a stop the driver itself delivers no torque."""
+    for last in itertools.count():
+        bench.renew(guarded=False)
+        steps: list[tuple[str, Callable[[], object]]] = [
+            ("construction", lambda: None),
+            *bench.steps(),
+            ("schedule", bench.schedule),
+            ("deactivate", bench.robot.deactivate),
+        ]
+        if last == len(steps):
+            return
+        state = steps[last][0]
+        try:
+            for _, step in steps[: last + 1]:
+                step()
+            for _ in range(2):
+                _require_no_error(bench.stop, f"stop after {state}")
+            if state in ("begin", "schedule"):
+                bench.request(bench.train())
+                with suppress(DeviceError):
+                    bench.run(bench.lead + 0.1)
+                bench.require_no_torque(f"after {state} and stop: the driver delivered a train")
+        finally:
+            for call in (bench.robot.close, bench.robot.close, bench.stop):
+                _require_no_error(call, f"{call.__name__} after {state} and stop")
+
+
+def deactivating(bench: Bench) -> None:
+    """After deactivating in mid-pulse the torque is zero, and no train is taken any more."""
+    bench.start()
+    since = bench.run_into_pulse()
+    bench.robot.deactivate()
+    bench.require_refused(bench.train(), "after deactivating")
+    with suppress(DeviceError):  # nothing more need be promised
+        bench.run(0.5)
+    bench.require_zero(since, "deactivating")
+
+
+def reconnecting(bench: Bench) -> None:
+    """Closed in mid-pulse and configured again, it is at zero torque and delivers anew."""
+    bench.start()
+    bench.run_into_pulse()
+    bench.robot.close()
+    bench.start()
+    bench.run(0.4)
+    bench.require_zero(bench.begun, "reconnecting")
+    bench.require_torque("reconnecting")
+
+
+def new_run(bench: Bench) -> None:
+    """A new run forgets the train of the one before, and profiles adjoin from its start on."""
+    bench.start()
+    bench.schedule(first_onset=bench.now + nanoseconds(bench.lead + 0.2))
+    bench.run(0.1)
+    bench.begin()
+    bench.run(bench.lead + 0.5)
+    bench.require_no_torque("of the run before in the new one")
+
+
+def stale_commands(bench: DriverBench) -> None:
+    """If the experiment falls silent in mid-pulse, the torque goes to zero and latches."""
+    if bench.simulated:  # nobody to push; the run stands still with its experiment
+        return
+    bench.limits = DeviceLimits(silence=0.1)
+    bench.renew()
+    bench.limits = DeviceLimits()
+    bench.start()
+    since = bench.run_into_pulse()
+    while not bench.robot.faults and bench.now - since < NANOSECONDS_PER_SECOND:
+        time.sleep(POLL)
+        bench.look()
+    for _ in range(60):
+        time.sleep(POLL)
+        bench.look()
+    silent = EXPERIMENT_SILENT in bench.robot.faults
+    require(silent, "The experiment's silence was not noticed.")
+    bench.require_zero(since + nanoseconds(0.1), "the limit of the experiment's silence")
+
+
+def states(bench: Bench) -> None:
+    """States come at the promised rate, ascending, with finite torques, and without faults."""
+    bench.start()
+    bench.schedule(count=2)
+    bench.run(1.2)
+    shown = bench.wait_for(lambda: any(state.commanded for state in bench.states))
+    require(shown, "No state shows that the device was asked for the pulses.")
+    able, stamps = bench.robot.capabilities, [state.stamp for state in bench.states]
+    ascending = all(a < b for a, b in itertools.pairwise(stamps))
+    require(ascending, "The stamps of the states are not ascending.")
+    for state in bench.states:
+        torques = {"commanded": state.commanded}
+        if able.measures_torque:
+            torques["measured"] = state.measured
+        for name, torque in torques.items():
+            require(math.isfinite(torque), f"A state has a {name} torque of {torque} N m.")
+        names = ", ".join(fault.name for fault in state.faults)
+        require(not names, f"A state reports {names} while all is well.")
+    if able.state_rate:
+        bench.figures["state_rate_hz"] = rate = len(stamps) / 1.2
+        require(
+            rate >= bench.tolerances.state_rate * able.state_rate,
+            f"States came at {rate:.0f} Hz; promised: {able.state_rate:.0f} Hz.",
+        )
+
+
+def timing(bench: Bench) -> None:
+    """Pulses are measured when they were commanded, up to the device's lag."""
+    bench.start()
+    count = 20 if bench.simulated else 8
+    train = bench.schedule(count=count, duration=0.12, period=0.3)
+    bench.run(bench.lead + count * train.period + 0.3)
+    bench.wait_for(lambda: bench.states and bench.states[-1].stamp >= train.end(count - 1))
+    audit, onsets = MeasuredOnsets(), [train.onset(number) for number in range(count)]
+    audit.add_promise(onsets, train.onset(count))
+    for onset in onsets:
+        audit.add_pulse(onset, train.torque, train.duration)
+    for state in bench.states:
+        audit.add_state(state)
+    audit.finish()
+    late = lateness_ms(audit.timings, "measured")
+    missing = count - len(late)
+    require(not missing, f"{missing} of {count} pulses show in no state.")
+    bench.figures |= _distribution("", late)
+    early, most = -1e3 * bench.tolerances.early, 1e3 * bench.tolerances.onset
+    require(
+        early <= late[0] and late[-1] <= most,
+        f"Pulses were measured {late[0]:+.1f} to {late[-1]:+.1f} ms from their commanded onsets; "
+        f"allowed: {early:+.1f} to {most:+.1f} ms.",
+    )
+
+
+def prompt_calls(bench: DriverBench) -> None:
+    """Promise and read return at once, so that nobody waits for the device."""
+    bench.start()
+    bench.schedule(count=2)
+    bench.run(1.0)
+    calls = sorted(1e3 * seconds for seconds in [*bench.promise_times, *bench.read_times])
+    usual, slowest = quantile(calls, 0.9), calls[-1]
+    bench.figures |= {"p90_ms": usual, "worst_ms": slowest}
+    most, limit = 1e3 * bench.tolerances.call, 1e3 * bench.tolerances.slowest_call
+    require(
+        usual <= most and slowest <= limit,
+        f"Nine in ten calls took up to {usual:.1f} ms and the slowest {slowest:.0f} ms; "
+        f"promised: {most:.0f} and {limit:.0f} ms.",
+    )
+
+
+def _distribution(prefix: str, ms: Iterable[float]) -> dict[str, float]:
+    shares = {"median": 0.5, "p99": 0.99, "worst": 1.0}
+    return {f"{prefix}{name}_ms": quantile(sorted(ms), q) for name, q in shares.items()}
+
+
+def _require_device_error(call: Callable[[], object], otherwise: str) -> None:
+    with suppress(DeviceError):
+        call()
+        raise BrokenPromiseError(otherwise)
+
+
+def _require_no_error(call: Callable[[], object], what: str) -> None:
+    try:
+        call()
+    except BrokenPromiseError:
+        raise
+    except Exception as error:
+        raise BrokenPromiseError(
+            f"Calling {what} raised {type(error).__name__}: {error}."
+        ) from None
+
+
+# What every bench can be asked.
+COMMON = (
+    lifecycle,
+    order,
+    idle,
+    pulses,
+    cuts,
+    beyond_limits,
+    one_at_a_time,
+    cancelling,
+    stopping_in_mid_pulse,
+    stopping_in_every_state,
+    deactivating,
+    reconnecting,
+    new_run,
+    states,
+    timing,
+)
+# And what only a driver can be: topics show no capabilities, limits and durations of calls.
+CHECKS = (construction, *COMMON, at_limits, stale_commands, prompt_calls)

@@ -1,0 +1,21 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What can go wrong between processes, without ROS, for those that have not loaded it yet."""
+
+from gait_entrainment.errors import EntrainmentError
+
+
+class NodeError(EntrainmentError):
+    """A run has failed; the log of ``node`` may say more, if one is named."""
+
+    def __init__(self, message: str, node: str = "") -> None:
+        super().__init__(message)
+        self.node = node
+
+
+class SilenceError(NodeError):
+    """A node did not answer a service or an action, ``name``, in time [s]."""
+
+    def __init__(self, name: str, patience: float) -> None:
+        super().__init__(f"no answer from {name} within {patience:g} s", name.rpartition("/")[0])
