@@ -40,19 +40,8 @@ class Run:
     """
     One run, from when its participants are brought together to the walker's last word.
 
-    Parameters
-    ----------
-    number
-        Of the run.
-    publish
-        Publishes a message on a topic.
-    request
-        Asks the perturbator for pulses; ``take_answer`` is told what it answers.
-    recorded
-        Whether the walker waits for a recorder.
-    clock
-        Steady time [s].
-
+    ``request`` asks the perturbator for pulses; ``take_answer`` is then told its answer. If the
+    run is ``recorded``, the walker waits for the recorder. ``clock`` is steady time [s].
     """
 
     def __init__(

@@ -14,9 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
-from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from gait_entrainment.conventions import Side
@@ -37,8 +35,8 @@ from gait_entrainment_msgs.msg import Horizon, Trouble
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.stamps import header
 from gait_entrainment_nodes.nodes.loop import run_node
-from gait_entrainment_nodes.nodes.parameters import declare_settings
-from gait_entrainment_nodes.nodes.participant import Participant, ReadSettings
+from gait_entrainment_nodes.nodes.one_goal import OneGoalServer
+from gait_entrainment_nodes.nodes.participant import Participant
 from gait_entrainment_nodes.nodes.perturbator_run import Result, Run
 from gait_entrainment_nodes.nodes.rclpy_internals import TolerantLifecycleNode
 
@@ -57,40 +55,35 @@ class Settings:
         False, "arm a real robot on activation; else a person does it by the service ~/arm"
     )
 
+    def __post_init__(self) -> None:
+        find_driver(self.driver)  # raises DeviceError if there is none
+
 
 class Perturbator(Participant, TolerantLifecycleNode):
     """ROS side of the ankle robot: lifecycle, action, services."""
 
+    settings: Settings  # the next robot is configured with them
+    limits: DeviceLimits
     run: Run | None
 
     def __init__(self) -> None:
         super().__init__("perturbator")
-        declare_settings(self, Settings)
-        declare_settings(self, DeviceLimits, "limits.")
+        self.begin_participation(settings=Settings, limits=(DeviceLimits, "limits."))
         self._robot: GuardedRobot | None = None  # from configuring to cleaning up
         self._stop_latched = False  # the stop service was called while there was no robot
         self._reported: tuple[Fault, ...] = ()  # faults that have been published
-        self.begin_participation()
-
         for topic in (topics.TORQUE_PROFILE, topics.PULSES, topics.ROBOT_STATE, topics.TROUBLE):
             self.offer(topic)
         self._now = 0  # latest instant that is known to be over [ns since 1970]
         self._latest_run = 0  # number of the latest run
         self._look_at: float | None = None  # when to look after a real robot, steady time [s]
-        self._goal: Any = None
-        self._train_ended: Future | None = None  # its Result; None if no train is under way
 
         self.subscribe(topics.HORIZON, self._on_horizon)
         self.create_service(Trigger, "~/stop", self.on_stop_service)
         self.create_service(Trigger, "~/arm", self._on_arm_service)
-        self._server = ActionServer(
-            self,
-            DeliverPulseTrain,
-            "~/deliver_pulse_train",
-            execute_callback=self._execute,
-            goal_callback=self.guarded(self._on_goal),
-            handle_accepted_callback=self.guarded(self._on_accepted),
-            cancel_callback=self.guarded(self.on_cancel),
+        name = "~/deliver_pulse_train"
+        self._server = OneGoalServer(
+            self, DeliverPulseTrain, name, accept=self._on_goal, cancel=self.on_cancel
         )
 
     def why_fixed(self, name: str) -> str:
@@ -98,14 +91,10 @@ class Perturbator(Participant, TolerantLifecycleNode):
         del name
         return "the robot is configured; clean it up first" if self._robot is not None else ""
 
-    def take_parameters(self, read: ReadSettings) -> None:
-        """Take what the next robot is configured with."""
-        settings, limits = read(Settings), read(DeviceLimits, "limits.")
-        try:
-            find_driver(settings.driver)
-        except DeviceError as error:
-            raise ValueError(str(error)) from None
-        self.settings, self.limits, self.hardware_id = settings, limits, settings.driver
+    @property
+    def hardware_id(self) -> str:
+        """The driver, by its name and options."""
+        return self.settings.driver
 
     # Lifecycle
 
@@ -254,20 +243,19 @@ class Perturbator(Participant, TolerantLifecycleNode):
 
     # The action
 
-    def _on_goal(self, goal: DeliverPulseTrain.Goal) -> GoalResponse:
-        """Accept a train that the robot can deliver, one at a time."""
+    def _on_goal(self, goal: DeliverPulseTrain.Goal) -> bool:
+        """Schedule a train, if the robot can deliver it, and say whether it can."""
         try:
             self._schedule(goal)
         except (LimitError, DeviceError) as error:
             self._report(DiagnosticStatus.WARN, f"pulse train rejected: {error}")
-            return GoalResponse.REJECT
-        self._train_ended = Future()
-        return GoalResponse.ACCEPT
+            return False
+        return True
 
     def _schedule(self, goal: DeliverPulseTrain.Goal) -> None:
         if self._robot is None:
             raise DeviceError("the perturbator is not active")
-        if self._train_ended is not None:
+        if self._server.busy:
             raise LimitError("a pulse train is under way; allowed: one at a time")
         if self.run is None or goal.run != self.run.number:
             raise LimitError(f"run: {goal.run} is not under way")
@@ -284,49 +272,18 @@ class Perturbator(Participant, TolerantLifecycleNode):
             )
         )
 
-    def _on_accepted(self, goal: Any) -> None:
-        """
-        Execute a goal only once its train has ended.
-
-        The executor resumes a coroutine that waits over and over: for as long as pulses come it
-        would fight the torque loop for the interpreter.
-        """
-        assert self._train_ended is not None
-        self._goal = goal
-        self._train_ended.add_done_callback(lambda _: goal.execute())
-
-    def _on_train_ended(self, result: Result) -> None:
-        assert self._train_ended is not None
-        self._train_ended.set_result(result)
-
-    def _execute(self, goal: Any) -> Result:
-        """Say how a train ended."""
-        assert self._train_ended is not None
-        result: Result = self._train_ended.result()
-        if result.outcome == Result.CANCELLED:
-            goal.canceled()
-        elif result.outcome == Result.DELIVERED:
-            goal.succeed()
-        else:
-            goal.abort()
-        self._goal = self._train_ended = None
-        return result
-
-    def on_cancel(self, _: Any) -> CancelResponse:
+    def on_cancel(self) -> None:
         """Bring the torque to zero now: the next horizon may be long in coming."""
         self._end_torque("cancelled by the client", Result.CANCELLED)
-        return CancelResponse.ACCEPT
 
     # Promises
 
     def publish(self, topic: topics.Topic, message: Any) -> None:
         """Publish a message; the client that asked for pulses hears of each."""
         super().publish(topic, message)
-        if topic is topics.PULSES and self._goal is not None:
-            onset = message.header.stamp
-            self._goal.publish_feedback(
-                DeliverPulseTrain.Feedback(number=message.number, onset=onset)
-            )
+        if topic is topics.PULSES:
+            number, onset = message.number, message.header.stamp
+            self._server.publish_feedback(DeliverPulseTrain.Feedback(number=number, onset=onset))
 
     def _on_horizon(self, message: Horizon) -> None:
         """Answer a horizon with the torque up to it, promised."""
@@ -338,7 +295,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
             self._end_torque("another run began")
         self._now = nanoseconds_of(message.header.stamp)
         if new:
-            self.run = Run(message.run, self._now, robot, self.publish, self._on_train_ended)
+            self.run = Run(message.run, self._now, robot, self.publish, self._server.end)
             self._latest_run = message.run
         assert self.run is not None
         until = nanoseconds_of(message.until)
