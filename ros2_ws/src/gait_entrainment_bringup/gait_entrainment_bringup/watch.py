@@ -11,8 +11,6 @@ from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.client import Client
 from gait_entrainment_nodes.messaging.errors import NodeError
 
-# How often a node is asked for a sign of life [s].
-ASKING_PERIOD = 0.5
 # A pause between two looks that is so long [s] says that this process was held up itself.
 HELD_UP = 1.0
 
@@ -32,7 +30,7 @@ class Watch:
     asked
         Nodes that are asked for signs of life from their first answer on.
     silence
-        How long they may owe one [s].
+        How long they may owe one [s]; they are asked three times as often.
 
     """
 
@@ -47,7 +45,7 @@ class Watch:
     ) -> None:
         self._supervisor, self._may_end, self._silence = supervisor, may_end, silence
         self._signs = {
-            node: client.ask(Ready, f"{node}/ready", accept=lambda _: False, period=ASKING_PERIOD)
+            node: client.ask(Ready, f"{node}/ready", accept=lambda _: False, period=silence / 3)
             for node in asked
         }
         self._looked_at = self._since = time.monotonic()

@@ -161,7 +161,7 @@ def test_a_stop_needs_no_ros_and_answers_with_what_was_measured(bench):
     device.push(seconds=0.5, count=20)
     device.until(device.pushed)
     answer = next(a for name, a in stop_all().items() if name.startswith("bench_device/"))
-    assert answer.zero
+    assert answer.done
     assert "N m measured" in answer.message
     device.until(lambda: "stopped" in device.faults())
     assert device.commands()[-1][1] == 0.0
@@ -172,7 +172,7 @@ def test_a_stop_of_a_motor_that_goes_on_pushing_says_to_cut_the_power(bench):
     device.push(seconds=0.5, count=20)
     device.until(device.pushed)
     answer = next(a for name, a in stop_all().items() if name.startswith("bench_device/"))
-    assert not answer.zero
+    assert not answer.done
     assert "+12.00 N m measured: cut the power" in answer.message
     device.until(lambda: "torque_not_falling" in device.faults())
 

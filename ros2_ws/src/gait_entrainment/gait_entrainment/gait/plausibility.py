@@ -42,9 +42,11 @@ class GaitLimits:
         1.5, "strides without a heel strike after which nobody walks", "1", (1.05, 10.0)
     )
     baseline_spread: float = setting(
-        0.15, "largest standard deviation of the baseline's strides, as a share of their mean", "1",
+        0.15,
+        "largest standard deviation of the baseline's strides, as a share of their mean",
+        "1",
         (0.001, 1.0),
-    )  # fmt: skip
+    )
 
     def __post_init__(self) -> None:
         """Check every field."""

@@ -5,9 +5,10 @@
 Stopping without ROS: whoever drives an ankle robot listens on a socket of this machine.
 
 The socket has a name in Linux's abstract namespace. That needs no file, no home folder and no
-writable disk, vanishes with its process, and is found in /proc/net/unix. A request is one datagram;
-the answer says what the device measured. No discovery, no executor and no other reader is in the
-way. Everyone who can reach the machine's network namespace may stop a robot: stopping is safe.
+writable disk, vanishes with its process, and is found in /proc/net/unix. A request is one
+datagram; the answer says what the device measured. No discovery, no executor and no other reader
+is in the way. Everyone who can reach the machine's network namespace may stop a robot: stopping
+is safe.
 """
 
 import json
@@ -28,13 +29,13 @@ _LARGEST_ANSWER = 4096
 class StopAnswer:
     """What a robot answers to a stop."""
 
-    zero: bool  # its torque was measured near zero, or it lives in simulated time
-    message: str  # for people, in one line
+    done: bool  # what the answerer vouches for is done: see the message
+    message: str  # for people, in one line; says "zero" only of a torque that was measured
 
 
 class StopListener:
     """
-    The end of the channel at the robot: requests are polled, never waited for.
+    The end of the channel at the robot: requests are polled, or waited for by ``select``.
 
     Parameters
     ----------

@@ -7,7 +7,6 @@ import argparse
 import importlib
 import os
 import shutil
-import signal
 import threading
 from collections.abc import Sequence
 from functools import partial
@@ -15,8 +14,15 @@ from pathlib import Path
 
 from gait_entrainment.errors import UsageError
 from gait_entrainment.protocol import Protocol, write_protocol
+from gait_entrainment.robot import find_driver
 from gait_entrainment_bags import BagError, BagReader, UnreadableBagError, recover
-from gait_entrainment_bringup.node_list import NODES, STOP_ORDER, bag_folder, parameter_arguments
+from gait_entrainment_bringup.node_list import (
+    NODES,
+    PERSON_SILENCE,
+    STOP_ORDER,
+    bag_folder,
+    parameter_arguments,
+)
 from gait_entrainment_bringup.node_process import prepare
 from gait_entrainment_bringup.run_options import (
     add_run_options,
@@ -25,6 +31,7 @@ from gait_entrainment_bringup.run_options import (
     checked_protocol,
     chosen_parameters,
 )
+from gait_entrainment_bringup.signals import stop_on_signals
 from gait_entrainment_bringup.supervisor import supervised
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 from gait_entrainment_nodes.messaging.environment import set_environment
@@ -61,14 +68,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run one experiment and print its outcome."""
+    # Stopping from outside takes the same path as Ctrl-C: torque first, then the rest.
+    stop_on_signals()
     protocol = checked_protocol(options)
     check_driver(protocol.driver, options)
     if options.elsewhere and "ROS_DOMAIN_ID" not in os.environ:
         raise UsageError("--elsewhere: set ROS_DOMAIN_ID, to the same number on every host")
     bag = options.out or bag_folder(protocol)
     check_output(bag)
-    # Stopping from outside takes the same path as Ctrl-C: torque first, then the rest.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     with claimed_domain() as domain:
         run_experiment(protocol, bag, domain, options)
     return 0
@@ -90,7 +97,9 @@ def run_experiment(
             if node not in options.elsewhere:
                 supervisor.start(node, arguments)
         later = [REPORT] if options.no_figures else [REPORT, *DRAWING]
-        conduct(supervisor, protocol, partial(load, later), quiet=options.json)
+        real = not find_driver(protocol.driver).simulated
+        silence = {"silence": PERSON_SILENCE} if real else {}
+        conduct(supervisor, protocol, partial(load, later), quiet=options.json, **silence)
         supervisor.wait_for_record()
         # No torque is left and the record is closed: in which order the rest ends does not matter.
         supervisor.request_stop(NODES)
