@@ -5,8 +5,8 @@
 Compile the walker, so that nobody who uses it waits for that.
 
 The machine code is kept beside the sources (gait_entrainment.walker.compiled), that of earlier
-sources is removed. The default experiment takes every kernel but those that sample a walk, so one
-stride is sampled too.
+sources is removed. The default experiment takes every kernel but those that sample a walk or make
+a whole one, so both are done for a stride too.
 """
 
 import shutil
@@ -18,12 +18,15 @@ from gait_entrainment.conventions import Side, nanoseconds
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.walker import WalkerRun
 from gait_entrainment.walker.compiled import CACHE_FOLDER
+from gait_entrainment.walker.model import make_model
+from gait_entrainment_studies.walks import walk
 
 if __name__ == "__main__":
     if CACHE_FOLDER:
         for folder in Path(CACHE_FOLDER).parent.glob("walker-*"):
             if folder != Path(CACHE_FOLDER):
                 shutil.rmtree(folder, ignore_errors=True)
-    walk = WalkerRun(WalkerParameters(), first_heel_strike=Side.RIGHT, sample_rate=200.0)
-    walk.advance(nanoseconds(2.0))
+    run = WalkerRun(WalkerParameters(), first_heel_strike=Side.RIGHT, sample_rate=200.0)
+    run.advance(nanoseconds(2.0))
+    walk(make_model(WalkerParameters()), 2)
     sys.exit(main(["simulate", "--json"]))

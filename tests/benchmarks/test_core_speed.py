@@ -11,7 +11,9 @@ import pytest
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment.walker import Pulses, Walker, walk
+from gait_entrainment.walker import Walker
+from gait_entrainment.walker.model import make_model
+from gait_entrainment_studies.walks import Pulses, walk
 
 pytestmark = pytest.mark.benchmark
 
@@ -39,8 +41,8 @@ def pulses(period):
 
 def strides_per_second(train):
     # The first walk loads the compiled functions; making the model is part of every walk.
-    assert walk(WALKER, 2 * STRIDES, train).toe_offs.size == 2 * STRIDES
-    return STRIDES / fastest(lambda: walk(WALKER, 2 * STRIDES, train), 15)
+    assert walk(make_model(WALKER), 2 * STRIDES, train).toe_offs.size == 2 * STRIDES
+    return STRIDES / fastest(lambda: walk(make_model(WALKER), 2 * STRIDES, train), 15)
 
 
 def paper_strides_per_second():
@@ -56,7 +58,7 @@ def paper_strides_per_second():
 
 
 def test_strides():
-    stride = float(walk(WALKER, 2).heel_strikes[2])
+    stride = float(walk(make_model(WALKER), 2).heel_strikes[2])
     paper = paper_strides_per_second()
     # A little off the stride's own period the pulses pass through every phase, again and again.
     cases = {

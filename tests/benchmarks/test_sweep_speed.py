@@ -10,13 +10,9 @@ import paper_integrator
 import pytest
 
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment_studies.sweep import (
-    Axis,
-    SweepPlan,
-    available_cores,
-    exact_borders,
-    rows_by_processes,
-)
+from gait_entrainment_studies.sweep.engine import available_cores, rows_by_processes
+from gait_entrainment_studies.sweep.plan import Axis, SweepPlan
+from gait_entrainment_studies.sweep.row import exact_borders
 
 pytestmark = pytest.mark.benchmark
 

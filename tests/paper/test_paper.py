@@ -8,7 +8,7 @@ import json
 import pytest
 
 from gait_entrainment.commands import main
-from gait_entrainment_studies.paper import compare, explain
+from gait_entrainment_studies.paper.comparison import compare, explain
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +63,7 @@ def test_less_than_9_percent_is_tight_for_pulses_in_every_step_only(published):
 def test_command_draws_every_figure_and_prints_json(tmp_path, capsys, monkeypatch, published):
     # The numbers are made above; here only what the command does with them.
     rows = list(published.values())
-    monkeypatch.setattr("gait_entrainment_studies.paper.compare", lambda: rows)
+    monkeypatch.setattr("gait_entrainment_studies.commands.paper.compare", lambda: rows)
     assert main(["paper", "--json", "--out", str(tmp_path / "figures")]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert set(printed[0]) == {"name", "paper", "ours", "unit", "agrees", "note"}

@@ -39,6 +39,6 @@ def nanoseconds(seconds: float) -> int:
     return round(seconds * NANOSECONDS_PER_SECOND)
 
 
-def stamp_nanoseconds(stamp: Any) -> int:
-    """Return a ROS stamp or duration, decoded by whatever reader, as integer nanoseconds."""
+def nanoseconds_of(stamp: Any) -> int:
+    """Return a ROS time or duration, decoded by whatever reader, as integer nanoseconds."""
     return int(stamp.sec) * NANOSECONDS_PER_SECOND + int(stamp.nanosec)

@@ -14,6 +14,10 @@ SKY, YELLOW, PINK, BLACK = "#56B4E9", "#E69F00", "#CC79A7", "#000000"
 COLOURS = (BLUE, ORANGE, GREEN, PINK, YELLOW, SKY)
 DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 2)))
 
+# Where a legend goes that would hide something inside the axes.
+BESIDE = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
+BELOW = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.13)}
+
 
 def new_figure(
     *shape: int, size: tuple[float, float] = (7.2, 4.2), **options: Any
@@ -26,6 +30,23 @@ def new_figure(
     for one in np.atleast_1d(axes).ravel():
         one.spines[["top", "right"]].set_visible(False)
     return figure, axes
+
+
+def add_legend(axes: Any, **options: Any) -> None:
+    """Add a small legend without a frame that has each label once, if there are any labels."""
+    named: dict[str, Any] = {}
+    for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+        named.setdefault(label, handle)
+    if named:
+        style = {"frameon": False, "fontsize": 8, **options}
+        axes.legend(list(named.values()), list(named), **style)
+
+
+def mark_instant(axes: Any, place: float, name: str, height: float = 0.0, lift: float = 3) -> None:
+    """Draw a vertical line at an instant, with its name `lift` points above this height."""
+    axes.axvline(place, color=GREY, ls=":", lw=1.0)
+    offset = {"xytext": (3, lift), "textcoords": "offset points"}
+    axes.annotate(name, (place, height), color=GREY, fontsize=8, **offset)
 
 
 def save_figure(figure: Any, folder: Path, name: str) -> list[Path]:

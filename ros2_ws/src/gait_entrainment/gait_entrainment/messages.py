@@ -13,7 +13,7 @@ count from 1970, the core's instants from wherever the caller wants: each functi
 from dataclasses import fields
 from typing import Any
 
-from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
+from gait_entrainment.conventions import EventKind, Side, nanoseconds_of
 from gait_entrainment.errors import UsageError
 from gait_entrainment.gait import GaitEvent, PulsePhase, Stride
 from gait_entrainment.gait.analyzer import Result
@@ -22,11 +22,6 @@ from gait_entrainment.robot import RobotState, TorqueProfile
 
 class MessageError(UsageError):
     """A message that has no meaning, such as one about a third leg."""
-
-
-def nanoseconds_of(stamp: Any) -> int:
-    """Return a ROS time or duration as integer nanoseconds."""
-    return int(stamp.sec) * NANOSECONDS_PER_SECOND + int(stamp.nanosec)
 
 
 def event_of(message: Any, start: int = 0) -> GaitEvent:

@@ -90,26 +90,26 @@ class WalkerParameters:
         # cos(2 alpha) > 0: above pi/4 the collision would throw the mass back.
         least, most = math.asin(min(1.0, self.foot_length / (2 * self.leg_length))), math.pi / 4
         if least >= most:
+            longest = 2 * self.leg_length * math.sin(most)
             raise SettingError(
                 f"foot_length: {self.foot_length:g} m is too long for legs of"
-                f" {self.leg_length:g} m; allowed:"
-                f" below {2 * self.leg_length * math.sin(most):g} m"
+                f" {self.leg_length:g} m; allowed: below {longest:g} m"
             )
-        _check_angle(
-            "leg_angle",
-            self.leg_angle,
-            least,
-            most,
-            "2 L sin(alpha) > l, and the collision must not reverse the motion",
-        )
+        why = "2 L sin(alpha) > l, and the collision must not reverse the motion"
+        self._check_angle("leg_angle", least, most, why)
         cosine = geometry.ankle_cosine(self, -math.sin(self.leg_angle))
-        _check_angle(
-            "max_plantarflexion",
-            self.max_plantarflexion,
-            self.double_stance_start,
-            math.acos(max(-1.0, cosine)),
-            "above pi/2 - alpha, and toe-off before the next heel strike",
-        )
+        least, most = self.double_stance_start, math.acos(max(-1.0, cosine))
+        why = "above pi/2 - alpha, and toe-off before the next heel strike"
+        self._check_angle("max_plantarflexion", least, most, why)
+
+    def _check_angle(self, name: str, least: float, most: float, why: str) -> None:
+        angle = getattr(self, name)
+        if not least < angle < most:
+            off = max(least - angle, angle - most)
+            raise SettingError(
+                f"{name}: {angle:.6g} rad is out of range by {off:.3g} rad;"
+                f" allowed: {least:.6g} to {most:.6g} rad ({why})"
+            )
 
     def _check_gait(self) -> None:
         """Refuse a stiffness with which the period-one gait falls or flies off."""
@@ -120,22 +120,18 @@ class WalkerParameters:
                 f" {self.max_plantarflexion:.6g} rad leaves no gait: the walker falls below an"
                 f" ankle_stiffness of {least:.4g} N m/rad and flies off above {most:.4g} N m/rad"
             )
-        if least < self.ankle_stiffness < most:
-            return
+        reason = ""
         if self.ankle_stiffness <= least:
-            reason = (
-                "is not above the just-vault-over stiffness: the walker falls for want of"
-                f" {-self.least_kinetic_energy:.3g} J"
+            reason = "above the just-vault-over stiffness: the walker falls for want of"
+            reason += f" {-self.least_kinetic_energy:.3g} J"
+        elif self.ankle_stiffness >= most:
+            reason = "below the just-fly-off stiffness: the walker flies off, its leading leg"
+            reason += f" would have to pull with {-self.least_leading_force:.3g} N"
+        if reason:
+            raise SettingError(
+                f"ankle_stiffness: {self.ankle_stiffness:g} N m/rad is not {reason};"
+                f" allowed: {least:.6g} to {most:.6g} N m/rad"
             )
-        else:
-            reason = (
-                "is not below the just-fly-off stiffness: the walker flies off, its leading leg"
-                f" would have to pull with {-self.least_leading_force:.3g} N"
-            )
-        raise SettingError(
-            f"ankle_stiffness: {self.ankle_stiffness:g} N m/rad {reason};"
-            f" allowed: {least:.6g} to {most:.6g} N m/rad"
-        )
 
     # Linkage
 
@@ -194,8 +190,8 @@ class WalkerParameters:
         """Speed [m/s] of the mass just after a collision in the period-one gait."""
         return self.restitution * self.collision_speed
 
-    # Barrier and ground reaction of the period-one gait. Energies and forces are linear in the
-    # stiffness, so they are kept in two parts: one without it, and one per unit of it.
+    # Barrier and ground reaction of the period-one gait. Both are linear in the stiffness, so they
+    # are kept in two parts: one without it, and one per unit of it.
 
     def _work_per_stiffness(self, ankle: float) -> float:
         """Work of the spring from heel strike to psi, per unit of stiffness [rad^2]."""
@@ -293,12 +289,3 @@ class WalkerParameters:
     def least_leading_force(self) -> float:
         """Smallest ground reaction [N] of the leading leg over the period-one gait."""
         return -self._most_while_leading(lambda hold, lift: self.ankle_stiffness * lift - hold)
-
-
-def _check_angle(name: str, angle: float, least: float, most: float, why: str) -> None:
-    """Refuse an angle [rad] that is not between two others."""
-    if not least < angle < most:
-        raise SettingError(
-            f"{name}: {angle:.6g} rad is out of range by {max(least - angle, angle - most):.3g}"
-            f" rad; allowed: {least:.6g} to {most:.6g} rad ({why})"
-        )

@@ -13,7 +13,7 @@ from operator import attrgetter, itemgetter
 from pathlib import Path
 from typing import Any
 
-from gait_entrainment.conventions import stamp_nanoseconds
+from gait_entrainment.conventions import nanoseconds_of
 from gait_entrainment_bags.decoding import decoder_for
 from gait_entrainment_bags.definitions import BUILT_IN_TYPES, Field, fields_of, schema_parts
 from gait_entrainment_bags.errors import BagError, BagWriteError, UnreadableBagError, make_folder
@@ -203,7 +203,7 @@ def _column(field: Field, path: str, unit: str, value: _Getter) -> Column:
     """Lay out one column: of values, or of lists if the field is an array of any length."""
     is_list = field.length == -1
     if field.type in _INSTANTS:
-        step = (lambda stamps: [*map(stamp_nanoseconds, stamps)]) if is_list else stamp_nanoseconds
+        step = (lambda stamps: [*map(nanoseconds_of, stamps)]) if is_list else nanoseconds_of
         return Column(path, "ns", "int64", _then(value, step), is_list)
     kind = _kind(field.type) if field.type in BUILT_IN_TYPES else "string"
     if is_list and kind in ("string", "bool_"):

@@ -9,6 +9,7 @@ the bag.
 """
 
 import json
+from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -100,11 +101,10 @@ def parameters(
 
     """
     side = protocol.side.name.lower()
-    walker = {name: getattr(protocol.walker, name) for name in protocol.walker.__match_args__}
     measured = real_time and not find_driver(protocol.driver).simulated
     given: Parameters = {
         "walker_sim": {
-            **walker,
+            **asdict(protocol.walker),
             "first_heel_strike": side,
             "real_time": real_time,
             "acknowledged": not real_time,

@@ -9,8 +9,6 @@ Nothing here knows a walker: a person's signals take the same path as the model'
 
 from gait_entrainment.gait.analyzer import Analysis, GaitAnalyzer, PulseCounts, analyze
 from gait_entrainment.gait.drift import Drift, drift_of
-from gait_entrainment.gait.event import GaitEvent
-from gait_entrainment.gait.published import published_values
 from gait_entrainment.gait.pulse_phase import PulsePhase
-from gait_entrainment.gait.strides import EventCounts, Stride, StrideTracker
+from gait_entrainment.gait.strides import EventCounts, GaitEvent, Stride, StrideTracker
 from gait_entrainment.gait.verdict import Entrainment, Verdict, VerdictSettings

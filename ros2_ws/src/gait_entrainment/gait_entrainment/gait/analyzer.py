@@ -10,13 +10,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
-from gait_entrainment.gait.event import GaitEvent
-from gait_entrainment.gait.pulse_phase import (
-    LagFollower,
-    PulsePhase,
-    depends_on_next_toe_off,
-)
-from gait_entrainment.gait.strides import EventCounts, Stride, StrideTracker
+from gait_entrainment.gait.pulse_phase import LagFollower, PulsePhase, depends_on_next_toe_off
+from gait_entrainment.gait.strides import EventCounts, GaitEvent, Stride, StrideTracker
 from gait_entrainment.gait.verdict import Entrainment, EntrainmentTest, VerdictSettings
 
 Result = Stride | PulsePhase | Entrainment

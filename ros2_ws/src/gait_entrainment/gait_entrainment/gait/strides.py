@@ -1,17 +1,38 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Strides of one leg, from gait events that may be missing, doubled or out of order."""
+"""Gait events and the strides of one leg; events may be missing, doubled or out of order."""
 
 import math
 from dataclasses import dataclass
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
-from gait_entrainment.gait.event import GaitEvent
 
 # How many places of the gait are remembered, four strides: enough to tell an event that comes
 # twice from one that comes late, and a bound on memory if a leg's strikes stop coming.
 REMEMBERED_PLACES = 16
+
+
+@dataclass(frozen=True, slots=True)
+class GaitEvent:
+    """
+    A heel strike or a toe-off.
+
+    Step numbers identify events, whatever order they arrive in: heel strike n closes step n, and
+    the toe-off of step n is the one that begins its swing, between heel strikes n - 1 and n. Both
+    are of the leg that swings. A run starts with heel strike 0. A source that cannot number its
+    steps in this way is out of scope: without numbers a missing event looks like a long step.
+    """
+
+    stamp: int  # instant of the event [ns since the start of the run]
+    kind: EventKind
+    side: Side  # the leg that strikes or leaves the ground
+    step: int
+
+    @property
+    def place(self) -> int:
+        """Place in the order of a gait: 0 for heel strike 0, 1 for toe-off 1, 2 for strike 1."""
+        return 2 * self.step - (1 if self.kind == EventKind.TOE_OFF else 0)
 
 
 @dataclass(frozen=True, slots=True)

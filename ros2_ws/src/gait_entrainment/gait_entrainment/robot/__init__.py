@@ -8,7 +8,6 @@ from gait_entrainment.robot.drivers import Driver, driver_names, find_driver
 from gait_entrainment.robot.faults import DeviceError, Fault, LimitError
 from gait_entrainment.robot.guard import GuardedRobot
 from gait_entrainment.robot.limits import DeviceLimits
-from gait_entrainment.robot.measured_onsets import MeasuredOnsets
 from gait_entrainment.robot.profile import ProfileError, TorqueProfile
 from gait_entrainment.robot.pulse_train import PulseTrain
-from gait_entrainment.robot.timing import PulseTiming, measured_onset
+from gait_entrainment.robot.timing import MeasuredOnsets, PulseTiming, measured_onset

@@ -9,7 +9,6 @@ protocol, on the command line, as a parameter of the perturbator. Drivers of oth
 found under the entry point ``gait_entrainment.drivers``.
 """
 
-import importlib
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
@@ -66,23 +65,14 @@ def find_driver(text: str) -> Driver:
         known = ", ".join(driver_names())
         raise LimitError(f"driver: {name!r} is unknown; allowed: {known}")
     try:
-        robot = _load(name, target)
+        robot = EntryPoint(name, target, ENTRY_POINTS).load()
     except (ImportError, AttributeError) as error:
         raise DeviceError(
             f"driver: {name} ({target}) cannot be loaded: {error}; install what it needs"
         ) from None
-    return Driver(name, robot, _options(name, robot.Options, options))
-
-
-def _load(name: str, target: str) -> type[AnkleRobot]:
-    if name in OWN_DRIVERS:
-        module, _, attribute = target.partition(":")
-        loaded: type[AnkleRobot] = getattr(importlib.import_module(module), attribute)
-    else:
-        loaded = EntryPoint(name, target, ENTRY_POINTS).load()
-    if not (isinstance(loaded, type) and issubclass(loaded, AnkleRobot)):
+    if not (isinstance(robot, type) and issubclass(robot, AnkleRobot)):
         raise LimitError(f"driver: {name} ({target}) is no AnkleRobot: derive it from that class")
-    return loaded
+    return Driver(name, robot, _options(name, robot.Options, options))
 
 
 def _options(name: str, options_type: type[Any], text: str) -> Any:

@@ -10,9 +10,14 @@ crosses a fraction of the pulse's height, interpolated between two states.
 """
 
 import math
+from bisect import bisect_left, insort
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
+
+from gait_entrainment.conventions import nanoseconds
+from gait_entrainment.robot.contract import RobotState
 
 # Half the height: noise has to reach that far to be mistaken, and the instant does not depend on
 # where the flank starts to be seen.
@@ -20,6 +25,9 @@ CROSSING = 0.5
 # States further apart [ns] are those of a torque that jumped at the later one: there is nothing
 # to interpolate over.
 LONGEST_GAP = 20_000_000
+# A device this late after the end of a pulse did not deliver it [s].
+LATEST = 0.2
+_STAMP = attrgetter("stamp")
 
 
 def measured_onset(
@@ -67,6 +75,103 @@ class PulseTiming:
         """By how many ms the "sent" or "measured" onset came after the command."""
         onset: int | None = getattr(self, kind)
         return None if onset is None else (onset - self.commanded) / 1e6
+
+
+class MeasuredOnsets:
+    """
+    Times each pulse once everything that it depends on is known, in a run or from its record.
+
+    A robot reports its pulses in three streams, each of which may be ahead of the others: promises
+    name the onsets, announcements give height and width, states show the torque. A pulse is judged
+    by the states up to LATEST after its end, or up to the onset of the next pulse. So the timings
+    are those of the whole run at once, however the streams interleave. (A stop is not bound by
+    this: it happens when it happens.)
+
+    Each ``add`` returns the onsets that have become known, with the instant before which none
+    will follow: what ``GaitAnalyzer.add_promise`` takes.
+    """
+
+    def __init__(self) -> None:
+        self.timings: list[PulseTiming] = []  # of the pulses so far, in order
+        self.states_until = 0  # stamp of the latest state [ns]
+        self._promised = 0  # every pulse that begins before this has been named [ns]
+        self._named: list[int] = []  # onsets of pulses not judged yet; ascending
+        self._announced: dict[int, tuple[float, float]] = {}  # their height, width
+        self._states: list[RobotState] = []  # ascending; those of pulses not judged yet
+
+    def add_promise(self, onsets: Sequence[int], valid_until: int) -> tuple[list[int], int]:
+        """Take the onsets of pulses [ns], and the promise that no others lie before an instant."""
+        self._named += onsets
+        self._promised = valid_until
+        return self._judge_what_is_known()
+
+    def add_pulse(self, onset: int, height: float, width: float) -> tuple[list[int], int]:
+        """Take the announcement of a pulse: onset [ns], height [N m], width [s]."""
+        self._announced[onset] = height, width
+        return self._judge_what_is_known()
+
+    def add_state(self, state: RobotState) -> tuple[list[int], int]:
+        """Take a state of the robot."""
+        insort(self._states, state, key=_STAMP)
+        self.states_until = max(self.states_until, state.stamp)
+        return self._judge_what_is_known()
+
+    def stop(self, stamp: int) -> None:
+        """Take a stop [ns]: pulses that begin from it on were promised and never came."""
+        self._promised = min(self._promised, stamp)
+        self._named = [onset for onset in self._named if onset < stamp]
+
+    def finish(self) -> list[int]:
+        """End the run; returns the remaining onsets. One never announced is as commanded."""
+        onsets, _ = self._judge_what_is_known(ended=True)
+        return onsets
+
+    def _judge_what_is_known(self, ended: bool = False) -> tuple[list[int], int]:
+        count = len(self.timings)
+        while self._named and (ended or self._next_is_known()):
+            self.timings.append(self._judge())
+        until = min([self._promised, *self._named[:1]])
+        self._forget_states_before(until)
+        # A crossing lies at most one gap before the state that shows it.
+        return [timing.onset for timing in self.timings[count:]], until - LONGEST_GAP
+
+    def _next_is_known(self) -> bool:
+        """Whether the next pulse, the one after it, and all states in between are known."""
+        onset, *later = self._named[:2]
+        if onset not in self._announced:
+            return False
+        end = self._end(onset, self._announced[onset][1], later)
+        return end < self.states_until and (bool(later) or end <= self._promised)
+
+    def _judge(self) -> PulseTiming:
+        """Take the next pulse from those named, and return its timing."""
+        onset = self._named.pop(0)
+        height, width = self._announced.pop(onset, (0.0, 0.0))
+        if height == 0:  # a sham, or never announced: no state can show it
+            return PulseTiming(onset, None, None)
+        end = self._end(onset, width, self._named[:1])
+        self._forget_states_before(onset)
+        seen = [state for state in self._states if state.stamp <= end]
+        during = (state for state in seen if state.stamp >= onset)
+        sent = next((state.stamp for state in during if state.commanded / height > 0), None)
+        stamps, torques = [s.stamp for s in seen], [s.measured for s in seen]
+        found = measured_onset(stamps, torques, height)
+        if found is None:
+            return PulseTiming(onset, sent, None)
+        index, measured = found
+        if seen[index].measured == seen[index].commanded:
+            # Equal to the last bit: not measured but computed, and known at each of its jumps.
+            measured = seen[index].stamp
+        return PulseTiming(onset, sent, measured)
+
+    def _end(self, onset: int, width: float, later: Sequence[int]) -> int:
+        """Return the end [ns] of the states by which a pulse is judged."""
+        return min([onset + nanoseconds(width + LATEST), *later])
+
+    def _forget_states_before(self, instant: int) -> None:
+        """Drop the states before an instant [ns], except for the last one."""
+        first = bisect_left(self._states, instant, key=_STAMP)
+        del self._states[: max(first - 1, 0)]
 
 
 def lateness_ms(timings: Sequence[PulseTiming], kind: str) -> list[float]:

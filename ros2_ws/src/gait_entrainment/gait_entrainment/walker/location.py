@@ -14,8 +14,8 @@ from typing import Final
 from gait_entrainment.walker.compiled import compiled
 from gait_entrainment.walker.model import Floats, Model
 from gait_entrainment.walker.segment import (
-    SINGLE_STANCE,
     Segment,
+    Stance,
     double_stance_time,
     motion,
     position_of,
@@ -42,7 +42,7 @@ def travel_time_onward(
     model: Model, work: Floats, segment: Segment, start: float, end: float
 ) -> float:
     """Time [s] from one position of the segment to a later one."""
-    if segment.stance == SINGLE_STANCE:
+    if segment.stance == Stance.SINGLE:
         return pendulum_time(model.per_drop, segment.apex, start, end)
     return double_stance_time(model, work, segment, start, end)
 

@@ -57,8 +57,10 @@ class Model(Protocol):
     """
     Constants of one walker. Positions in double stance are psi, in single stance -theta.
 
-    `apex` is the squared rate that the walker would have at the apex; a hold is the force on the
-    leading or stance leg without the centrifugal part of `apex`.
+    In single stance, and in what gravity does, theta counts from the vertical; in the linkage from
+    the normal of the ground. Only on a slope do the two differ. `apex` is the squared rate that
+    the walker would have at the apex; a hold is the force on the leading or stance leg without the
+    centrifugal part of `apex`.
     """
 
     mass: float
@@ -76,7 +78,10 @@ class Model(Protocol):
     swing_ankle_slope: float  # and that of the ankle
     per_energy: float  # squared rate per energy, 2 / (m L^2)
     per_drop: float  # squared rate per relative height, 2 g / L
-    strike_gain: float  # squared rate at heel strike over that at the apex
+    strike_gain: float  # squared rate right before heel strike over that at the apex
+    start_gain: float  # the same right after it: uphill the new leading leg leans further
+    slope_sine: float  # of the angle by which the ground rises
+    slope_cosine: float
     restitution: float  # squared rate after a collision over that before it
     start_apex: float  # `apex` right after a collision in the period-one gait
     toe_off_half_sine: float  # sin(theta / 2)^2 at toe-off
@@ -143,9 +148,10 @@ def _converged_apex(whole: Floats, rule: Floats) -> float:
 
 
 class _Extended:
-    """The parameters of a walker, and functions of the trailing ankle's angle psi."""
+    """The parameters of a walker on a slope, and functions of the trailing ankle's angle psi."""
 
-    def __init__(self, p: WalkerParameters) -> None:
+    def __init__(self, p: WalkerParameters, slope: float) -> None:
+        self.rise = Extended(slope)
         self.mass, self.gravity, self.ankle_stiffness = p.mass, p.gravity, p.ankle_stiffness
         self.leg_length, self.foot_length = p.leg_length, p.foot_length
         self.alpha, self.max_plantarflexion = Extended(p.leg_angle), Extended(p.max_plantarflexion)
@@ -161,6 +167,12 @@ class _Extended:
         cosine = np.sqrt(1 - self.leg_sine(psi) ** 2)
         return geometry.leg_per_ankle(self, np.sin(psi), cosine)
 
+    def lean(self, psi: Any) -> tuple[Any, Any]:
+        """Sine and cosine of the leading leg's angle from the vertical."""
+        sine, up, along = self.leg_sine(psi), np.cos(self.rise), np.sin(self.rise)
+        cosine = np.sqrt(1 - sine**2)
+        return sine * up + cosine * along, cosine * up - sine * along
+
     def work(self, psi: Any) -> Any:
         """Work of the spring from heel strike to psi [J]."""
         peak = geometry.spring_torque(self, self.start)
@@ -168,24 +180,29 @@ class _Extended:
 
     def gain(self, psi: Any) -> Any:
         """Squared rate at psi, unperturbed, less `apex` at heel strike."""
-        sine = self.leg_sine(psi)
-        fall = geometry.drop(sine, np.sqrt(1 - sine**2))
+        fall = geometry.drop(*self.lean(psi))
         return self.per_energy * self.work(psi) + self.per_drop * fall
 
     def hold(self, psi: Any, pulse: float) -> Any:
         """Leading-leg force with a pulse on since heel strike, if `apex` was zero there."""
-        sine = self.leg_sine(psi)
         torque = pulse + geometry.spring_torque(self, psi)
         squared_rate = self.gain(psi) + self.per_energy * pulse * (psi - self.start)
-        carried = geometry.pendulum_force(self, np.sqrt(1 - sine**2), squared_rate)
-        return carried - geometry.unloading_arm(self, np.sin(psi), sine) * torque
+        carried = geometry.pendulum_force(self, self.lean(psi)[1], squared_rate)
+        return carried - geometry.unloading_arm(self, np.sin(psi), self.leg_sine(psi)) * torque
 
 
-def make_model(p: WalkerParameters) -> Model:
-    """Work out the constants of a walker."""
-    body = _Extended(p)
+def make_model(p: WalkerParameters, slope: float = 0.0) -> Model:
+    """
+    Work out the constants of a walker on ground that rises by `slope` [rad].
+
+    A slope turns gravity against ground and linkage and changes nothing else. It is an extension
+    of the paper; samples of the walker are those of level ground.
+    """
+    body = _Extended(p, slope)
     alpha, start, end, per_drop = body.alpha, body.start, body.max_plantarflexion, body.per_drop
-    strike_gain = per_drop * geometry.drop(np.sin(alpha), np.cos(alpha))
+    rise = body.rise
+    strike_gain = per_drop * geometry.drop(np.sin(alpha - rise), np.cos(alpha - rise))
+    start_gain = per_drop * geometry.drop(np.sin(alpha + rise), np.cos(alpha + rise))
     restitution = np.cos(2 * alpha) ** 2
     after_strike = body.per_energy * body.work(end) * restitution / (1 - restitution)
     pulse = BOUNDED_PULSE * p.peak_torque
@@ -200,14 +217,14 @@ def make_model(p: WalkerParameters) -> Model:
     toe_off_sine = body.leg_sine(end)
     toe_off = np.arcsin(toe_off_sine)
     half = 0.5 * (alpha + toe_off)
-    theta = toe_off - half + half * single_rule[NODES]
+    theta = toe_off - half + half * single_rule[NODES] + rise
     fallen = per_drop * geometry.drop(np.sin(theta), np.cos(theta))
     single_stance = np.array([fallen, half * single_rule[WEIGHTS]])
 
     # The display path of the swing leg (docs/model.md) starts with the posture and the rates at
     # toe-off, here per unit of progress through single stance.
-    slope, reach = body.transmission(end), geometry.trailing_reach(body, np.cos(end))
-    hip_per_ankle = geometry.trailing_leg_per_ankle(body, end, toe_off_sine, slope, reach)
+    turn, reach = body.transmission(end), geometry.trailing_reach(body, np.cos(end))
+    hip_per_ankle = geometry.trailing_leg_per_ankle(body, end, toe_off_sine, turn, reach)
     return _record(
         mass=p.mass,
         leg_length=p.leg_length,
@@ -217,18 +234,21 @@ def make_model(p: WalkerParameters) -> Model:
         ankle_stiffness=p.ankle_stiffness,
         max_plantarflexion=end,
         double_stance_start=start,
-        strike_position=alpha,
-        toe_off_position=-toe_off,
+        strike_position=alpha - rise,
+        toe_off_position=-toe_off - rise,
         swing_hip=geometry.trailing_leg_angle(body, end, toe_off_sine),
-        swing_hip_slope=hip_per_ankle * (2 * half / slope),
-        swing_ankle_slope=2 * half / slope,
+        swing_hip_slope=hip_per_ankle * (2 * half / turn),
+        swing_ankle_slope=2 * half / turn,
         per_energy=body.per_energy,
         per_drop=per_drop,
         strike_gain=strike_gain,
+        start_gain=start_gain,
+        slope_sine=np.sin(rise),
+        slope_cosine=np.cos(rise),
         restitution=restitution,
-        start_apex=after_strike - strike_gain,
-        toe_off_half_sine=0.5 * geometry.drop(toe_off_sine, np.cos(toe_off)),
-        strike_hold=geometry.pendulum_force(body, np.cos(alpha), strike_gain),
+        start_apex=after_strike - strike_gain + (strike_gain - start_gain) / (1 - restitution),
+        toe_off_half_sine=0.5 * geometry.drop(body.lean(end)[0], np.cos(toe_off + rise)),
+        strike_hold=geometry.pendulum_force(body, np.cos(alpha - rise), strike_gain),
         rule=rule,
         whole_double_stance=double_stance,
         whole_double_stance_apex=_converged_apex(double_stance, rule),
@@ -251,4 +271,4 @@ def start_apex(model: Any, speed: float | None) -> float:
         return float(model["start_apex"])
     if not 0.0 < speed < float("inf"):
         raise ValueError(f"initial_speed {speed} m/s is not a positive, finite number")
-    return float((speed / model["leg_length"]) ** 2 - model["strike_gain"])
+    return float((speed / model["leg_length"]) ** 2 - model["start_gain"])

@@ -20,22 +20,15 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from gait_entrainment.walker import linkage
 from gait_entrainment.walker.compiled import compiled
-from gait_entrainment.walker.linkage import (
-    leg_per_ankle,
-    spring_torque,
-    trailing_force,
-    trailing_leg_angle,
-    trailing_leg_per_ankle,
-    trailing_reach,
-)
 from gait_entrainment.walker.location import position_at
 from gait_entrainment.walker.model import Floats, Model, Stamps
 from gait_entrainment.walker.segment import (
-    DOUBLE_STANCE,
     WORK_SIZE,
     Log,
     Segment,
+    Stance,
     effective_torque,
     leading_force,
     leg_sine_at,
@@ -111,9 +104,9 @@ def fill_samples(model: Model, log: Log, times: Stamps, robot: Torques, table: A
         segment = log[rows[i] - 1]
         elapsed = (times[i] - segment.stamp) / NANO - segment.rest
         position = position_at(model, work, segment, elapsed)
-        row.double_stance = segment.stance == DOUBLE_STANCE
+        row.double_stance = segment.stance == Stance.DOUBLE
         row.leading = segment.leading
-        if segment.stance == DOUBLE_STANCE:
+        if segment.stance == Stance.DOUBLE:
             fill_double_stance(model, segment, position, row)
         else:
             fill_single_stance(model, segment, position, row)
@@ -141,24 +134,24 @@ def fill_double_stance(model: Model, segment: Segment, position: float, row: Any
     sine = leg_sine_at(model, segment.stance, position)
     cosine = math.sqrt(1.0 - sine * sine)
     sin_ankle = math.sin(position)
-    slope = leg_per_ankle(model, sin_ankle, cosine)
-    reach = trailing_reach(model, math.cos(position))
+    slope = linkage.leg_per_ankle(model, sin_ankle, cosine)
+    reach = linkage.trailing_reach(model, math.cos(position))
     rate = math.sqrt(max(0.0, squared_rate(model, segment, position)))
     velocity = rate / slope
     fill_leading_leg(model, segment, position, sine, -rate, row)
 
-    hip_per_ankle = trailing_leg_per_ankle(model, position, sine, slope, reach)
-    row.position[HIP + trailing] = trailing_leg_angle(model, position, sine)
+    hip_per_ankle = linkage.trailing_leg_per_ankle(model, position, sine, slope, reach)
+    row.position[HIP + trailing] = linkage.trailing_leg_angle(model, position, sine)
     row.velocity[HIP + trailing] = velocity * hip_per_ankle
     row.position[ANKLE + trailing] = position - 0.5 * math.pi
     row.velocity[ANKLE + trailing] = velocity
 
     torque = max(0.0, effective_torque(segment, position))
-    intrinsic = spring_torque(model, position)
+    intrinsic = linkage.spring_torque(model, position)
     row.intrinsic_torque[trailing] = intrinsic
     row.unloaded = segment.stiffness == 0.0
     row.effective_torque[trailing] = -intrinsic if row.unloaded else segment.perturbation
-    force = trailing_force(model, torque, sin_ankle, reach)
+    force = linkage.trailing_force(model, torque, sin_ankle, reach)
     row.force[trailing] = force
     ahead = model.toe_separation - model.leg_length * sine
     row.ground_reaction[trailing, 0] = force * ahead / reach

@@ -19,16 +19,8 @@ from typing import Any, Final, Protocol
 
 import numpy as np
 
+from gait_entrainment.walker import linkage
 from gait_entrainment.walker.compiled import compiled
-from gait_entrainment.walker.linkage import (
-    ankle_cosine,
-    drop,
-    leg_per_ankle,
-    leg_sine,
-    pendulum_force,
-    torque_work,
-    unloading_arm,
-)
 from gait_entrainment.walker.model import (
     NODES,
     PANEL_NODES,
@@ -40,24 +32,23 @@ from gait_entrainment.walker.model import (
     Model,
 )
 
-# The compiled functions read plain integers; the enumerations name them for everyone else.
-DOUBLE_STANCE: Final = 0
-SINGLE_STANCE: Final = 1
-
 
 class Stance(IntEnum):
     """What the walker stands on: both feet, or one."""
 
-    DOUBLE = DOUBLE_STANCE
-    SINGLE = SINGLE_STANCE
+    DOUBLE = 0
+    SINGLE = 1
 
 
-HEEL_STRIKE: Final = 0
-TOE_OFF: Final = 1
-TORQUE_CHANGE: Final = 2
-UNLOADING: Final = 3
-FALL: Final = 4
-FLY_OFF: Final = 5
+class Switch(IntEnum):
+    """What ends a segment and begins the next one; the last two end the walk."""
+
+    HEEL_STRIKE = 0
+    TOE_OFF = 1
+    TORQUE_CHANGE = 2
+    UNLOADING = 3
+    FALL = 4
+    FLY_OFF = 5
 
 
 class Segment(Protocol):
@@ -112,34 +103,50 @@ def effective_torque(segment: Segment, position: float) -> float:
 def gained_apex(model: Model, segment: Segment, position: float) -> float:
     """`apex` at a position of the segment: the start's, and the torque's work."""
     rotation = position - segment.position
-    work = torque_work(rotation, segment.torque, segment.stiffness)
+    work = linkage.torque_work(rotation, segment.torque, segment.stiffness)
     return segment.apex + model.per_energy * work
 
 
 @compiled
 def leg_sine_at(model: Model, stance: int, position: float) -> float:
     """sin(theta) of the leading leg."""
-    if stance == SINGLE_STANCE:
+    if stance == Stance.SINGLE:
         return -math.sin(position)
-    return leg_sine(model, math.cos(position))
+    return linkage.leg_sine(model, math.cos(position))
+
+
+@compiled
+def leaned(model: Model, sine: float, cosine: float) -> tuple[float, float]:
+    """Sine and cosine of an angle from the vertical, from those off the ground's normal."""
+    up, along = model.slope_cosine, model.slope_sine
+    return sine * up + cosine * along, cosine * up - sine * along
+
+
+@compiled
+def lean_at(model: Model, stance: int, position: float) -> tuple[float, float]:
+    """Sine and cosine of the leading leg's angle from the vertical."""
+    sine = leg_sine_at(model, stance, position)
+    cosine = math.sqrt(1.0 - sine * sine)
+    if stance == Stance.SINGLE:
+        return sine, cosine
+    return leaned(model, sine, cosine)
 
 
 @compiled
 def squared_rate(model: Model, segment: Segment, position: float) -> float:
     """theta_dot^2 at a position of the segment, from energy; negative beyond a stall."""
-    sine = leg_sine_at(model, segment.stance, position)
-    fall = drop(sine, math.sqrt(1.0 - sine * sine))
+    fall = linkage.drop(*lean_at(model, segment.stance, position))
     return gained_apex(model, segment, position) + model.per_drop * fall
 
 
 @compiled
 def leading_force(model: Model, segment: Segment, position: float) -> float:
     """Ground reaction F_B [N] of the leading leg, along the leg; negative if it would pull."""
-    sine = leg_sine_at(model, segment.stance, position)
     square = squared_rate(model, segment, position)
-    force = pendulum_force(model, math.sqrt(1.0 - sine * sine), square)
-    if segment.stance == DOUBLE_STANCE:
-        arm = unloading_arm(model, math.sin(position), sine)
+    force = linkage.pendulum_force(model, lean_at(model, segment.stance, position)[1], square)
+    if segment.stance == Stance.DOUBLE:
+        sine = leg_sine_at(model, segment.stance, position)
+        arm = linkage.unloading_arm(model, math.sin(position), sine)
         force -= arm * effective_torque(segment, position)
     return force
 
@@ -152,27 +159,26 @@ def motion(model: Model, segment: Segment, position: float) -> tuple[float, floa
     In single stance the position, in double stance sin(theta): psi itself speeds up twentyfold.
     theta_ddot is half the derivative of theta_dot^2 by theta.
     """
-    if segment.stance == SINGLE_STANCE:
+    if segment.stance == Stance.SINGLE:
         rate = math.sqrt(max(0.0, squared_rate(model, segment, position)))
         return position, rate, 0.5 * model.per_drop * math.sin(position)
     cos_ankle = math.cos(position)
-    sine = leg_sine(model, cos_ankle)
+    sine = linkage.leg_sine(model, cos_ankle)
     cosine = math.sqrt(1.0 - sine * sine)
     sin_ankle = math.sqrt(1.0 - cos_ankle * cos_ankle)
-    slope = leg_per_ankle(model, sin_ankle, cosine)
-    square = gained_apex(model, segment, position) + model.per_drop * drop(sine, cosine)
-    square = max(0.0, square)
+    slope = linkage.leg_per_ankle(model, sin_ankle, cosine)
+    square = max(0.0, squared_rate(model, segment, position))
     push = model.per_energy * effective_torque(segment, position) / slope
-    acceleration = 0.5 * (model.per_drop * sine - push)
+    acceleration = 0.5 * (model.per_drop * leaned(model, sine, cosine)[0] - push)
     return sine, -cosine * math.sqrt(square), cosine * acceleration - sine * square
 
 
 @compiled
 def position_of(model: Model, stance: int, coordinate: float) -> float:
     """Position where the coordinate of `motion` has this value."""
-    if stance == SINGLE_STANCE:
+    if stance == Stance.SINGLE:
         return coordinate
-    cosine = ankle_cosine(model, coordinate)
+    cosine = linkage.ankle_cosine(model, coordinate)
     return math.acos(max(-1.0, min(1.0, cosine)))
 
 
@@ -195,11 +201,12 @@ def panel(
         s, c = short_sine(x), short_cosine(x)
         sin_ankle = sin_middle * c + cos_middle * s
         cos_ankle = cos_middle * c - sin_middle * s
-        sine = leg_sine(model, cos_ankle)
+        sine = linkage.leg_sine(model, cos_ankle)
         cosine = math.sqrt(1.0 - sine * sine)
-        gain = torque_work(rotation + x, segment.torque, segment.stiffness)
-        square = segment.apex + model.per_energy * gain + model.per_drop * drop(sine, cosine)
-        slope = leg_per_ankle(model, sin_ankle, cosine)
+        gain = linkage.torque_work(rotation + x, segment.torque, segment.stiffness)
+        fall = linkage.drop(*leaned(model, sine, cosine))
+        square = segment.apex + model.per_energy * gain + model.per_drop * fall
+        slope = linkage.leg_per_ankle(model, sin_ankle, cosine)
         work[i] = slope / math.sqrt(square)
     return weighed(model, work, half)
 
@@ -216,19 +223,21 @@ def stall_panel(
     """
     middle, half = 0.5 * (start + end), 0.5 * (end - start)
     stall_torque = effective_torque(segment, segment.end)
-    stall_sine = leg_sine_at(model, DOUBLE_STANCE, segment.end)
+    stall_sine = leg_sine_at(model, Stance.DOUBLE, segment.end)
     stall_cosine = math.sqrt(1.0 - stall_sine * stall_sine)
     for i in range(PANEL_NODES):
         u = middle + half * model.rule[NODES, i]
         back = u * u
         position = segment.end - back
-        sine = leg_sine_at(model, DOUBLE_STANCE, position)
+        sine = leg_sine_at(model, Stance.DOUBLE, position)
         cosine = math.sqrt(1.0 - sine * sine)
         rise = 2.0 * math.sin(segment.end - 0.5 * back) * math.sin(0.5 * back)
+        ahead = model.per_drop * model.slope_sine * model.foot_length / model.toe_separation * rise
         rise *= model.foot_length / model.toe_separation * (sine + stall_sine)
-        gain = torque_work(-back, stall_torque, segment.stiffness)
-        square = model.per_energy * gain + model.per_drop * rise / (cosine + stall_cosine)
-        slope = leg_per_ankle(model, math.sin(position), cosine)
+        level = model.per_drop * rise / (cosine + stall_cosine)
+        gain = linkage.torque_work(-back, stall_torque, segment.stiffness)
+        square = model.per_energy * gain + model.slope_cosine * level + ahead
+        slope = linkage.leg_per_ankle(model, math.sin(position), cosine)
         work[i] = -2.0 * u * slope / math.sqrt(square)
     return weighed(model, work, half)
 
@@ -306,7 +315,7 @@ def double_stance_time(
     model: Model, work: Floats, segment: Segment, start: float, end: float
 ) -> float:
     """Time [s] from one position of double stance to a later one, in panels that converge."""
-    to_stall = segment.ends == FALL
+    to_stall = segment.ends == Switch.FALL
     widest = PANEL_WIDTH
     if to_stall:
         start = math.sqrt(max(0.0, segment.end - start))

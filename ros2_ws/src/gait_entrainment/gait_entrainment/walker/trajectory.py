@@ -16,16 +16,7 @@ import numpy as np
 from gait_entrainment.walker.compiled import compiled
 from gait_entrainment.walker.location import position_at
 from gait_entrainment.walker.model import Floats, Model, Stamps
-from gait_entrainment.walker.segment import (
-    DOUBLE_STANCE,
-    FALL,
-    FLY_OFF,
-    HEEL_STRIKE,
-    TOE_OFF,
-    WORK_SIZE,
-    Log,
-    Segment,
-)
+from gait_entrainment.walker.segment import WORK_SIZE, Log, Segment, Stance, Switch
 from gait_entrainment.walker.transitions import (
     NANO,
     change_torque,
@@ -77,10 +68,10 @@ def proceed(
     Such an end comes after a torque change of its own stamp, which may avert it.
     """
     end, rest = clock(segment.stamp, segment.rest, segment.duration)
-    terminal = segment.ends == FALL or segment.ends == FLY_OFF
+    terminal = segment.ends == Switch.FALL or segment.ends == Switch.FLY_OFF
     due = end + 1 if terminal else end
     trailing = 1 - segment.leading
-    if segment.stance == DOUBLE_STANCE:
+    if segment.stance == Stance.DOUBLE:
         ahead = skip_changes(robot, cursors, trailing, segment.after)
         index = cursors[trailing]
         if ahead and robot.changes[index] < due:
@@ -98,11 +89,11 @@ def proceed(
         return ENDED
     segment.stamp, segment.rest = end, rest
     segment.after = max(segment.after, end - 1)
-    if segment.ends == HEEL_STRIKE:
+    if segment.ends == Switch.HEEL_STRIKE:
         # The stance leg now trails: its torque is what held before this stamp.
         skip_changes(robot, cursors, segment.leading, segment.after)
         collide(model, segment, robot.torques[cursors[segment.leading] - 1], work)
-    elif segment.ends == TOE_OFF:
+    elif segment.ends == Switch.TOE_OFF:
         leave_double_stance(model, segment, work)
     else:
         unload(model, segment, work)
@@ -130,6 +121,6 @@ def advance(model: Model, log: Log, count: int, robot: Torques, until: int) -> t
 def start_walking(model: Model, segment: Segment, leading: int, apex: float) -> None:
     """Write the first segment: right after heel strike 0 of `leading`."""
     segment.stamp, segment.rest, segment.after = 0, 0.0, -1
-    segment.began, segment.leading, segment.step = HEEL_STRIKE, leading, 1
+    segment.began, segment.leading, segment.step = Switch.HEEL_STRIKE, leading, 1
     segment.apex = apex
     enter_double_stance(model, segment, 0.0, np.empty(WORK_SIZE))

@@ -21,30 +21,20 @@ from typing import Final
 
 import numpy as np
 
+from gait_entrainment.walker import linkage
 from gait_entrainment.walker.compiled import compiled
-from gait_entrainment.walker.linkage import spring_torque, torque_work
 from gait_entrainment.walker.model import Floats, Model
 from gait_entrainment.walker.segment import (
-    DOUBLE_STANCE,
-    FALL,
-    FLY_OFF,
-    HEEL_STRIKE,
-    SINGLE_STANCE,
-    TOE_OFF,
-    TORQUE_CHANGE,
-    UNLOADING,
     Segment,
+    Stance,
+    Switch,
     double_stance_time,
     gained_apex,
     leading_force,
     ordered_sum,
     squared_rate,
 )
-from gait_entrainment.walker.single_stance import (
-    lift_off_position,
-    pendulum_time,
-    turning_point,
-)
+from gait_entrainment.walker.single_stance import lift_off_position, pendulum_time, turning_point
 
 NANO: Final = 1e9
 
@@ -60,17 +50,17 @@ SEARCH_POINTS: Final = 128
 def collide(model: Model, segment: Segment, perturbation: float, work: Floats) -> None:
     """Heel strike: the speed falls by cos(2 alpha), the legs change roles, the push-off begins."""
     square = segment.apex + model.strike_gain
-    segment.apex = model.restitution * square - model.strike_gain
+    segment.apex = model.restitution * square - model.start_gain
     segment.leading = 1 - segment.leading
     segment.step += 1
-    segment.began = HEEL_STRIKE
+    segment.began = Switch.HEEL_STRIKE
     enter_double_stance(model, segment, perturbation, work)
 
 
 @compiled
 def enter_double_stance(model: Model, segment: Segment, perturbation: float, work: Floats) -> None:
     """Begin double stance right after the collision, with `apex` as it is."""
-    segment.stance = DOUBLE_STANCE
+    segment.stance = Stance.DOUBLE
     segment.position = model.double_stance_start
     segment.perturbation = perturbation
     load(model, segment)
@@ -81,12 +71,10 @@ def enter_double_stance(model: Model, segment: Segment, perturbation: float, wor
 def leave_double_stance(model: Model, segment: Segment, work: Floats) -> None:
     """Toe-off: the ankle torque ends, also where a pulse is still on."""
     segment.apex = gained_apex(model, segment, segment.end)
-    segment.stance = SINGLE_STANCE
+    segment.stance = Stance.SINGLE
     segment.position = model.toe_off_position
-    segment.perturbation = 0.0
-    segment.torque = 0.0
-    segment.stiffness = 0.0
-    segment.began = TOE_OFF
+    segment.perturbation, segment.torque, segment.stiffness = 0.0, 0.0, 0.0
+    segment.began = Switch.TOE_OFF
     look_ahead_single_stance(model, segment, work)
 
 
@@ -98,7 +86,7 @@ def change_torque(
     segment.apex = gained_apex(model, segment, position)
     segment.position = position
     segment.perturbation = perturbation
-    segment.began = TORQUE_CHANGE
+    segment.began = Switch.TORQUE_CHANGE
     load(model, segment)
     look_ahead_double_stance(model, segment, work)
 
@@ -108,16 +96,15 @@ def unload(model: Model, segment: Segment, work: Floats) -> None:
     """The pulse has eaten up the spring: the trailing foot is unloaded, double stance goes on."""
     segment.apex = gained_apex(model, segment, segment.end)
     segment.position = segment.end
-    segment.torque = 0.0
-    segment.stiffness = 0.0
-    segment.began = UNLOADING
+    segment.torque, segment.stiffness = 0.0, 0.0
+    segment.began = Switch.UNLOADING
     look_ahead_double_stance(model, segment, work)
 
 
 @compiled
 def load(model: Model, segment: Segment) -> None:
     """Effective torque max(0, k (mu - psi) + T_p) at the start, and how it falls off."""
-    spring = spring_torque(model, segment.position)
+    spring = linkage.spring_torque(model, segment.position)
     segment.torque = max(0.0, spring + segment.perturbation)
     segment.stiffness = model.ankle_stiffness if segment.torque > 0.0 else 0.0
 
@@ -128,43 +115,38 @@ def load(model: Model, segment: Segment) -> None:
 @compiled
 def look_ahead_single_stance(model: Model, segment: Segment, work: Floats) -> None:
     """Heel strike, unless the walker turns back before the apex or flies off after it."""
-    segment.ends = HEEL_STRIKE
-    segment.end = model.strike_position
-    segment.shortfall = 0.0
+    segment.ends, segment.end, segment.shortfall = Switch.HEEL_STRIKE, model.strike_position, 0.0
     if segment.apex <= 0.0 and model.toe_off_position < 0.0:
-        segment.ends = FALL
+        segment.ends = Switch.FALL
         segment.end, segment.duration = turning_point(model, segment.apex)
         segment.shortfall = -segment.apex / model.per_energy
         return
     # The mass is lowest and fastest at heel strike, so the force is least there.
     force = model.strike_hold - model.mass * model.leg_length * segment.apex
     if force < 0.0:
-        segment.ends = FLY_OFF
+        segment.ends = Switch.FLY_OFF
         segment.end = max(segment.position, lift_off_position(model, segment.apex))
         segment.shortfall = -force
-    if segment.ends == HEEL_STRIKE and segment.apex >= model.whole_single_stance_apex:
+    if segment.ends == Switch.HEEL_STRIKE and segment.apex >= model.whole_single_stance_apex:
         segment.duration = whole_time(model.whole_single_stance, work, segment.apex)
     else:
-        segment.duration = pendulum_time(
-            model.per_drop, segment.apex, segment.position, segment.end
-        )
+        start, end = segment.position, segment.end
+        segment.duration = pendulum_time(model.per_drop, segment.apex, start, end)
 
 
 @compiled
 def look_ahead_double_stance(model: Model, segment: Segment, work: Floats) -> None:
     """Toe-off or unloading, unless the walker stalls or flies off before."""
-    segment.ends = TOE_OFF
-    segment.end = model.max_plantarflexion
-    segment.shortfall = 0.0
+    segment.ends, segment.end, segment.shortfall = Switch.TOE_OFF, model.max_plantarflexion, 0.0
     if segment.stiffness > 0.0 and segment.perturbation < 0.0:
-        segment.ends = UNLOADING
+        segment.ends = Switch.UNLOADING
         segment.end = segment.position + segment.torque / segment.stiffness
         segment.end = min(segment.end, model.max_plantarflexion)
     if not cleared(model, segment):
         search_stall_and_lift_off(model, segment)
     whole = (
         segment.position == model.double_stance_start
-        and segment.ends == TOE_OFF
+        and segment.ends == Switch.TOE_OFF
         and segment.perturbation == 0.0
         and segment.apex >= model.whole_double_stance_apex
     )
@@ -194,8 +176,9 @@ def cleared(model: Model, segment: Segment) -> bool:
     """
     pulse = segment.perturbation
     turned = segment.position - model.double_stance_start
-    peak = spring_torque(model, model.double_stance_start)
-    apex = segment.apex - model.per_energy * torque_work(turned, peak, model.ankle_stiffness)
+    peak = linkage.spring_torque(model, model.double_stance_start)
+    by_spring = linkage.torque_work(turned, peak, model.ankle_stiffness)
+    apex = segment.apex - model.per_energy * by_spring
     slowest = apex + model.least_gain
     hold = model.least_hold
     if pulse < 0.0:
@@ -211,7 +194,7 @@ def cleared(model: Model, segment: Segment) -> bool:
 @compiled
 def margin(model: Model, segment: Segment, position: float, switch: int) -> float:
     """What must stay positive: the squared rate (fall) or the leading leg's force (fly-off)."""
-    if switch == FALL:
+    if switch == Switch.FALL:
         return squared_rate(model, segment, position)
     return leading_force(model, segment, position)
 
@@ -220,14 +203,11 @@ def margin(model: Model, segment: Segment, position: float, switch: int) -> floa
 def search_stall_and_lift_off(model: Model, segment: Segment) -> None:
     """End the segment where first its speed or the leading leg's force would go through zero."""
     end = segment.end
-    for switch in (FALL, FLY_OFF):
+    for switch in (Switch.FALL, Switch.FLY_OFF):
         position, least = first_crossing(model, segment, end, switch)
         if least < 0.0 and position <= segment.end:
-            segment.ends = switch
-            segment.end = position
-            segment.shortfall = -least
-            if switch == FALL:
-                segment.shortfall = -least / model.per_energy
+            segment.ends, segment.end = switch, position
+            segment.shortfall = -least / model.per_energy if switch == Switch.FALL else -least
 
 
 @compiled
@@ -247,9 +227,8 @@ def first_crossing(model: Model, segment: Segment, end: float, switch: int) -> t
         if dip or i == 1 or i == SEARCH_POINTS:
             low, low_value = minimum(model, segment, before, there, switch)
         if low_value < 0.0 and first == math.inf:
-            first = root(
-                model, segment, here if value_here >= 0.0 and here < low else before, low, switch
-            )
+            positive = here if value_here >= 0.0 and here < low else before
+            first = root(model, segment, positive, low, switch)
         least = min(least, low_value, value_there)
         before, value_before = here, value_here
         here, value_here = there, value_there

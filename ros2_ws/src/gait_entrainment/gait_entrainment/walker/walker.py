@@ -21,15 +21,7 @@ from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.walker.model import Floats, Stamps, make_model, start_apex
 from gait_entrainment.walker.promise import PromisedTorque
 from gait_entrainment.walker.sampling import SAMPLE, Samples, fill_samples, samples_from
-from gait_entrainment.walker.segment import (
-    FALL,
-    HEEL_STRIKE,
-    SEGMENT,
-    TOE_OFF,
-    Log,
-    Stance,
-    leg_sine_at,
-)
+from gait_entrainment.walker.segment import SEGMENT, Log, Stance, Switch, leg_sine_at
 from gait_entrainment.walker.trajectory import ENDED, SWITCHED, Torques, advance, start_walking
 from gait_entrainment.walker.transitions import clock, seconds
 
@@ -173,7 +165,8 @@ class Walker:
             self.time_reached = self.ending.stamp
         fresh = self._log[self._announced : self._count]
         self._announced = self._count
-        return [_transition(row) for row in fresh if row["began"] in (HEEL_STRIKE, TOE_OFF)]
+        events = (Switch.HEEL_STRIKE, Switch.TOE_OFF)
+        return [_transition(row) for row in fresh if row["began"] in events]
 
     def sample(self, times_ns: Stamps) -> Samples:
         """
@@ -212,7 +205,7 @@ class Walker:
         stamp, rest = clock(last["stamp"], last["rest"], last["duration"])
         sine = leg_sine_at(self._model, last["stance"], last["end"])
         return Ending(
-            kind=EndingKind.FALL if last["ends"] == FALL else EndingKind.FLY_OFF,
+            kind=EndingKind.FALL if last["ends"] == Switch.FALL else EndingKind.FLY_OFF,
             stance=Stance(last["stance"]),
             side=Side(last["leading"]),
             step=int(last["step"]),
@@ -225,7 +218,7 @@ class Walker:
 
 def _transition(segment: Any) -> Transition:
     """Event that began a segment. A heel strike closes the step before the one in progress."""
-    struck = segment["began"] == HEEL_STRIKE
+    struck = segment["began"] == Switch.HEEL_STRIKE
     leading, step = Side(segment["leading"]), int(segment["step"])
     return Transition(
         time=seconds(segment["stamp"], segment["rest"]),

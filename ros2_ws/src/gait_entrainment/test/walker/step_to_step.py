@@ -12,16 +12,7 @@ from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.walker.compiled import compiled
 from gait_entrainment.walker.location import position_at
 from gait_entrainment.walker.model import Floats, Model, make_model
-from gait_entrainment.walker.segment import (
-    DOUBLE_STANCE,
-    HEEL_STRIKE,
-    SEGMENT,
-    TOE_OFF,
-    UNLOADING,
-    WORK_SIZE,
-    Log,
-    Segment,
-)
+from gait_entrainment.walker.segment import SEGMENT, WORK_SIZE, Log, Segment, Stance, Switch
 from gait_entrainment.walker.trajectory import start_walking
 from gait_entrainment.walker.transitions import (
     change_torque,
@@ -70,10 +61,10 @@ def map_steps(model: Model, log: Log, rows: Floats, result: Floats) -> None:
     segment = log[0]
     for i in range(rows.shape[1]):
         rate = rows[0, i] / model.leg_length
-        start_walking(model, segment, 1, rate * rate - model.strike_gain)
+        start_walking(model, segment, 1, rate * rate - model.start_gain)
         onset, torque = rows[1, i], rows[3, i]
         duration = one_step(model, work, segment, onset, onset + rows[2, i], torque)
-        square = segment.apex + model.strike_gain
+        square = segment.apex + model.start_gain
         result[0, i] = model.leg_length * np.sqrt(square) if duration > 0.0 else np.nan
         result[1, i] = duration
 
@@ -86,7 +77,7 @@ def one_step(
     elapsed = 0.0
     if onset <= 0.0 < end:
         enter_double_stance(model, segment, torque, work)
-    while segment.stance == DOUBLE_STANCE:
+    while segment.stance == Stance.DOUBLE:
         edge = onset if onset > elapsed else end
         if elapsed < edge < elapsed + segment.duration:
             position = position_at(model, work, segment, edge - elapsed)
@@ -94,14 +85,14 @@ def one_step(
             change_torque(model, segment, position, torque if edge == onset else 0.0, work)
             continue
         elapsed += segment.duration
-        if segment.ends == TOE_OFF:
+        if segment.ends == Switch.TOE_OFF:
             leave_double_stance(model, segment, work)
-        elif segment.ends == UNLOADING:
+        elif segment.ends == Switch.UNLOADING:
             unload(model, segment, work)
         else:
             return np.nan
     elapsed += segment.duration
-    if segment.ends != HEEL_STRIKE:
+    if segment.ends != Switch.HEEL_STRIKE:
         return np.nan
     collide(model, segment, 0.0, work)
     return elapsed

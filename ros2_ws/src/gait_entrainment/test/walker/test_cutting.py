@@ -6,12 +6,12 @@
 from itertools import pairwise
 
 import numpy as np
-from driving import SECOND, TABLE_1, promise, pulse_trains
+from driving import SECOND, TABLE_1, promise, pulse_trains, toe_offs, walked
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gait_entrainment.conventions import Side, nanoseconds
-from gait_entrainment.walker import Pulses, Walker, walk
+from gait_entrainment.walker import Walker
 
 RUN = 6 * SECOND
 SETTINGS = settings(derandomize=True, deadline=None, max_examples=40)
@@ -105,26 +105,11 @@ def test_equal_neighbours_are_merged(right):
     assert walker.advance(RUN) == events
 
 
-@SETTINGS
-@given(period=st.floats(1.6, 2.2), torque=st.floats(-15, 30), onset=st.integers(0, 2 * SECOND))
-def test_the_batch_walk_gives_the_bits_of_the_walker(period, torque, onset):
-    onsets = onset + np.array([nanoseconds(n * period) for n in range(4)])
-    events = walk(TABLE_1, 6, Pulses(onsets, SECOND // 10, torque))
-    walker = Walker(TABLE_1)
-    train = [(int(t), int(t) + SECOND // 10, torque) for t in onsets]
-    promise(walker, ((), train), 10 * SECOND)
-    expected = walker.advance(10 * SECOND)
-    strikes = [event.time for event in expected if event.kind == 0][:7]
-    assert np.array_equal(events.heel_strikes, strikes[: events.heel_strikes.size])
-    offs = [event.time for event in expected if event.kind == 1][:6]
-    assert np.array_equal(events.toe_offs, offs[: events.toe_offs.size])
-
-
 def test_events_are_told_once_and_by_their_stamps():
     walker = Walker(TABLE_1)
     first = walker.advance(0)
     assert [(e.kind, e.step, e.stamp, e.side) for e in first] == [(0, 0, 0, Side.RIGHT)]
-    toe_off = walk(TABLE_1, 1).toe_offs[0]
+    toe_off = toe_offs(walked()[1])[0]
     stamp = nanoseconds(toe_off)
     assert walker.advance(stamp - 1) == []
     (event,) = walker.advance(stamp)

@@ -14,10 +14,10 @@ from step_to_step import step_to_step
 
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment.walker import EndingKind, Stance, Walker, segment, walk
+from gait_entrainment.walker import EndingKind, Stance, Walker, segment
 
-PERIOD = float(walk(TABLE_1, 1).heel_strikes[1])
-TOE_OFF = float(walk(TABLE_1, 1).toe_offs[0])
+PERIOD = float(heel_strikes(walked()[1])[1])
+TOE_OFF = float(toe_offs(walked()[1])[0])
 MILLISECOND = SECOND // 1000
 
 
@@ -319,7 +319,7 @@ def test_a_start_at_almost_no_speed_takes_few_panels(monkeypatch, torque):
     walker.extend_torque(Side.LEFT, [0], [torque], 10 * SECOND)
     walker.advance(SECOND // 10)
     last = walker._log[walker._count - 1]
-    assert (last["ends"] == segment.FALL) == (torque < 0)
+    assert (last["ends"] == segment.Switch.FALL) == (torque < 0)
     # The loop as it is written, not compiled, so that its panels can be counted.
     fields = SimpleNamespace(**{name: last[name] for name in last.dtype.names})
     calls = []

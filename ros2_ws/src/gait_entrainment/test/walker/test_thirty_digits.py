@@ -3,14 +3,22 @@
 
 """Event times to 1e-13 s, against 32-digit integration."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
-from driving import SECOND, TABLE_1
+from driving import SECOND, TABLE_1, heel_strikes, toe_offs, walked
 from thirty_digits import Reference, mpf
 
-from gait_entrainment.walker import Pulses, walk
-
 TOLERANCE = 1e-13
+
+
+def walk(steps, onsets=(), width=0, torque=0.0):
+    pulses = [(int(onset), int(onset) + width, torque) for onset in onsets]
+    _, events = walked(((), pulses), seconds=2.0 * steps)
+    return SimpleNamespace(
+        heel_strikes=heel_strikes(events)[: steps + 1], toe_offs=toe_offs(events)[:steps]
+    )
 
 
 def edges_of(events, onsets, width, torque):
@@ -37,7 +45,7 @@ def worst(events, reference):
 
 
 def test_unperturbed_run_as_long_as_the_default_protocol():
-    events = walk(TABLE_1, 160)
+    events = walk(160)
     assert worst(events, Reference().walk(160, {})) < TOLERANCE
 
 
@@ -48,7 +56,7 @@ def test_pulses_that_lock_and_pulses_that_drift_through_double_stance(period, to
     """Drifting pulses also begin before heel strike and end after toe-off."""
     onsets = np.array([int(1.15e9) + round(n * period * SECOND) for n in range(20)])
     width = SECOND // 10
-    events = walk(TABLE_1, 24, Pulses(onsets, width, torque))
+    events = walk(24, onsets, width, torque)
     edges = edges_of(events, onsets, width, torque)
     assert edges
     assert worst(events, Reference().walk(24, edges)) < TOLERANCE

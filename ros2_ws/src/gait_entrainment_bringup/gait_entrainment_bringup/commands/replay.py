@@ -77,7 +77,8 @@ def replay(options: argparse.Namespace, domain: int) -> dict[str, list[bytes]]:
             if node in given:
                 supervisor.start(node, arguments)
         recorded = options.out is not None
-        with ReplayClient(supervisor, namespace, recorded=recorded) as client:
+        client = ReplayClient(supervisor, namespace, recorded=recorded)
+        with client:
             client.play(quiet=options.json)
         if recorded:
             supervisor.wait_for_record()

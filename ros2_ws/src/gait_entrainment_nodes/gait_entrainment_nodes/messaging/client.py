@@ -130,7 +130,7 @@ class Client:
         rclpy.try_shutdown(context=self._context)
 
     def subscribe(
-        self, topic: Topic, callback: Callable[[Any], object], *, raw: bool = False
+        self, topic: Topic, callback: Callable[[Any], None], *, raw: bool = False
     ) -> None:
         """Hear a topic; ``raw`` gives the callback serialized messages."""
         self.node.create_subscription(topic.type, topic.name, callback, topic.qos, raw=raw)

@@ -8,17 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from gait_entrainment.drawing import (
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PINK,
-    SKY,
-    YELLOW,
-    new_figure,
-    save_figure,
-)
+from gait_entrainment import drawing
+from gait_entrainment.drawing import BLUE, GREEN, GREY, ORANGE, PINK, SKY, YELLOW
 from gait_entrainment_studies.cohort.study import Study, verdicts
 
 _COLOURS = {
@@ -34,20 +25,16 @@ _COLOURS = {
 
 def draw_cohort(study: Study, folder: Path) -> list[Path]:
     """Draw the share of each verdict, and each subject's basin without noise."""
-    figure, (left, right) = new_figure(1, 2, size=(9.6, 4.0))
+    figure, (left, right) = drawing.new_figure(1, 2, size=(9.6, 4.0))
     _draw_verdicts(study, left)
-    drawn = [left]
     if study.basins.size:
         _draw_basins(study, right)
-        drawn.append(right)
     else:
         right.set_axis_off()
-    for axes in drawn:
+    for axes in (left, right):
         axes.locator_params(axis="y", integer=True)
-        axes.legend(
-            frameon=False, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=4
-        )
-    return save_figure(figure, folder, "cohort")
+        drawing.add_legend(axes, loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=4)
+    return drawing.save_figure(figure, folder, "cohort")
 
 
 def _draw_verdicts(study: Study, axes: Any) -> None:

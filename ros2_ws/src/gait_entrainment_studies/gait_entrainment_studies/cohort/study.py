@@ -6,31 +6,34 @@ The human study's experiment on each simulated subject.
 
 Fed in: the distributions of the subjects, their variability, and 10 N m for 0.1 s. Predicted: who
 entrains, where in the gait cycle, and how the basin depends on the subject. The spread of the
-basin is mostly fed in, for the basin follows from torque over body size and peak torque.
+basin is mostly fed in, because it follows from torque over body size and peak torque.
 """
 
+import math
 from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
 
 from gait_entrainment.conventions import EventKind, Side, nanoseconds
+from gait_entrainment.errors import UsageError
 from gait_entrainment.gait import GaitEvent, Verdict, analyze
-from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment_studies.cohort.subjects import Subjects
-from gait_entrainment_studies.locking import PulsedGait, locked_gaits, pieces_of, stable_intervals
-from gait_entrainment_studies.locking.pulsed_gait import Floats
-from gait_entrainment_studies.variability import (
+from gait_entrainment.settings import check_settings, setting
+from gait_entrainment_studies.cohort.population import (
     Population,
     PopulationWalk,
-    PopulationWalker,
     PulseTrains,
     locked_runs,
     noise_for,
+    step_noise,
 )
+from gait_entrainment_studies.cohort.subjects import Subjects
+from gait_entrainment_studies.locking.branches import basin_of, locked_gaits, pieces_of
+from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
+from gait_entrainment_studies.locking.roots import Floats
 
-# Streams of noise beside that which draws the subjects. A trial's goes by its pulse period: it is
-# the same trial, whatever other periods are asked for.
+# Streams of noise beside the one that draws the subjects. That of a trial depends on its pulse
+# period alone: it is the same trial, whatever other periods are asked for.
 _PILOT, _TRIAL = 1, 2
 
 # A pulse within this fraction of the stride of the noise-free lock counts as locked.
@@ -41,18 +44,24 @@ _LOCKED_WITHIN = 0.05
 class StudyPlan:
     """The experiment, the same for every subject."""
 
-    torque: float = 10.0
-    width: float = 0.1
+    torque: float = setting(10.0, "height of the pulses", "N m")
+    width: float = setting(0.1, "duration of a pulse", "s")
     period_offsets: tuple[float, ...] = (-0.05,)
     """Pulse periods off each subject's measured stride period [s]."""
     baseline: int = 15
-    pulses: int = 50
+    pulses: int = setting(50, "pulses in a trial", within=(1, math.inf))
     washout: int = 15
-    initial_phase: float = 0.0
-    seed: int = 0
-    hurst: float = 0.75
-    slope: float = 0.0
-    asymmetry: float = 0.0
+    initial_phase: float = setting(
+        0.0, "first pulse, as a fraction of a stride", within=(0, 1), most_excluded=True
+    )
+    seed: int = setting(0, "seed of subjects and noise", within=(0, math.inf))
+    hurst: float = setting(0.75, "correlation of the noise: 0.5 white, to below 1")
+    slope: float = setting(0.0, "rise of the ground, uphill positive", "rad")
+    asymmetry: float = setting(0.0, "excess of the perturbed leg's stiffness, -1 to 1")
+
+    def __post_init__(self) -> None:
+        """Check the settings; raises SettingError."""
+        check_settings(self)
 
     @property
     def solvable(self) -> bool:
@@ -68,12 +77,12 @@ class Trial:
     period_offset: float
     measured_period: float
     verdict: str
-    """That of definitions.md, or that the walker fell or flew off."""
-    fraction_locked: float
-    """Of the strides under pulses; NaN where the walker has no lock at that period."""
-    mean_run: float
+    """That of docs/analysis.md, or that the walker fell or flew off."""
+    fraction_locked: float = math.nan
+    """Of the strides under pulses; NaN if the walker has no lock at that period."""
+    mean_run: float = math.nan
     """Mean length [strides] of the runs of locked strides."""
-    median_lag: float
+    median_lag: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -84,7 +93,7 @@ class Study:
     basins: Floats
     """
     (n, 2) shortest and longest pulse period with a stable lock, solved without noise, off the
-    unperturbed stride period in percent of it; (0, 2) where the plan is not solvable.
+    unperturbed stride period in percent of it; (0, 2) if the plan is not solvable.
     """
 
     @property
@@ -98,71 +107,55 @@ def run_study(subjects: Subjects, plan: StudyPlan) -> Study:
     """
     Run the experiment on each subject at each pulse period, with noise of its own.
 
-    Raises ValueError where the plan cannot be conducted.
+    Raises UsageError if the plan cannot be conducted.
     """
-    if not np.isfinite(plan.torque):
-        raise ValueError(f"torque {plan.torque} N m is not a finite number")
-    count = len(subjects.walkers)
-    population = Population(subjects.walkers, plan.slope)
-    noise = noise_for(population, subjects.variation, (plan.seed, _PILOT), plan.hurst)
+    population = Population(subjects.walkers, plan.slope, plan.asymmetry)
+    noise = noise_for(
+        Population(subjects.walkers, plan.slope),
+        subjects.variation,
+        (plan.seed, _PILOT),
+        plan.hurst,
+    )
     gaits = [PulsedGait(walker, plan.torque, plan.width) for walker in subjects.walkers]
     pieces = [pieces_of(gait) for gait in gaits]
-    if not 0 <= plan.initial_phase < 1:
-        raise ValueError(
-            f"initial_phase {plan.initial_phase:g} is out of range; allowed: 0 to below 1"
-        )
     # Half the stride is room enough for any stride that noise makes; less the pulse, so that no
-    # two of them reach into one double stance.
+    # two pulses reach into one double stance.
     shortest = min(gait.unperturbed_period for gait in gaits) / 2 - plan.width
-    for offset in plan.period_offsets:
-        if not abs(offset) < shortest:
-            raise ValueError(
-                f"period_offset {offset:g} s is out of range; allowed: within {shortest:.3g} s"
-            )
     trials: list[Trial] = []
     for offset in plan.period_offsets:
-        walker = PopulationWalker(
-            population,
-            2 * (plan.baseline + plan.pulses + plan.washout) + 2,
-            (plan.seed, _TRIAL, nanoseconds(offset) % 2**64),
-            noise,
-            plan.hurst,
-            plan.asymmetry,
-        )
-        walk, trains = _conduct(walker, plan, offset, count)
-        for subject in range(count):
-            lock = float("nan")
+        if not abs(offset) < shortest:
+            raise UsageError(f"period_offset: {offset:g} s; allowed: within {shortest:.3g} s")
+        walk, trains = _conduct(population, noise, plan, offset)
+        for subject, gait in enumerate(gaits):
+            lock = math.nan
             if plan.solvable:
-                period = gaits[subject].unperturbed_period + offset
-                locks = locked_gaits(gaits[subject], period, pieces[subject])
+                locks = locked_gaits(gait, gait.unperturbed_period + offset, pieces[subject])
                 lock = next((one.lag for one in reversed(locks) if one.stable), lock)
             trials.append(_trial(walk, trains, subject, offset, lock))
     basins = []
     for gait, branches in zip(gaits, pieces, strict=True) if plan.solvable else ():
-        stable = stable_intervals(branches)
-        ends = [(p.least_period.period, p.greatest_period.period) for p in stable]
         base = gait.unperturbed_period
-        low = min((end[0] for end in ends), default=base) / base - 1
-        high = max((end[1] for end in ends), default=base) / base - 1
-        basins.append((100 * low, 100 * high))
+        basins.append([100 * (end / base - 1) for end in basin_of(gait, branches)])
     return Study(tuple(trials), np.reshape(basins, (-1, 2)))
 
 
 def _conduct(
-    walker: PopulationWalker, plan: StudyPlan, offset: float, count: int
+    population: Population, noise: Floats, plan: StudyPlan, offset: float
 ) -> tuple[PopulationWalk, PulseTrains]:
-    """Walk the baseline, plan the pulses from it as `definitions.md` says, walk the rest."""
-    baseline = walker.walk(2 * (plan.baseline - 1))
+    """Walk the baseline, plan the pulses from it as a protocol does, walk all of it with them."""
+    steps = 2 * (plan.baseline + plan.pulses + plan.washout)
+    seed = (plan.seed, _TRIAL, nanoseconds(offset) % 2**64)
+    noise = noise * step_noise(seed, steps + 2, population.size, plan.hurst)
+    baseline = population.walk(noise[: 2 * (plan.baseline - 1)])
     measured = baseline.stride_periods.mean(axis=0)
     trains = PulseTrains(
         first_onset=baseline.heel_strikes[-1] + (1 + plan.initial_phase) * measured,
         period=measured + offset,
         count=plan.pulses,
-        torque=np.full(count, plan.torque),
+        torque=np.full(population.size, plan.torque),
         width=plan.width,
     )
-    steps = 2 * (plan.baseline + plan.pulses + plan.washout)
-    return walker.walk(steps, trains), trains
+    return population.walk(noise[:steps], trains), trains
 
 
 def _trial(
@@ -171,39 +164,33 @@ def _trial(
     period = float(trains.period[subject])
     measured = period - offset
     if walk.fell[subject] or walk.flew_off[subject]:
-        verdict = "fell" if walk.fell[subject] else "flew off"
-        nan = float("nan")
-        return Trial(subject, offset, measured, verdict, nan, nan, nan)
-    strikes = walk.heel_strikes[:, subject]
+        return Trial(subject, offset, measured, "fell" if walk.fell[subject] else "flew off")
     onsets = trains.first_onset[subject] + np.arange(trains.count) * period
-    events = _events(strikes, walk.toe_offs[:, subject])
+    events = _events(walk.heel_strikes[:, subject], walk.toe_offs[:, subject])
     analysis = analyze(events, [nanoseconds(float(t)) for t in onsets], Side.RIGHT)
     last = analysis.entrainments[-1].verdict if analysis.entrainments else Verdict.UNDECIDED
     lags = np.array([pulse.phase_lag for pulse in analysis.pulses])
-    fraction, runs = float("nan"), list[int]()
+    fraction, runs = math.nan, list[int]()
     if np.isfinite(lock):
         fraction, runs = locked_runs(lags, lock, _LOCKED_WITHIN * measured)
-    mean_run = float(np.mean(runs)) if runs else float("nan")
     return Trial(
         subject,
         offset,
         measured,
         last.name.lower(),
         fraction,
-        mean_run,
-        float(np.median(lags[-20:])) if lags.size else float("nan"),
+        float(np.mean(runs)) if runs else math.nan,
+        float(np.median(lags[-20:])) if lags.size else math.nan,
     )
 
 
 def _events(strikes: Floats, toe_offs: Floats) -> list[GaitEvent]:
     """Events of a walk whose heel strike 0 is the right, perturbed leg's."""
-    sides = (Side.RIGHT, Side.LEFT)
     events = [GaitEvent(0, EventKind.HEEL_STRIKE, Side.RIGHT, 0)]
-    for step in range(toe_offs.size):
-        side = sides[(step + 1) % 2]
-        off, strike = nanoseconds(float(toe_offs[step])), nanoseconds(float(strikes[step + 1]))
-        events.append(GaitEvent(off, EventKind.TOE_OFF, side, step + 1))
-        events.append(GaitEvent(strike, EventKind.HEEL_STRIKE, side, step + 1))
+    for step, (off, strike) in enumerate(zip(toe_offs, strikes[1:], strict=True), start=1):
+        side = Side.LEFT if step % 2 else Side.RIGHT
+        events.append(GaitEvent(nanoseconds(float(off)), EventKind.TOE_OFF, side, step))
+        events.append(GaitEvent(nanoseconds(float(strike)), EventKind.HEEL_STRIKE, side, step))
     return events
 
 
@@ -213,16 +200,10 @@ def verdicts(study: Study, offset: float) -> dict[str, int]:
 
 
 def measured_basin_percent(study: Study) -> Floats:
-    """Each subject's longest way off its own period at which it was found entrained [%]."""
-    widest: dict[int, float] = {}
+    """Each subject's furthest period off its own at which it was found entrained [%]."""
+    widest = np.zeros(1 + max(trial.subject for trial in study.trials))
     for trial in study.trials:
-        reached = abs(trial.period_offset) / trial.measured_period
-        entrained = trial.verdict == "entrained"
-        widest[trial.subject] = max(widest.get(trial.subject, 0.0), reached if entrained else 0.0)
-    percent: Floats = 100 * np.array([widest[subject] for subject in sorted(widest)])
-    return percent
-
-
-def table_1_subjects(count: int, variation: float) -> Subjects:
-    """Return subjects that are all the walker of Table 1: what noise alone does."""
-    return Subjects((WalkerParameters(),) * count, np.full(count, variation), 0)
+        if trial.verdict == "entrained":
+            reached = abs(trial.period_offset) / trial.measured_period
+            widest[trial.subject] = max(widest[trial.subject], reached)
+    return 100 * widest

@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from gait_entrainment.errors import UsageError
 from gait_entrainment.parameters import ParameterError, WalkerParameters
-from gait_entrainment_studies.locking.pulsed_gait import Floats
+from gait_entrainment_studies.locking.roots import Floats
 
 
-def _pair(mean: float, deviation: float, meaning: str, unit: str) -> Any:
-    return field(default=(mean, deviation), metadata={"meaning": meaning, "unit": unit})
+def _normal(mean: float, deviation: float, meaning: str) -> Any:
+    return field(default=(mean, deviation), metadata={"meaning": meaning})
 
 
 @dataclass(frozen=True)
@@ -23,33 +24,33 @@ class SubjectDistributions:
 
     Assumptions of ours, for adults in general: the human study's own are not known here.
 
-    Raises ValueError for a mean or deviation out of range.
+    Raises UsageError for a mean or deviation out of range.
     """
 
-    leg_length: tuple[float, float] = _pair(0.92, 0.05, "leg length", "m")
-    mass: tuple[float, float] = _pair(75.0, 12.0, "mass", "kg")
-    peak_torque: tuple[float, float] = _pair(
-        0.17, 0.01, "peak ankle torque over body weight x leg length", "1"
+    leg_length: tuple[float, float] = _normal(0.92, 0.05, "leg length [m]")
+    mass: tuple[float, float] = _normal(75.0, 12.0, "mass [kg]")
+    peak_torque: tuple[float, float] = _normal(
+        0.17, 0.01, "peak ankle torque over body weight x leg length"
     )
-    variation: tuple[float, float] = _pair(
-        0.02, 0.005, "coefficient of variation of the stride period", "1"
+    variation: tuple[float, float] = _normal(
+        0.02, 0.005, "coefficient of variation of the stride period"
     )
 
     def __post_init__(self) -> None:
-        """Hold each distribution against its range."""
+        """Check each distribution."""
         for item in fields(self):
             mean, deviation = getattr(self, item.name)
-            # Two deviations off it must still be positive.
+            # Two deviations below the mean must still be positive.
             if not (mean > 2 * deviation >= 0 and mean < np.inf):
-                raise ValueError(
-                    f"{item.name} {mean:g} +/- {deviation:g} [{item.metadata['unit']}] is out of"
-                    " range; allowed: a mean above twice the deviation, none negative"
+                raise UsageError(
+                    f"{item.name}: {mean:g} +/- {deviation:g}; allowed: a mean above twice the"
+                    " deviation, none negative"
                 )
 
 
 @dataclass(frozen=True)
 class Subjects:
-    """The subjects drawn, and how many draws had no gait and were drawn again."""
+    """The subjects drawn, and how many were drawn again because they had no gait."""
 
     walkers: tuple[WalkerParameters, ...]
     variation: Floats
@@ -58,36 +59,33 @@ class Subjects:
 
 def draw_subjects(distributions: SubjectDistributions, count: int, seed: int) -> Subjects:
     """Draw subjects; feet are 0.2 leg lengths and angles those of Table 1, as in the paper."""
-    generator = np.random.default_rng(seed)
+    generator, names = np.random.default_rng(seed), [item.name for item in fields(distributions)]
     table_1 = WalkerParameters()
     turn = table_1.max_plantarflexion - table_1.double_stance_start
     walkers: list[WalkerParameters] = []
-    variation: list[float] = []
+    variations: list[float] = []
     redrawn = 0
     while len(walkers) < count:
-        values = {
-            item.name: _truncated(generator, *getattr(distributions, item.name))
-            for item in fields(distributions)
-        }
-        length, mass = values["leg_length"], values["mass"]
-        torque = values["peak_torque"] * mass * table_1.gravity * length
+        length, mass, peak, variation = (
+            _truncated(generator, *getattr(distributions, name)) for name in names
+        )
         try:
             walker = WalkerParameters(
                 mass=mass,
                 leg_length=length,
                 foot_length=0.2 * length,
-                ankle_stiffness=torque / turn,
+                ankle_stiffness=peak * mass * table_1.gravity * length / turn,
             )
         except ParameterError:
             redrawn += 1
             if redrawn > 20 * count:
-                raise ValueError(
+                raise UsageError(
                     "peak_torque: hardly a subject drawn has a gait; allowed: about 0.14 to 0.21"
                 ) from None
             continue
         walkers.append(walker)
-        variation.append(values["variation"])
-    return Subjects(tuple(walkers), np.array(variation), redrawn)
+        variations.append(variation)
+    return Subjects(tuple(walkers), np.array(variations), redrawn)
 
 
 def _truncated(generator: np.random.Generator, mean: float, deviation: float) -> float:

@@ -5,21 +5,31 @@
 
 import argparse
 import csv
-import json
-import sys
+from collections.abc import Iterable
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from gait_entrainment_studies.commands.pulse_options import check_at_least
+import numpy as np
+from scipy.stats import binomtest
 
-if TYPE_CHECKING:
-    from gait_entrainment_studies.cohort import Study, StudyPlan, Subjects
+from gait_entrainment.settings import Setting
+from gait_entrainment_studies.cohort.figures import draw_cohort
+from gait_entrainment_studies.cohort.study import (
+    Study,
+    StudyPlan,
+    measured_basin_percent,
+    run_study,
+    verdicts,
+)
+from gait_entrainment_studies.cohort.subjects import SubjectDistributions, Subjects, draw_subjects
+from gait_entrainment_studies.commands import question
+from gait_entrainment_studies.locking.roots import Floats
 
 DESCRIPTION = (
     "Draw subjects, give each its own stride-to-stride variability, conduct the experiment on "
     "each at several pulse periods relative to its measured stride period, and judge each "
-    "trial as a real one. Off the paper: an extension."
+    "trial as a real one. Not in the paper: an extension."
 )
 EXAMPLES = """examples:
   entrain cohort --out cohort               19 subjects, nine pulse periods
@@ -27,121 +37,75 @@ EXAMPLES = """examples:
   entrain cohort --slope -0.02 --period-offset -0.05
 """
 
-_OFFSETS = (-0.12, -0.10, -0.08, -0.06, -0.05, -0.04, -0.02, 0.02, 0.05)
+_SUBJECTS = Setting("number of subjects", int, least=2)
+_PERIOD_OFFSET = Setting("pulse period minus measured stride period", unit="s")
+_OFFSETS = ("-0.12", "-0.1", "-0.08", "-0.06", "-0.05", "-0.04", "-0.02", "0.02", "0.05")
 _HEADLINE = -0.05
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    numbers = parser.add_argument_group("experiment")
-    for option, kind, default, text in (
-        ("--subjects", int, 19, "number of subjects"),
-        ("--seed", int, 0, "seed of subjects and noise"),
-        ("--torque", float, 10.0, "height of the pulses [N m]"),
-        ("--width", float, 0.1, "duration of a pulse [s]"),
-        ("--pulses", int, 50, "pulses in a trial"),
-        ("--initial-phase", float, 0.0, "first pulse, as a fraction of a stride"),
-        ("--hurst", float, 0.75, "correlation of the noise: 0.5 white, to below 1"),
-        ("--slope", float, 0.0, "rise of the ground [rad], uphill positive"),
-        ("--asymmetry", float, 0.0, "excess of the perturbed leg's stiffness, -1 to 1"),
-    ):
-        numbers.add_argument(
-            option,
-            type=kind,
-            default=default,
-            metavar=kind.__name__.upper(),
-            help=f"{text}; default {default}",
-        )
-    numbers.add_argument(
-        "--period-offset",
-        type=float,
-        action="append",
-        metavar="FLOAT",
-        help="pulse period minus measured stride period [s], may be given again; default "
-        + " ".join(map(str, _OFFSETS)),
-    )
+    experiment = parser.add_argument_group("experiment")
+    question.add_setting(experiment, "subjects", _SUBJECTS, "19")
+    question.add_settings(experiment, StudyPlan)
+    shown = f"{' '.join(_OFFSETS)}; may be given again"
+    told = _PERIOD_OFFSET
+    question.add_setting(experiment, "period_offset", told, shown=shown, action="append")
     drawn = parser.add_argument_group("distributions of the subjects")
-    for name, text in (
-        ("leg-length", "leg length [m]; default 0.92 0.05"),
-        ("mass", "mass [kg]; default 75 12"),
-        ("peak-torque", "peak ankle torque over body weight x leg length; default 0.17 0.01"),
-        ("variation", "coefficient of variation of the stride period; default 0.02 0.005"),
-    ):
-        drawn.add_argument("--" + name, nargs=2, type=float, metavar=("MEAN", "SD"), help=text)
-    parser.add_argument("--out", type=Path, metavar="DIR", help="write figure and trials.csv")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    for item in fields(SubjectDistributions):
+        mean, deviation = getattr(SubjectDistributions, item.name)
+        drawn.add_argument(
+            "--" + item.name.replace("_", "-"),
+            nargs=2,
+            type=float,
+            default=(mean, deviation),
+            metavar=("MEAN", "SD"),
+            help=f"{item.metadata['meaning']}; default {mean:g} {deviation:g}",
+        )
+    question.add_output_options(parser, "write figure and trials.csv")
 
 
 def run(options: argparse.Namespace) -> int:
     """Draw, conduct, judge, print."""
-    from gait_entrainment_studies.cohort import (
-        StudyPlan,
-        SubjectDistributions,
-        draw_subjects,
-        run_study,
-    )
-
     names = [item.name for item in fields(SubjectDistributions)]
-    given = {name: tuple(value) for name in names if (value := getattr(options, name))}
-    try:
-        for name, least in (("subjects", 2), ("pulses", 1), ("seed", 0)):
-            check_at_least(name, getattr(options, name), least)
-        distributions = SubjectDistributions(**given)
-        subjects = draw_subjects(distributions, options.subjects, options.seed)
-        plan = StudyPlan(
-            torque=options.torque,
-            width=options.width,
-            period_offsets=tuple(dict.fromkeys(options.period_offset or _OFFSETS)),
-            pulses=options.pulses,
-            initial_phase=options.initial_phase,
-            seed=options.seed,
-            hurst=options.hurst,
-            slope=options.slope,
-            asymmetry=options.asymmetry,
-        )
-        study = run_study(subjects, plan)
-    except ValueError as error:
-        print(f"entrain cohort: {error}", file=sys.stderr)
-        return 2
-    outcome = _outcome(study, subjects, plan, asdict(distributions))
-    print(json.dumps(outcome) if options.json else _summary(outcome))
-    if options.out is not None:
-        from gait_entrainment_studies.cohort.figures import draw_cohort
+    distributions = SubjectDistributions(*(tuple(getattr(options, name)) for name in names))
+    texts = options.period_offset or _OFFSETS
+    offsets = [_PERIOD_OFFSET.parse("period_offset", text) for text in texts]
+    plan = question.chosen(options, StudyPlan, period_offsets=tuple(dict.fromkeys(offsets)))
+    count = _SUBJECTS.parse("subjects", options.subjects)
+    subjects = draw_subjects(distributions, count, plan.seed)
+    study = run_study(subjects, plan)
 
-        paths = draw_cohort(study, options.out)
-        paths.append(options.out / "trials.csv")
+    def write(folder: Path) -> list[Path]:
+        paths = [*draw_cohort(study, folder), folder / "trials.csv"]
         with open(paths[-1], "w", newline="") as file:
             writer = csv.DictWriter(file, list(asdict(study.trials[0])))
             writer.writeheader()
             writer.writerows(asdict(trial) for trial in study.trials)
-        for path in paths if not options.json else ():
-            print(f"written          {path}")
-    return 0
+        return paths
+
+    outcome = _outcome(study, subjects, plan, asdict(distributions))
+    return question.answer(options, outcome, _summary(outcome), write, "written          ")
 
 
 def _outcome(
-    study: "Study", subjects: "Subjects", plan: "StudyPlan", distributions: dict[str, Any]
+    study: Study, subjects: Subjects, plan: StudyPlan, distributions: dict[str, Any]
 ) -> dict[str, Any]:
-    import numpy as np
-
-    from gait_entrainment_studies.cohort import measured_basin_percent, verdicts
-
-    def mean(values: list[float]) -> float | None:
+    def mean(values: Iterable[float]) -> float | None:
         finite = [value for value in values if np.isfinite(value)]
         return float(np.mean(finite)) if finite else None
 
     periods = []
     for offset in plan.period_offsets:
         trials = [trial for trial in study.trials if trial.period_offset == offset]
+        entrained = (trial for trial in trials if trial.verdict == "entrained")
         periods.append(
             {
                 "period_offset": offset,
                 "verdicts": verdicts(study, offset),
-                "fraction_locked": mean([trial.fraction_locked for trial in trials]),
-                "mean_run": mean([trial.mean_run for trial in trials]),
-                "lag_of_entrained": mean(
-                    [trial.median_lag for trial in trials if trial.verdict == "entrained"]
-                ),
+                "fraction_locked": mean(trial.fraction_locked for trial in trials),
+                "mean_run": mean(trial.mean_run for trial in trials),
+                "lag_of_entrained": mean(trial.median_lag for trial in entrained),
             }
         )
     anywhere = {trial.subject for trial in study.trials if trial.verdict == "entrained"}
@@ -151,21 +115,21 @@ def _outcome(
         "redrawn_for_want_of_a_gait": subjects.redrawn,
         "distributions": distributions,
         "plan": asdict(plan),
-        "mean_stride_period": mean([trial.measured_period for trial in study.trials]),
+        "mean_stride_period": mean(trial.measured_period for trial in study.trials),
         "periods": periods,
         "entrained_at_some_period": len(anywhere),
-        "basin_solved_percent": (
-            [float(solved.mean()), float(solved.std(ddof=1))] if solved.size else None
-        ),
+        "basin_solved_percent": _spread(solved) if solved.size else None,
         "basin_ends_percent": study.basins.mean(axis=0).tolist() if solved.size else None,
-        "basin_measured_percent": [float(measured.mean()), float(measured.std(ddof=1))],
+        "basin_measured_percent": _spread(measured),
     }
 
 
-def _of(found: int, count: int) -> str:
-    """Say how many, with the 95 % interval of the share by Wilson's score."""
-    from scipy.stats import binomtest
+def _spread(values: Floats) -> list[float]:
+    return [float(values.mean()), float(values.std(ddof=1))]
 
+
+def _of(found: int, count: int) -> str:
+    """Return how many, with the 95 % interval of the share by Wilson's score."""
     interval = binomtest(found, count).proportion_ci(method="wilson")
     low, high = 100 * interval.low, 100 * interval.high
     return f"{found} of {count}, 95 % interval {low:.0f} to {high:.0f} %"

@@ -4,59 +4,39 @@
 """entrain existence: for which stiffness and leg angle there is a gait."""
 
 import argparse
-import json
-import sys
 from dataclasses import asdict
-from pathlib import Path
 
-from gait_entrainment_studies.commands.pulse_options import (
-    add_walker_options,
-    check_at_least,
-    chosen_walker,
-)
+from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment.settings import Setting
+from gait_entrainment_studies.commands import question
+from gait_entrainment_studies.existence.figures import draw_existence
+from gait_entrainment_studies.existence.stiffness_range import existence_map, stiffness_range
 
 DESCRIPTION = "Range of stiffness between falling and flying off, along the leg angle."
 EXAMPLES = "examples:\n  entrain existence --out figures\n  entrain existence --json"
 
 
+_POINTS = Setting("leg angles", int, least=2)
+
+
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    parser.add_argument(
-        "--points", type=int, default=120, metavar="INT", help="leg angles; default 120"
-    )
-    add_walker_options(parser)
-    parser.add_argument("--out", type=Path, metavar="DIR", help="draw the map into a folder")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    question.add_setting(parser, "points", _POINTS, "120")
+    question.add_walker_options(parser)
+    question.add_output_options(parser, "draw the map into a folder")
 
 
 def run(options: argparse.Namespace) -> int:
     """Print the range of the walker, and the map in JSON."""
-    from gait_entrainment_studies.existence import existence_map, stiffness_range
-
-    try:
-        walker = chosen_walker(options)
-        own = stiffness_range(walker)
-        check_at_least("points", options.points, 2)
-        ranges = existence_map(walker, options.points)
-    except ValueError as error:
-        print(f"entrain existence: {error}", file=sys.stderr)
-        return 2
-    if options.json:
-        print(json.dumps({"walker": asdict(own), "map": [asdict(r) for r in ranges]}))
-    else:
-        print(f"leg angle        {own.leg_angle:.6f} rad")
-        print(f"just vaults over {own.just_vault_over:.6f} N m/rad, felt at: {own.falls_at.value}")
-        print(
-            f"just flies off   {own.just_fly_off:.6f} N m/rad, felt at: {own.flies_off_at.value}"
-        )
-        print(
-            f"map              {len(ranges)} leg angles with a linkage, "
-            f"{sum(r.exists for r in ranges)} with a gait"
-        )
-    if options.out is not None:
-        from gait_entrainment_studies.existence.figures import draw_existence
-
-        for path in draw_existence(ranges, walker, options.out):
-            if not options.json:
-                print(f"figure           {path}")
-    return 0
+    walker = question.chosen(options, WalkerParameters)
+    own = stiffness_range(walker)
+    ranges = existence_map(walker, _POINTS.parse("points", options.points))
+    text = (
+        f"leg angle        {own.leg_angle:.6f} rad\n"
+        f"just vaults over {own.just_vault_over:.6f} N m/rad, felt at: {own.falls_at.value}\n"
+        f"just flies off   {own.just_fly_off:.6f} N m/rad, felt at: {own.flies_off_at.value}\n"
+        f"map              {len(ranges)} leg angles with a linkage,"
+        f" {sum(r.exists for r in ranges)} with a gait"
+    )
+    outcome = {"walker": asdict(own), "map": [asdict(r) for r in ranges]}
+    return question.answer(options, outcome, text, lambda out: draw_existence(ranges, walker, out))

@@ -4,75 +4,47 @@
 """entrain lock: all phase-locked gaits under one kind of pulse, solved."""
 
 import argparse
-import json
-import sys
+from collections import Counter
 from dataclasses import asdict
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from gait_entrainment_studies.commands.pulse_options import (
-    add_pulse_options,
-    add_walker_options,
-    check_at_least,
-    check_period_offset,
-    chosen_torque,
-    chosen_walker,
-)
-
-if TYPE_CHECKING:
-    from gait_entrainment_studies.locking import Piece
+from gait_entrainment.settings import Setting
+from gait_entrainment_studies.commands import question
+from gait_entrainment_studies.locking.branches import Piece, locked_gaits, pieces_of
+from gait_entrainment_studies.locking.figures import draw_branches
+from gait_entrainment_studies.locking.walked import shares_of
 
 DESCRIPTION = (
-    "Solve for the 1:1 phase-locked gaits: borders of the pulse periods with a stable lock, "
-    "named as what they are, and the locked gaits at one period with their Floquet "
+    "Solve for the 1:1 phase-locked gaits: the borders of the pulse periods with a stable lock, "
+    "named for what they are, and the locked gaits at one period with their Floquet "
     "multipliers and the share of initial phases that each draws."
 )
 EXAMPLES = """examples:
   entrain lock                                  the paper's pulses at 2 tau_0 - 50 ms
-  entrain lock --period-offset -0.067           where two attractors coexist
+  entrain lock --period-offset -0.067           two attractors coexist
   entrain lock --torque-fraction -0.1 --period-offset 0.02 --out figures
 """
 
 
+_PHASES = Setting("initial phases walked from", int, least=1)
+
+
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    parser.add_argument(
-        "--period-offset",
-        type=float,
-        default=-0.05,
-        metavar="FLOAT",
-        help="pulse period minus the unperturbed stride period [s]; default -0.05",
-    )
-    parser.add_argument(
-        "--phases",
-        type=int,
-        default=32,
-        metavar="INT",
-        help="initial phases walked from; default 32",
-    )
-    add_pulse_options(parser)
-    add_walker_options(parser)
-    parser.add_argument("--out", type=Path, metavar="DIR", help="draw the branches into a folder")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    question.add_setting(parser, "period_offset", question.PERIOD_OFFSET, "-0.05")
+    question.add_setting(parser, "phases", _PHASES, "32")
+    question.add_gait_options(parser)
+    question.add_output_options(parser, "draw the branches into a folder")
 
 
 def run(options: argparse.Namespace) -> int:
     """Solve, walk, print."""
-    from gait_entrainment_studies.locking import PulsedGait, locked_gaits, pieces_of, shares_of
-
-    try:
-        walker = chosen_walker(options)
-        gait = PulsedGait(walker, chosen_torque(options, walker), options.width)
-        check_period_offset(options.period_offset, gait)
-        check_at_least("phases", options.phases, 1)
-    except ValueError as error:
-        print(f"entrain lock: {error}", file=sys.stderr)
-        return 2
-    period = gait.unperturbed_period + options.period_offset
+    gait = question.chosen_gait(options)
+    period = gait.unperturbed_period + question.chosen_offset(options.period_offset, gait)
+    phases = _PHASES.parse("phases", options.phases)
     pieces = pieces_of(gait)
     locks = locked_gaits(gait, period, pieces)
-    shares = shares_of(gait, period, locks, options.phases)
-    drawn = dict(zip(map(id, shares.locks), shares.drawn, strict=True))
+    shares = shares_of(gait, period, locks, phases)
     outcome = {
         "unperturbed_stride_period": gait.unperturbed_period,
         "pulse_period": period,
@@ -83,29 +55,22 @@ def run(options: argparse.Namespace) -> int:
             {
                 **asdict(lock),
                 "multipliers": [[m.real, m.imag] for m in lock.multipliers],
-                "share_of_initial_phases": drawn.get(id(lock)),
+                "share_of_initial_phases": shares.drawn.get(lock),
             }
             for lock in locks
         ],
-        "walked": {
-            str(kind.value): shares.outcomes.count(kind) for kind in dict.fromkeys(shares.outcomes)
-        },
+        "walked": {kind.value: count for kind, count in Counter(shares.outcomes).items()},
     }
-    if options.json:
-        print(json.dumps(outcome))
-    else:
-        print(_summary(outcome))
-    if options.out is not None:
-        from gait_entrainment_studies.locking.figures import draw_branches
-
-        for path in draw_branches(gait, pieces, locks, options.out):
-            if not options.json:
-                print(f"figure           {path}")
-    return 0
+    return question.answer(
+        options,
+        outcome,
+        _summary(outcome),
+        lambda folder: draw_branches(gait, pieces, locks, folder),
+    )
 
 
-def _branch(piece: "Piece") -> dict[str, Any]:
-    """Return a piece as JSON holds it: there is no number where there is no gait."""
+def _branch(piece: Piece) -> dict[str, Any]:
+    """Return a piece as JSON holds it: None for the numbers of a gait that does not exist."""
     ends = {
         name: {key: None if value != value else value for key, value in asdict(end).items()}
         for name, end in (("first", piece.first), ("last", piece.last))

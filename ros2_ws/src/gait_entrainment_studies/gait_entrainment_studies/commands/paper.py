@@ -4,13 +4,12 @@
 """entrain paper: every published number and figure beside ours."""
 
 import argparse
-import json
+from collections.abc import Sequence
 from dataclasses import asdict
-from pathlib import Path
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from gait_entrainment_studies.paper import Comparison
+from gait_entrainment_studies.commands import question
+from gait_entrainment_studies.paper.comparison import Comparison, compare, explain
+from gait_entrainment_studies.paper.figures import draw_figures
 
 DESCRIPTION = "Hold the model against Ahn and Hogan (2012), with the parameters of Table 1."
 EXAMPLES = """examples:
@@ -22,37 +21,24 @@ EXAMPLES = """examples:
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    parser.add_argument("--out", type=Path, metavar="DIR", help="draw the figures into a folder")
-    parser.add_argument("--json", action="store_true", help="print one JSON list")
+    question.add_output_options(parser, "draw the figures into a folder")
 
 
 def run(options: argparse.Namespace) -> int:
     """Print the comparison; a number that differs is a finding, not a failure."""
-    from gait_entrainment_studies.paper import compare, explain
-
     rows, explanations = compare(), explain()
-    paths = []
-    if options.out is not None:
-        from gait_entrainment_studies.paper.figures import draw_figures
-
-        options.out.mkdir(parents=True, exist_ok=True)
-        paths = draw_figures(options.out)
-    if options.json:
-        print(json.dumps([asdict(row) for row in [*rows, *explanations]]))
-    else:
-        print(table(rows))
-        stated = [row.agrees for row in rows if row.agrees is not None]
-        print(f"\n{sum(stated)} of {len(stated)} agree.")
-        print(
-            "\nExplanations tested: Table 1 with k, mu or both as they may have been unrounded\n"
-        )
-        print(table(explanations))
-        for path in paths:
-            print(f"figure           {path}")
-    return 0
+    stated = [row.agrees for row in rows if row.agrees is not None]
+    text = (
+        f"{_table(rows)}\n\n{sum(stated)} of {len(stated)} agree.\n\n"
+        "Explanations tested: Table 1 with k, mu or both as they may have been unrounded\n\n"
+        f"{_table(explanations)}"
+    )
+    return question.answer(
+        options, [asdict(row) for row in [*rows, *explanations]], text, draw_figures
+    )
 
 
-def table(rows: "list[Comparison]") -> str:
+def _table(rows: Sequence[Comparison]) -> str:
     """Return comparisons as a Markdown table."""
     lines = ["| what | paper | ours | unit | agrees | note |", "| --- " * 6 + "|"]
     for row in rows:

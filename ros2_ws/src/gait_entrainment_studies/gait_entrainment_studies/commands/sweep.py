@@ -4,26 +4,28 @@
 """entrain sweep: the Arnold tongue."""
 
 import argparse
-import json
 import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from gait_entrainment_studies.commands.pulse_options import (
-    PAPER_WIDTH,
-    add_walker_options,
-    chosen_walker,
-)
+import numpy as np
+from tqdm import tqdm
 
-if TYPE_CHECKING:
-    from gait_entrainment_studies.sweep import Axis
+from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment.settings import Setting
+from gait_entrainment_studies.commands import question
+from gait_entrainment_studies.sweep.engine import available_cores, rows_by_dask, rows_by_processes
+from gait_entrainment_studies.sweep.figures import draw_locked_lags, draw_tongue
+from gait_entrainment_studies.sweep.plan import Axis, SweepPlan
+from gait_entrainment_studies.sweep.row import exact_borders
+from gait_entrainment_studies.sweep.store import SweepStore, read_sweep
 
-# The exact borders are drawn at this many torques or more: a coarse sweep has smooth borders too.
+# The exact borders are drawn at this many torques or more: those of a coarse sweep are smooth too.
 _BORDER_TORQUES = 50
 
-_OUT = "folder of table and picture; what is there already is not walked again; default sweep"
+_OUT = "folder of table and figures; what is there already is not walked again; default sweep"
 DESCRIPTION = (
     "Two maps: whether a stable lock exists (solved), and the share of initial phases locked "
     "by the last stride (walked). Writes tongue.parquet and a picture."
@@ -36,102 +38,72 @@ EXAMPLES = """examples:
 """
 
 
+_JOBS = Setting("processes; default: all cores", int, least=1)
+_OFFSET = Setting("pulse period minus stride period", unit="s")
+_FRACTION = Setting("torque over the peak ankle torque", unit="1")
+_COUNT = Setting("number of values", int, least=1)
+
+
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    for option, default, text in (
-        ("--period-offsets", (-0.12, 0.02, 100), "pulse period minus stride period [s]"),
-        ("--torque-fractions", (0.005, 0.25, 50), "torque over the peak ankle torque"),
+    for name, told, *default in (
+        ("period_offsets", _OFFSET, "-0.12", "0.02", "100"),
+        ("torque_fractions", _FRACTION, "0.005", "0.25", "50"),
     ):
         parser.add_argument(
-            option,
+            "--" + name.replace("_", "-"),
             nargs=3,
-            type=float,
             default=default,
             metavar=("MIN", "MAX", "COUNT"),
-            help=f"{text}; default {' '.join(map(str, default))}",
+            help=f"{told.meaning} [{told.unit}]; default {' '.join(default)}",
         )
-    for option, count, text in (
-        ("--phases", 16, "initial phases walked from"),
-        ("--strides", 100, "strides of each walk"),
-    ):
-        parser.add_argument(
-            option, type=int, default=count, metavar="INT", help=f"{text}; default {count}"
-        )
-    parser.add_argument(
-        "--width",
-        type=float,
-        default=PAPER_WIDTH,
-        metavar="FLOAT",
-        help=f"duration of the pulse [s]; default {PAPER_WIDTH}",
-    )
-    add_walker_options(parser)
-    parser.add_argument("--out", type=Path, default=Path("sweep"), metavar="DIR", help=_OUT)
-    parser.add_argument("--jobs", type=int, metavar="INT", help="processes; default: all cores")
+    question.add_settings(parser, SweepPlan)
+    question.add_setting(parser, "jobs", _JOBS)
     parser.add_argument("--scheduler", metavar="ADDRESS", help="use a Dask cluster instead")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    question.add_walker_options(parser)
+    question.add_output_options(parser, _OUT, Path("sweep"))
 
 
 def run(options: argparse.Namespace) -> int:
     """Sweep what is missing, join, draw."""
-    from gait_entrainment.parameters import ParameterError
-    from gait_entrainment_studies.sweep import SweepError, SweepPlan, SweepStore
-
+    jobs = _JOBS.parse("jobs", options.jobs) if options.jobs else available_cores()
+    plan = question.chosen(
+        options,
+        SweepPlan,
+        walker=question.chosen(options, WalkerParameters),
+        period_offsets=_axis("period_offsets", _OFFSET, options.period_offsets),
+        torque_fractions=_axis("torque_fractions", _FRACTION, options.torque_fractions),
+    )
+    store = SweepStore(options.out, plan)
     try:
-        if options.jobs is not None and options.jobs < 1:
-            raise SweepError(f"jobs: {options.jobs}; allowed: at least 1")
-        plan = SweepPlan(
-            walker=chosen_walker(options),
-            period_offsets=_axis("period_offsets", options.period_offsets),
-            torque_fractions=_axis("torque_fractions", options.torque_fractions),
-            phases=options.phases,
-            strides=options.strides,
-            width=options.width,
-        )
-        store = SweepStore(options.out, plan)
-    except (ParameterError, SweepError) as error:
-        print(f"entrain sweep: {error}", file=sys.stderr)
-        return 2
-    try:
-        _fill(plan, store, options)
-    except SweepError as error:
-        print(f"entrain sweep: {error}", file=sys.stderr)
-        return 1
+        _fill(plan, store, jobs, options.scheduler)
     except KeyboardInterrupt:
-        done = plan.torque_fractions.count - len(store.missing())
+        count = plan.torque_fractions.count
         print(
-            f"entrain sweep: interrupted after {done} of {plan.torque_fractions.count} torques;"
+            f"entrain sweep: interrupted after {count - len(store.missing())} of {count} torques;"
             " the same command goes on",
             file=sys.stderr,
         )
         return 1
-    _report(plan, store, options)
-    return 0
+    return _report(plan, store, options)
 
 
-def _axis(name: str, values: Sequence[float]) -> "Axis":
-    from gait_entrainment_studies.sweep import Axis, SweepError
-
-    least, most, count = values
-    if not float(count).is_integer():
-        raise SweepError(f"{name}: {count:g} values; allowed: a whole number")
-    return Axis(least, most, int(count))
+def _axis(name: str, told: Setting, texts: Sequence[str]) -> Axis:
+    least, most = (told.parse(name, text) for text in texts[:2])
+    return Axis(least, most, _COUNT.parse(name, texts[2]))
 
 
-def _fill(plan: Any, store: Any, options: argparse.Namespace) -> None:
+def _fill(plan: SweepPlan, store: SweepStore, jobs: int, scheduler: str | None) -> None:
     """Make and write the rows that are missing."""
-    from tqdm import tqdm
-
-    from gait_entrainment_studies.sweep import available_cores, rows_by_dask, rows_by_processes
-
     missing = store.missing()
     if not missing:
         return
-    if options.scheduler:
-        rows = rows_by_dask(plan, missing, options.scheduler)
+    if scheduler:
+        rows = rows_by_dask(plan, missing, scheduler)
     else:
-        rows = rows_by_processes(plan, missing, options.jobs or available_cores())
+        rows = rows_by_processes(plan, missing, jobs)
     tqdm.monitor_interval = 0  # no thread: see rows_by_processes
-    walks = plan.walks // plan.torque_fractions.count
+    walks = plan.period_offsets.count * plan.phases
     total = plan.torque_fractions.count * walks
     with tqdm(total=total, initial=total - len(missing) * walks, unit="walk", disable=None) as bar:
         for index, row in rows:
@@ -139,24 +111,33 @@ def _fill(plan: Any, store: Any, options: argparse.Namespace) -> None:
             bar.update(walks)
 
 
-def _report(plan: Any, store: Any, options: argparse.Namespace) -> None:
-    import numpy as np
-
-    from gait_entrainment_studies.sweep import exact_borders, read_sweep
-    from gait_entrainment_studies.sweep.figures import draw_locked_lags, draw_tongue
-
+def _report(plan: SweepPlan, store: SweepStore, options: argparse.Namespace) -> int:
     table, _ = read_sweep(store.finish())
     torques = plan.torque_fractions
     fractions = np.linspace(torques.least, torques.most, max(torques.count, _BORDER_TORQUES))
     borders = exact_borders(plan.walker, fractions, plan.width)
-    paths = [store.table_path, *draw_tongue(plan, table, borders, options.out)]
-    paths += draw_locked_lags(plan, table, options.out)
-    columns = {name: np.asarray(table[name]) for name in table.column_names}
-    # Where walks were long enough to tell, both maps must agree.
+    counts = _counts(plan, {name: np.asarray(table[name]) for name in table.column_names})
+
+    def draw(folder: Path) -> list[Path]:
+        tongue = draw_tongue(plan, table, borders, folder)
+        return [store.table_path, *tongue, *draw_locked_lags(plan, table, folder)]
+
+    outcome = {re.sub(r"\W", "_", name): count for name, count in counts.items()}
+    return question.answer(
+        options,
+        {**outcome, "borders": [vars(one) for one in borders]},
+        "\n".join(f"{name:25} {count}" for name, count in counts.items()),
+        draw,
+        f"{'written':25} ",
+    )
+
+
+def _counts(plan: SweepPlan, columns: dict[str, Any]) -> dict[str, int]:
+    # If walks were long enough to tell, both maps must agree.
     asked = columns["problem"] == ""
-    told = (columns["share_censored"] == 0) & asked
-    told &= columns["share_alternating"] == 0
-    told &= columns["share_fell"] + columns["share_flew_off"] == 0
+    ended = columns["share_fell"] + columns["share_flew_off"]
+    told = asked & (columns["share_censored"] == 0) & (columns["share_alternating"] == 0)
+    told &= ended == 0
     agree = (columns["stable_locks"] > 0) == (columns["share_locked"] > 0)
     counts = {
         "cells": asked.size,
@@ -170,11 +151,4 @@ def _report(plan: Any, store: Any, options: argparse.Namespace) -> None:
         "cells with falls": (columns["share_fell"] > 0).sum(),
         "cells with flights": (columns["share_flew_off"] > 0).sum(),
     }
-    if options.json:
-        outcome = {re.sub(r"\W", "_", name): int(count) for name, count in counts.items()}
-        print(json.dumps({**outcome, "borders": [vars(one) for one in borders]}))
-        return
-    for name, count in counts.items():
-        print(f"{name:25} {count}")
-    for path in paths:
-        print(f"{'written':25} {path}")
+    return {name: int(count) for name, count in counts.items()}

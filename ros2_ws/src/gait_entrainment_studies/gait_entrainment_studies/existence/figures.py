@@ -1,14 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Where a period-one gait exists, as a picture."""
+"""For which stiffness and leg angle a period-one gait exists, as a picture."""
 
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from gait_entrainment.drawing import BLUE, GREY, ORANGE, SKY, new_figure, save_figure
+from gait_entrainment import drawing
+from gait_entrainment.drawing import BLUE, GREY, ORANGE, SKY
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment_studies.existence.stiffness_range import StiffnessRange
 
@@ -17,7 +18,7 @@ def draw_existence(
     ranges: Sequence[StiffnessRange], walker: WalkerParameters, folder: Path
 ) -> list[Path]:
     """Draw the range of stiffness along the leg angle, and where the walker lies in it."""
-    figure, axes = new_figure()
+    figure, axes = drawing.new_figure()
     angles = np.degrees([r.leg_angle for r in ranges])
     least = np.array([r.just_vault_over for r in ranges])
     most = np.array([r.just_fly_off for r in ranges])
@@ -33,5 +34,5 @@ def draw_existence(
     axes.plot([], [], color=GREY, ls=":", lw=0.8, label="another instant decides")
     axes.set(xlabel="leg angle at heel strike [deg]", ylabel="ankle stiffness [N m/rad]", ylim=0)
     axes.set_title("Where a period-one gait exists", fontsize=11)
-    axes.legend(frameon=False, loc="upper left", fontsize=8)
-    return save_figure(figure, folder, "existence")
+    drawing.add_legend(axes, loc="upper left")
+    return drawing.save_figure(figure, folder, "existence")

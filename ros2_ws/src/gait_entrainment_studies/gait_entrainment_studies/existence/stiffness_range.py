@@ -9,7 +9,7 @@ leg would have to pull. Both are closed forms but for a search over double stanc
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass
 from enum import Enum
 
 import numpy as np
@@ -18,7 +18,7 @@ from gait_entrainment.parameters import ParameterError, WalkerParameters
 
 
 class Limit(str, Enum):
-    """Where in the gait the end of the range is felt."""
+    """Where in the gait an end of the range is felt."""
 
     APEX = "apex of single stance"
     DOUBLE_STANCE = "within double stance"
@@ -28,7 +28,7 @@ class Limit(str, Enum):
 
 @dataclass(frozen=True)
 class StiffnessRange:
-    """Stiffness [N m/rad] between which a gait exists; none where the range is empty."""
+    """Stiffness [N m/rad] between which a gait exists; there is none if the range is empty."""
 
     leg_angle: float
     just_vault_over: float
@@ -43,7 +43,7 @@ class StiffnessRange:
 
 
 class _AnyStiffness(WalkerParameters):
-    """A walker whose linkage closes, with a gait or without: to ask where a gait would end."""
+    """A walker whose linkage closes, with a gait or without, to ask which limit ends its gait."""
 
     def _check_gait(self) -> None:
         """Accept any stiffness."""
@@ -58,18 +58,14 @@ class _AnyStiffness(WalkerParameters):
             Limit.HEEL_STRIKE: self._hold(start) / self._lift_per_stiffness(start),
             Limit.BEFORE_HEEL_STRIKE: self._hold_before_collision / self._lift_before_collision,
         }
-        # The search over double stance includes its ends, so equal means there.
-        least = self.just_fly_off_stiffness
-        place = Limit.DOUBLE_STANCE
+        least, place = self.just_fly_off_stiffness, Limit.DOUBLE_STANCE
         for limit, stiffness in fly_off.items():
+            # The search over double stance includes its ends, so it has found this one.
             if math.isclose(stiffness, least, rel_tol=1e-12):
                 place = limit
+        falls_at = Limit.APEX if at_apex else Limit.DOUBLE_STANCE
         return StiffnessRange(
-            self.leg_angle,
-            self.just_vault_over_stiffness,
-            least,
-            Limit.APEX if at_apex else Limit.DOUBLE_STANCE,
-            place,
+            self.leg_angle, self.just_vault_over_stiffness, least, falls_at, place
         )
 
 
@@ -79,13 +75,10 @@ def stiffness_range(
     """
     Return the range of stiffness with a gait, all else as in `parameters`.
 
-    Raises ParameterError where the linkage does not close at the leg angle [rad].
+    Raises ParameterError if the linkage does not close at the leg angle [rad].
     """
-    values = {name: getattr(parameters, name) for name in parameters.__dataclass_fields__}
-    walker = _AnyStiffness(**values)
-    if leg_angle is not None:
-        walker = replace(walker, leg_angle=leg_angle)
-    return walker.range()
+    angle = parameters.leg_angle if leg_angle is None else leg_angle
+    return _AnyStiffness(**asdict(parameters) | {"leg_angle": angle}).range()
 
 
 def existence_map(parameters: WalkerParameters, points: int = 200) -> list[StiffnessRange]:

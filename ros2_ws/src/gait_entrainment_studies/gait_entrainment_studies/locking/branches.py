@@ -5,41 +5,31 @@
 Branches of locked gaits, their borders, and the locked gaits at one pulse period.
 
 Along each branch (pulse begins before double stance, inside it, or outlasts it) the period is a
-smooth function of where the pulse lies. The branches meet in corners, where a border of the pulse
-meets heel strike or toe-off. So the pulse periods with a stable lock are intervals that end in a
-corner or in a fold, and both are solved for, not searched by simulation.
+smooth function of where the pulse lies. The branches meet in corners, where the pulse begins or
+ends at heel strike or toe-off. So the pulse periods with a stable lock are intervals that end in a
+corner or a fold, and both are solved for, not searched for by simulation.
 """
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 
 import numpy as np
-from scipy.optimize import brentq
 
-from gait_entrainment_studies.locking.pulsed_gait import Floats, Gaits, PulsedGait
+from gait_entrainment_studies.locking.pulsed_gait import Gaits, Place, PulsedGait
+from gait_entrainment_studies.locking.roots import ANGLE_TOLERANCE, Floats, solve
 
 # The scan along a branch, closer at its ends, where periods bend most, but not at the corners
-# themselves, where rounding would tell. What it brackets is then solved for, so its step decides
-# only what could be overlooked.
+# themselves, where rounding would decide. What it brackets is solved for, so its step decides only
+# what may be overlooked.
 _SCAN = 0.5 - 0.5 * np.cos(np.linspace(1e-3, np.pi - 1e-3, 65))
 
-# Borders are solved to this ankle angle [rad]: at 0.1 rad/s and faster, below 1e-11 s.
-_ANGLE_TOLERANCE = 1e-12
-
-# Right beside a turn [rad].
+# How close to a turn the next one is looked for [rad].
 _BESIDE = 1e-8
 
 # Whether a gait is feasible, stable, and on a branch with a growing period.
 _Marks = tuple[bool, bool, bool]
-
-
-class Place(str, Enum):
-    """Where the pulse of a gait lies."""
-
-    EARLY = "pulse begins before double stance"
-    INSIDE = "pulse inside double stance"
-    LATE = "pulse outlasts double stance"
 
 
 class Border(str, Enum):
@@ -69,7 +59,7 @@ class End:
 
 @dataclass(frozen=True)
 class Piece:
-    """Part of a branch along which the period is monotone and the stability the same."""
+    """Part of a branch along which the period is monotone and stability does not change."""
 
     place: Place
     first: End
@@ -110,7 +100,7 @@ def pieces_of(gait: PulsedGait) -> list[Piece]:
     """Return all pieces of all branches, in the order of the pulse onset."""
     return [
         piece
-        for place, first, last, borders in _branches(gait)
+        for place, first, last, borders in branches_of(gait)
         for piece in _split(gait, place, first, last, borders)
     ]
 
@@ -121,20 +111,32 @@ def locked_gaits(
     """
     Return every 1:1 phase-locked gait at a pulse period [s], stable or not, by pulse onset.
 
-    Where the pulse acts nowhere, any onset repeats itself at exactly the unperturbed period; that
-    neutral continuum is not a lock and is left out.
+    A pulse that never acts repeats itself at exactly the unperturbed period, whatever its onset;
+    that neutral continuum is not a lock and is left out.
     """
     found = []
     for piece in pieces_of(gait) if pieces is None else pieces:
         low, high = piece.least_period.period, piece.greatest_period.period
         if not piece.feasible or not low <= period <= high:
             continue
-        along = _along(gait, piece.place)
+        along = partial(gait.gaits, piece.place)
         angles = piece.first.angle, piece.last.angle
-        angle = _solve(lambda x, along=along: along(x).period - period, *angles)  # type: ignore[misc]
-        solution = along(np.array([angle]))
-        if solution.end[0] > solution.start[0]:
-            found.append(_locked(gait, piece.place, solution))
+        angle = solve(lambda x, along=along: along(x).period - period, *angles)  # type: ignore[misc]
+        one = along(np.array([angle])).at(0)
+        if one.end > one.start:
+            first, second = one.multipliers.tolist()
+            found.append(
+                LockedGait(
+                    place=piece.place,
+                    period=float(one.period),
+                    onset=float(one.onset),
+                    lag=float(one.lag),
+                    phase=float(one.phase),
+                    speed=gait.speed(float(one.apex)),
+                    multipliers=(first, second),
+                    stable=bool(one.stable),
+                )
+            )
     return found
 
 
@@ -143,8 +145,17 @@ def stable_intervals(pieces: list[Piece]) -> list[Piece]:
     return [piece for piece in pieces if piece.stable]
 
 
-def _branches(gait: PulsedGait) -> Iterator[tuple[Place, float, float, tuple[Border, Border]]]:
-    """Yield the branches: place, range of the ankle angle along them, and their corners."""
+def basin_of(gait: PulsedGait, pieces: list[Piece]) -> tuple[float, float]:
+    """Return shortest and longest period with a stable lock [s]; the unperturbed one if none."""
+    stable = stable_intervals(pieces)
+    return (
+        min((one.least_period.period for one in stable), default=gait.unperturbed_period),
+        max((one.greatest_period.period for one in stable), default=gait.unperturbed_period),
+    )
+
+
+def branches_of(gait: PulsedGait) -> Iterator[tuple[Place, float, float, tuple[Border, Border]]]:
+    """Yield each branch: place, first and last ankle angle along it, and its corners."""
     struck, off = gait.heel_strike, gait.toe_off
     first_end, last_start = gait.first_end, gait.last_start
     if last_start > struck:
@@ -153,20 +164,16 @@ def _branches(gait: PulsedGait) -> Iterator[tuple[Place, float, float, tuple[Bor
         yield Place.INSIDE, struck, last_start, inside
         yield Place.LATE, last_start, off, (inside[1], Border.START_AT_TOE_OFF)
     else:
-        # Between the two, the pulse covers all of double stance and its onset does not matter.
+        # Between the two the pulse covers all of double stance, and its onset does not matter.
         yield Place.EARLY, struck, off, (Border.END_AT_HEEL_STRIKE, Border.END_AT_TOE_OFF)
         yield Place.LATE, struck, off, (Border.START_AT_HEEL_STRIKE, Border.START_AT_TOE_OFF)
-
-
-def _along(gait: PulsedGait, place: Place) -> Callable[[Floats], Gaits]:
-    return {Place.EARLY: gait.early, Place.INSIDE: gait.inside, Place.LATE: gait.late}[place]
 
 
 def _split(
     gait: PulsedGait, place: Place, first: float, last: float, corners: tuple[Border, Border]
 ) -> Iterator[Piece]:
-    """Cut a branch where period or stability turns."""
-    along = _along(gait, place)
+    """Cut a branch wherever the slope of the period or the stability changes."""
+    along = partial(gait.gaits, place)
     angles = first + (last - first) * _SCAN
     marks = _marks(along(angles))
     begin, mark = _end(corners[0], first, along), marks[0]
@@ -181,14 +188,14 @@ def _split(
 def _turns(
     along: Callable[[Floats], Gaits], low: float, high: float, before: _Marks, after: _Marks
 ) -> Iterator[tuple[float, Border, _Marks]]:
-    """Yield what turns between two angles with these marks: where, what, and the marks then."""
+    """Yield each change between two angles with these marks: angle, kind and marks after it."""
     if before == after:
         return
     angle, border, here = _turn(along, low, high, before, after)
     if high - low < 4 * _BESIDE:
         yield angle, border, after
         return
-    # More than one may turn, as where a flip lies close to a fold: look right beside it.
+    # There may be more than one, such as a flip close to a fold: look right beside it.
     beside = np.clip([angle - _BESIDE, angle + _BESIDE], low, high)
     if border is Border.FOLD:
         left, here = _marks(along(beside))
@@ -198,7 +205,7 @@ def _turns(
 
 
 def _marks(gaits: Gaits) -> list[_Marks]:
-    """Tell of each gait whether it is feasible, stable, and whether its period grows."""
+    """Return for each gait whether it is feasible, stable, and whether its period grows."""
     with np.errstate(invalid="ignore"):
         growing = gaits.feasible & (gaits.slope > 0)
         return list(
@@ -209,10 +216,10 @@ def _marks(gaits: Gaits) -> list[_Marks]:
 def _turn(
     along: Callable[[Floats], Gaits], low: float, high: float, before: _Marks, after: _Marks
 ) -> tuple[float, Border, _Marks]:
-    """Find something that turns between two angles with these marks: where, what, marks then."""
+    """Find one change between two angles with these marks: angle, kind and marks after it."""
     if before[0] and after[0] and before[2] != after[2]:
-        return _solve(lambda angle: along(angle).slope, low, high), Border.FOLD, after
-    while high - low > _ANGLE_TOLERANCE:
+        return solve(lambda angle: along(angle).slope, low, high), Border.FOLD, after
+    while high - low > ANGLE_TOLERANCE:
         middle = 0.5 * (low + high)
         marks = _marks(along(np.array([middle])))[0]
         if marks == before:
@@ -227,33 +234,6 @@ def _turn(
     return low, Border.FLIP if largest.imag == 0 else Border.NEIMARK_SACKER, after
 
 
-def _solve(function: Callable[[Floats], Floats], low: float, high: float) -> float:
-    """Return the root of a function of the ankle angle; at an end where rounding hides it."""
-
-    def value(angle: float) -> float:
-        return float(function(np.array([angle]))[0])
-
-    ends = value(low), value(high)
-    if ends[0] * ends[1] >= 0:
-        return low if abs(ends[0]) <= abs(ends[1]) else high
-    return float(brentq(value, low, high, xtol=_ANGLE_TOLERANCE))
-
-
 def _end(border: Border, angle: float, along: Callable[[Floats], Gaits]) -> End:
     gait = along(np.array([angle])).at(0)
     return End(border, angle, float(gait.period), float(gait.onset), float(gait.lag))
-
-
-def _locked(gait: PulsedGait, place: Place, solution: Gaits) -> LockedGait:
-    one = solution.at(0)
-    first, second = one.multipliers
-    return LockedGait(
-        place=place,
-        period=float(one.period),
-        onset=float(one.onset),
-        lag=float(one.lag),
-        phase=float(one.phase),
-        speed=gait.speed(float(one.apex)),
-        multipliers=(complex(first), complex(second)),
-        stable=bool(one.stable),
-    )

@@ -4,85 +4,78 @@
 """
 Gaits with one pulse a stride, exactly, in terms of where in double stance the pulse acts.
 
-A pulse of width w on the leg that trails acts from the ankle angle psi_s to psi_e. Energy then
-gives the speed of the gait that repeats itself in closed form, for the stride is linear in `apex`
-below), and times are quadratures between known angles: nothing is integrated step by step and no
-time is inverted. So a whole branch of gaits is a few array operations, and the walker in time,
-which shares no code with it but the closed forms of the linkage, can be held against it.
+This is the independent solution: it shares only the closed forms of the linkage with the walker in
+time, so that each can be checked against the other.
 
-`apex` is the squared angular velocity that the mass would have at the apex if no torque acted any
-more [1/s^2]: theta_dot^2 = apex + (2 g / L)(1 - cos(theta)). Torque changes it by
-2 T d psi / (m L^2); a collision keeps cos(2 alpha)^2 of theta_dot^2.
+A pulse of width w on the trailing leg acts from the ankle angle psi_s to psi_e. Energy then gives
+the speed of the gait that repeats itself in closed form, because the stride is linear in `apex`
+(below), and times are quadratures between known angles: nothing is integrated step by step and no
+time is inverted. So a whole branch of gaits takes a few array operations.
+
+`apex` is the squared angular velocity [1/s^2] that the mass would have at the apex without further
+torque: theta_dot^2 = apex + (2 g / L)(1 - cos(theta)). Torque changes it by 2 T d psi / (m L^2); a
+collision keeps cos(2 alpha)^2 of theta_dot^2.
 
 The Poincare section is the heel strike of the *other* leg, where the perturbed leg's push-off
 begins. The state there is (apex right after the collision, onset of the pulse after the heel
-strike [s], negative before), and a pulse period tau_p gives the map
+strike [s], negative before it), and a pulse period tau_p gives the map
 
     apex' = A(apex, onset),    onset' = onset + tau_p - R(apex, onset),
 
-R the time to the next such heel strike. Its fixed points are the 1:1 phase-locked gaits: the gaits
-below whose period R is tau_p. The Jacobian does not depend on tau_p and is exact.
+R being the time to the next such heel strike. Its fixed points are the 1:1 phase-locked gaits: the
+gaits below whose period R is tau_p. The Jacobian does not depend on tau_p and is exact.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, fields
+from enum import Enum
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.optimize import brentq
 from scipy.special import elliprd, elliprf
 
 from gait_entrainment import geometry
+from gait_entrainment.errors import UsageError
 from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment_studies.locking.roots import Floats, first_root, newton
 
-Floats = NDArray[np.float64]
-
-# These closed forms are arithmetic only: they take arrays as they take numbers.
-_leg_sine: Callable[..., Any] = geometry.leg_sine
-_leg_per_ankle: Callable[..., Any] = geometry.leg_per_ankle
-_drop: Callable[..., Any] = geometry.drop
-_torque_work: Callable[..., Any] = geometry.torque_work
-_pendulum_force: Callable[..., Any] = geometry.pendulum_force
-_unloading_arm: Callable[..., Any] = geometry.unloading_arm
+# The closed forms of the linkage are typed for numbers; being arithmetic only, they take arrays.
+_FORMS: Any = geometry
 
 # Gauss-Legendre rule of one stretch of double stance, and the weights that give the last two
-# Legendre coefficients. At Table 1 these fall by 3 each over a whole double stance, so 24 nodes
-# leave 3^-48 of the time. A stretch whose last two are not this small beside its mean has not
-# converged and is halved, as many other walkers need: the error is then about their square.
+# Legendre coefficients. With Table 1 each is a third of the one before over a whole double stance,
+# so 24 nodes leave 3^-48 of the time. If the last two are not this small beside the mean, the
+# stretch has not converged and is halved, as many other walkers need: the error is then about
+# their square.
 _COUNT = 24
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(_COUNT)
 _LAST = np.arange(_COUNT - 2, _COUNT)
 _TAILS = np.polynomial.legendre.legvander(_NODES, _COUNT - 1)[:, _LAST].T
 _TAILS = (_LAST[:, None] + 0.5) * _TAILS * _WEIGHTS
 _TAIL_TOLERANCE = 1e-8
-# What so many halvings leave ends in a stall.
+# A stretch that has not converged after this many halvings ends in a stall.
 _MOST_HALVINGS = 12
-# Both ends beside the nodes, for the force, which is least there.
+# The nodes and both ends, where the force is least.
 _PLACES = np.concatenate([[-1.0], _NODES, [1.0]])
 
-# Newton steps on an ankle angle end here [rad]; convergence is quadratic, so the next is rounding.
-_ANGLE_STEP = 1e-12
-_MOST_STEPS = 100
-# A Newton step that would still be longer than this [rad]: there is no such angle.
-_NO_ROOT = 1e-10
 
-# Points of the scan for a corner. The function searched grows; the scan only steps up to where
-# the walker falls, ever closer.
-_SCAN_POINTS = 33
-_MOST_SCANS = 8
+class Place(str, Enum):
+    """Where the pulse of a gait lies, which names a branch of gaits."""
+
+    EARLY = "pulse begins before double stance"
+    INSIDE = "pulse inside double stance"
+    LATE = "pulse outlasts double stance"
 
 
 @dataclass(frozen=True)
 class Gaits:
-    """Gaits that repeat themselves, one element each; times in s. NaN where there is none."""
+    """Gaits that repeat themselves, one element each; times in s, NaN if there is none."""
 
     start: Floats
     """Ankle angle where the pulse begins to act [rad]."""
     end: Floats
-    """Ankle angle where it ceases to act."""
+    """Ankle angle where it stops acting."""
     onset: Floats
     """Pulse onset after the other leg's heel strike."""
     period: Floats
@@ -96,8 +89,8 @@ class Gaits:
     jacobian: Floats
     """Derivative of the map (..., 2, 2)."""
     feasible: Any
-    """Whether the mass goes on, the leading leg presses on the ground at both ends and at all
-    nodes of the quadratures, and these have converged."""
+    """Whether the mass keeps moving, the leading leg presses on the ground at all nodes and ends
+    of the quadratures, and these have converged."""
 
     @property
     def lag(self) -> Floats:
@@ -148,7 +141,7 @@ class Gaits:
 
 
 class _Stretch(NamedTuple):
-    """Times of stretches of double stance and what they tell about them."""
+    """Times of stretches of double stance."""
 
     time: Floats
     by_apex: Floats
@@ -161,22 +154,12 @@ class PulsedGait:
     """
     Gaits of one walker under one kind of pulse.
 
-    Parameters
-    ----------
-    parameters
-        The walker.
-    torque, width
-        Height [N m] and duration [s] of the pulse; a negative torque (dorsiflexion) is this
-        project's extension of the paper.
-    steps_per_pulse
-        2: one leg, once per stride, as in the experiments. 1: every step, each leg at its own.
-        Many: a single pulse, whose effect has died out by the time that the gait repeats itself.
+    `torque` [N m] and `width` [s] are those of the pulse; a negative torque (dorsiflexion) is an
+    extension of the paper. `steps_per_pulse` is 2 for a pulse on one leg in each stride, as in the
+    experiments; 1 for a pulse in each step, on the leg that trails; many for a single pulse, whose
+    effect has died out when the gait repeats itself.
 
-    Raises
-    ------
-    ValueError
-        where a pulse could reach from one push-off of its leg into the next.
-
+    Raises UsageError if a pulse could reach from one push-off of its leg into the next.
     """
 
     def __init__(
@@ -194,55 +177,52 @@ class PulsedGait:
         )
         self._start_apex = (p.speed_after_collision / p.leg_length) ** 2 - self._strike_gain
         self._step_gain = self._per_energy * p.push_off_work
-        # Beyond it a negative pulse leaves nothing of the spring: the trailing foot is unloaded.
+        # From here on a negative pulse cancels the spring: the trailing foot is unloaded.
         unloaded = self.toe_off + min(torque, 0.0) / p.ankle_stiffness
         self._unloaded = max(unloaded, self.heel_strike)
         here = np.array([self.heel_strike])
-        plain = self._gaits(here, here, "none")
+        plain = self._gaits(here, here, None)
         self.unperturbed_period = float(plain.period[0])
         """Period of the same number of steps without a pulse [s]."""
         step = self.unperturbed_period / steps_per_pulse
         if not 0 < width < step:
-            raise ValueError(
-                f"width {width:g} s is out of range; allowed: above 0 and below a step,"
-                f" {step:.4g} s"
+            raise UsageError(
+                f"width: {width:g} s; allowed: above 0 and below a step, {step:.4g} s"
             )
 
     def speed(self, apex: float) -> float:
         """Speed of the mass [m/s] at the section, right after the collision."""
         return float(self.parameters.leg_length * np.sqrt(apex + self._strike_gain))
 
-    # Branches: where the pulse begins and ends
+    # Branches: where the pulse begins and ends.
 
-    def early(self, end: Floats) -> Gaits:
-        """Pulses that begin before double stance and end in it, at these ankle angles."""
-        return self._gaits(np.full_like(end, self.heel_strike), end, "early")
-
-    def inside(self, start: Floats) -> Gaits:
-        """Pulses that begin in double stance, at these ankle angles, and end in it."""
-        return self._gaits(start, self._end_of_pulse(start), "inside")
-
-    def late(self, start: Floats) -> Gaits:
-        """Pulses that begin in double stance, at these ankle angles, and outlast it."""
-        return self._gaits(start, np.full_like(start, self.toe_off), "late")
+    def gaits(self, place: Place, angle: Floats) -> Gaits:
+        """Return gaits of a branch by the ankle angle where the pulse ends (EARLY) or begins."""
+        if place is Place.EARLY:
+            return self._gaits(np.full_like(angle, self.heel_strike), angle, place)
+        if place is Place.INSIDE:
+            return self._gaits(angle, self._end_of_pulse(angle), place)
+        return self._gaits(angle, np.full_like(angle, self.toe_off), place)
 
     @cached_property
     def first_end(self) -> float:
-        """Ankle angle where a pulse that begins at heel strike ends; toe-off if it outlasts it."""
-
-        def excess(end: Floats) -> Floats:
-            return self._pulse_time(np.full_like(end, self.heel_strike), end).time - self.width
-
-        return _first_root(excess, self.heel_strike, self.toe_off)
+        """Ankle angle where a pulse from heel strike on ends; toe-off if it lasts longer."""
+        struck = self.heel_strike
+        return first_root(
+            lambda end: self._pulse_time(np.full_like(end, struck), end).time - self.width,
+            struck,
+            self.toe_off,
+        )
 
     @cached_property
     def last_start(self) -> float:
-        """Ankle angle where a pulse that ends at toe-off begins; heel strike if before it."""
-
-        def excess(start: Floats) -> Floats:
-            return self._pulse_time(start, np.full_like(start, self.toe_off)).time - self.width
-
-        return _first_root(excess, self.toe_off, self.heel_strike)
+        """Ankle angle where a pulse up to toe-off begins; heel strike if it lasts longer."""
+        off = self.toe_off
+        return first_root(
+            lambda start: self._pulse_time(start, np.full_like(start, off)).time - self.width,
+            off,
+            self.heel_strike,
+        )
 
     def _end_of_pulse(self, start: Floats) -> Floats:
         """Ankle angle where a pulse that begins at `start` ends, in the gait that it sustains."""
@@ -253,9 +233,9 @@ class PulsedGait:
             slope = 1 / self._velocity(end, self._apex(start, end), start)
             return stretch.time - self.width, slope + stretch.by_apex * gain
 
-        return _newton(excess, start, start, self.toe_off)
+        return newton(excess, start, start, self.toe_off)
 
-    # Energy
+    # Energy.
 
     @property
     def _apex_per_gain(self) -> float:
@@ -264,7 +244,7 @@ class PulsedGait:
         return float(kept / (1 - kept))
 
     def _apex(self, start: Floats, end: Floats) -> Floats:
-        """Return `apex` of the gait that repeats itself (Eq. 8 with the pulse's work)."""
+        """`apex` of the gait that repeats itself (Eq. 8 with the pulse's work)."""
         return self._start_apex + self._apex_per_gain * self._pulse_gain(start, end)
 
     def _pulse_torque(self, angle: Floats) -> Floats:
@@ -283,17 +263,17 @@ class PulsedGait:
         return gain
 
     def _gain(self, angle: Floats, sine: Floats, cosine: Floats) -> Floats:
-        """Gain in squared rate from heel strike on, unperturbed: the spring's work and height."""
+        """Gain in squared rate since heel strike without a pulse, by spring and height."""
         p = self.parameters
-        work = _torque_work(angle - self.heel_strike, p.peak_torque, p.ankle_stiffness)
-        gain: Floats = self._per_energy * work + self._per_drop * _drop(sine, cosine)
+        work = _FORMS.torque_work(angle - self.heel_strike, p.peak_torque, p.ankle_stiffness)
+        gain: Floats = self._per_energy * work + self._per_drop * _FORMS.drop(sine, cosine)
         return gain
 
     def _posture(self, angle: Floats) -> tuple[Floats, Floats, Floats]:
         """Sine and cosine of the leading leg's angle, and its change per ankle angle."""
-        sine = _leg_sine(self.parameters, np.cos(angle))
+        sine = _FORMS.leg_sine(self.parameters, np.cos(angle))
         cosine = np.sqrt(1 - sine**2)
-        return sine, cosine, _leg_per_ankle(self.parameters, np.sin(angle), cosine)
+        return sine, cosine, _FORMS.leg_per_ankle(self.parameters, np.sin(angle), cosine)
 
     def _velocity(self, angle: Floats, apex: Floats, start: Floats) -> Floats:
         """Rate of the ankle angle [rad/s] with the pulse on since `start`."""
@@ -302,7 +282,7 @@ class PulsedGait:
         velocity: Floats = np.sqrt(square) / slope
         return velocity
 
-    # Times
+    # Times.
 
     def _stretch(
         self,
@@ -327,7 +307,7 @@ class PulsedGait:
             tail = np.abs(integrand @ _TAILS.T).sum(axis=-1)
             by_apex = -0.5 * half * ((integrand / square[..., 1:-1]) @ _WEIGHTS)
         force = self._pendulum_force(cosine, square)
-        force = force - _unloading_arm(self.parameters, np.sin(angle), sine) * torque
+        force = force - _FORMS.unloading_arm(self.parameters, np.sin(angle), sine) * torque
         time, converged = half * total, tail <= 0.5 * _TAIL_TOLERANCE * total
         sound = (converged & (force >= 0).all(axis=-1)) | (half <= 0)
         rough = ~converged & (square > 0).all(axis=-1) & (half > 0)
@@ -358,13 +338,13 @@ class PulsedGait:
         """
         Time of single stance: R_F, and R_D for its derivative (DLMF 19.18.1).
 
-        Where toe-off comes after the apex, a walker too slow for the apex itself counts as fallen.
+        A walker too slow for the apex counts as fallen even if toe-off comes after the apex.
         """
         time, by_apex = np.zeros_like(apex), np.zeros_like(apex)
         moving = np.nan_to_num(apex, nan=-1.0) > 0
         apex = np.where(moving, apex, np.nan)
         p = self.parameters
-        # An apex after toe-off is passed from both sides; one before it only from the far side.
+        # The way to an apex after toe-off adds to the time, that from an apex before it takes off.
         for sign, angle in (
             (math.copysign(1, p.toe_off_angle), p.toe_off_angle),
             (1, p.leg_angle),
@@ -379,14 +359,14 @@ class PulsedGait:
             return _Stretch(time, by_apex, moving & (struck >= 0))
 
     def _pendulum_force(self, cosine: Any, square: Floats) -> Any:
-        return _pendulum_force(self.parameters, cosine, square)
+        return _FORMS.pendulum_force(self.parameters, cosine, square)
 
     def _collide(self, apex: Floats) -> Floats:
         return self._kept * apex - (1 - self._kept) * self._strike_gain
 
-    # The whole gait and the derivative of the map
+    # The whole gait, and the derivative of the map.
 
-    def _gaits(self, start: Floats, end: Floats, kind: str) -> Gaits:
+    def _gaits(self, start: Floats, end: Floats, place: Place | None) -> Gaits:
         apex = self._apex(start, end)
         pulse_gain = self._pulse_gain(start, end)
         here, there = np.full_like(apex, self.heel_strike), np.full_like(apex, self.toe_off)
@@ -397,14 +377,14 @@ class PulsedGait:
         swing = self._single_stance(leaving)
         double_stance = before.time + pulse.time + after.time
         step = double_stance + swing.time
-        onset = pulse.time - self.width if kind == "early" else before.time
+        onset = pulse.time - self.width if place is Place.EARLY else before.time
 
         # Forward differentiation by (apex, onset), in the order of the motion.
         one, none = np.ones_like(apex), np.zeros_like(apex)
         d_apex = np.stack([one, none], axis=-1)
         d_onset = np.stack([none, one], axis=-1)
         column = np.newaxis
-        begins, ends = kind in ("inside", "late"), kind in ("inside", "early")
+        begins, ends = place in (Place.INSIDE, Place.LATE), place in (Place.INSIDE, Place.EARLY)
         d_start = d_end = np.zeros_like(d_apex)
         with np.errstate(invalid="ignore"):
             at_start = self._velocity(start, apex, start)[..., column]
@@ -437,47 +417,3 @@ class PulsedGait:
             arriving = self._collide(arriving + self._step_gain)
         jacobian = np.stack([d_next, d_onset - d_period], axis=-2)
         return Gaits(start, end, onset, period, apex, double_stance, step, jacobian, sound)
-
-
-def _newton(
-    function: Callable[[Floats], tuple[Floats, Floats]],
-    guess: Floats,
-    least: Floats,
-    most: float,
-) -> Floats:
-    """Roots of a growing function, element by element, held within bounds; NaN for none."""
-    angle, low, high = guess, least, np.full_like(guess, most)
-    for _ in range(_MOST_STEPS):
-        with np.errstate(invalid="ignore", divide="ignore"):
-            value, slope = function(angle)
-            following = np.clip(angle - value / slope, least, most)
-            # Where the walker has fallen the root is before it.
-            short = value < 0
-            low, high = np.where(short, angle, low), np.where(short, high, angle)
-            within = (low <= following) & (following <= high) & (slope > 0)
-        following = np.where(within, following, 0.5 * (low + high))
-        step = np.abs(following - angle)
-        angle = following
-        if not (step > _ANGLE_STEP).any():
-            break
-    found: Floats = np.where(np.abs(value) <= np.abs(slope) * _NO_ROOT, angle, np.nan)
-    return found
-
-
-def _first_root(function: Callable[[Floats], Floats], start: float, end: float) -> float:
-    """Return the root of a function, negative at `start`, nearest to it; `end` for none."""
-    angles = np.linspace(start, end, _SCAN_POINTS)
-    for _ in range(_MOST_SCANS):
-        with np.errstate(invalid="ignore"):
-            values = function(angles)
-        beyond = np.flatnonzero(~(values < 0))
-        if beyond.size == 0:
-            return end
-        bracket = angles[beyond[0] - 1], angles[beyond[0]]
-        if values[beyond[0]] >= 0:
-            return float(
-                brentq(lambda x: float(function(np.array([x]))[0]), *bracket, xtol=_ANGLE_STEP)
-            )
-        # There the walker has fallen: the time grows without bound on the way.
-        angles = np.linspace(*bracket, _SCAN_POINTS)
-    return end

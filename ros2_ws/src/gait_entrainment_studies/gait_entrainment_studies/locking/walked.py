@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Walks under a train of pulses, by the walker in time: what the solved locks are confirmed with.
+Walks under a train of pulses, by the walker in time: they confirm the solved locks.
 
-A walk that has not locked is called slipping only when the pulses have gone through a whole gait
-cycle: then every phase has been tried. Near a border that takes of the order of 2 tau_0 over the
-distance to it in strides, so a shorter walk proves nothing and is reported as censored.
+A walk that has not locked is called slipping only once the pulses have gone through a whole gait
+cycle: then every phase has been tried. Near a border that takes about 2 tau_0 over the distance
+to it in strides, so a shorter walk proves nothing and is reported as censored.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
@@ -17,33 +18,46 @@ import numpy as np
 
 from gait_entrainment.conventions import nanoseconds
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment.walker.batch import Pulses, Walk, _torque_changes, walk_steps
-from gait_entrainment.walker.model import Model, make_model, start_apex
-from gait_entrainment.walker.segment import FALL, SEGMENT
-from gait_entrainment_studies.locking.pulsed_gait import Floats
+from gait_entrainment.walker import EndingKind
+from gait_entrainment.walker.model import Floats, Model, make_model
+from gait_entrainment_studies.locking.branches import LockedGait
+from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
+from gait_entrainment_studies.walks import Pulses, walk
 
-# A lag that creeps by less than this per stride [s], for several strides, is called locked. So a
-# pulse period closer than this to a border is decided by the solver, not by walking.
+# A lag that creeps by less than this per stride [s], for several strides, is called locked. So
+# the solver, not walking, decides about a pulse period closer than this to a border.
 CREEP = 1e-7
 _QUIET_STRIDES = 5
 
-# Gait cycles that the pulses must slip through: one, and what the first strides may have skipped.
+# Gait cycles that the pulses must slip through: one, and what the first strides may skip.
 _SLIPPED_CYCLES = 1.25
 
 # What whole nanoseconds can count [s], with room for a pulse.
 _CLOCK = 9e9
 
+# How close to a solved lock a walk must end [s]: what the creep still allowed adds up to at a
+# multiplier of 0.99, far below the distance between two locks.
+_NEAR = 2e-5
+
+# Strides that a walk is given in addition to those that slipping takes.
+_SETTLING_STRIDES = 100
+# Near a fold or with a slow multiplier it takes longer; a censored walk is made again.
+_LONGEST = 4000
+
 
 class Outcome(str, Enum):
-    """What became of a walk under pulses."""
+    """What became of a walk under pulses, the better the earlier."""
 
     LOCKED = "locked"
     ALTERNATING = "locked 2:2: every other stride alike"
-    SLIPPING = "slipping"
     CENSORED = "censored: neither locked nor slipped through a cycle"
-    """Too short to tell; or, past a flip, bound to the pulses without ever repeating."""
+    """Too short to tell; or, past a flip, bound to the pulses without ever repeating itself."""
+    SLIPPING = "slipping"
     FELL = "fell"
     FLEW_OFF = "flew off"
+
+
+_ENDINGS = {None: None, EndingKind.FALL: Outcome.FELL, EndingKind.FLY_OFF: Outcome.FLEW_OFF}
 
 
 @dataclass(frozen=True)
@@ -57,7 +71,7 @@ class PulsedWalk:
     """Of the perturbed leg, one in each stride."""
     onsets: Floats
     ending: Outcome | None
-    """FELL or FLEW_OFF where the walker did so before the last stride."""
+    """FELL or FLEW_OFF if the walker did so before the last stride."""
 
     @property
     def stride_periods(self) -> Floats:
@@ -66,31 +80,24 @@ class PulsedWalk:
 
     @property
     def unwrapped_lags(self) -> Floats:
-        """Onset of pulse n minus toe-off of stride n, which is a lag up to whole strides."""
+        """Onset of pulse n minus toe-off of stride n: the lag, up to whole strides."""
         count = min(self.onsets.size, self.toe_offs.size)
         lags: Floats = self.onsets[:count] - self.toe_offs[:count]
         return lags
 
     @property
     def lags(self) -> Floats:
-        """Pulse onset minus the nearest toe-off of the perturbed leg; NaN if that is not known."""
+        """Pulse onset minus the nearest toe-off of the perturbed leg; NaN if that is unknown."""
         onsets = self.onsets[self.onsets <= self.toe_offs[-1]]
         after = np.clip(np.searchsorted(self.toe_offs, onsets), 1, self.toe_offs.size - 1)
         before, following = onsets - self.toe_offs[after - 1], onsets - self.toe_offs[after]
         lags: Floats = np.where(before <= -following, before, following)
-        # A stride before the first toe-off of the walk there was another one.
+        # There was another toe-off a stride before the first one of the walk.
         lags[onsets < self.toe_offs[0] - self.stride_periods[0] / 2] = np.nan
         return lags
 
-    @property
-    def last_lag(self) -> float:
-        """Onset of the last pulse minus the nearest toe-off, of those that have been walked."""
-        onset = self.onsets[self.onsets <= self.toe_offs[-1]][-1]
-        differences = onset - self.toe_offs[-2:]
-        return float(differences[np.argmin(np.abs(differences))])
-
     def outcome(self, creep: float = CREEP) -> Outcome:
-        """Whether it has locked, and whether it was long enough to say that it does not."""
+        """What became of the walk; locked if its lag creeps by less than `creep` [s] a stride."""
         if self.ending is not None:
             return self.ending
         lags = self.unwrapped_lags
@@ -116,29 +123,23 @@ def walk_under_pulses(
     """
     Walk `strides` strides from the unperturbed gait with pulses on one leg.
 
-    The first comes at this fraction of an unperturbed stride after the leg's heel strike 0.
-    Instants of the pulses are whole nanoseconds, as everywhere in the project.
+    Torque is in N m, width and period in s. The first pulse comes `initial_phase` of an
+    unperturbed stride after the leg's heel strike 0. Pulses begin and end on whole nanoseconds.
     """
     model, stride = _prepared(parameters)
     # Enough for strides a third longer than the pulse period or the walker's own.
     count = int(4 / 3 * (strides + 1) * max(stride / period, 1.0)) + 1
-    # Pulses that come after the end of the clock are none.
+    # There are no pulses after the end of the clock.
     count = min(count, 1 + int(_CLOCK / period))
     onsets = np.rint(np.arange(count) * (min(period, _CLOCK) * 1e9)).astype(np.int64)
     onsets += nanoseconds(initial_phase * stride)
-    pulses = Pulses(onsets, nanoseconds(width), torque)
-    walk, ends = _walk(model, 2 * strides, pulses)
-    ending = None
-    if walk.heel_strikes.size <= 2 * strides:
-        ending = Outcome.FELL if ends == FALL else Outcome.FLEW_OFF
-    toe_offs = walk.toe_offs[1::2]
-    last = walk.heel_strikes[-1]
+    walked = walk(model, 2 * strides, Pulses(onsets, nanoseconds(width), torque))
     return PulsedWalk(
         period=period,
-        heel_strikes=walk.heel_strikes[::2],
-        toe_offs=toe_offs,
-        onsets=onsets[: np.searchsorted(onsets, last * 1e9)] * 1e-9,
-        ending=ending,
+        heel_strikes=walked.heel_strikes[::2],
+        toe_offs=walked.toe_offs[1::2],
+        onsets=onsets[: np.searchsorted(onsets, walked.heel_strikes[-1] * 1e9)] * 1e-9,
+        ending=_ENDINGS[walked.ending],
     )
 
 
@@ -146,14 +147,37 @@ def walk_under_pulses(
 def _prepared(parameters: WalkerParameters) -> tuple[Model, float]:
     """Return the walker's constants, and its unperturbed stride period [s]."""
     model = make_model(parameters)
-    walk, _ = _walk(model, 2, None)
-    return model, float(walk.heel_strikes[-1])
+    return model, float(walk(model, 2).heel_strikes[-1])
 
 
-def _walk(model: Model, steps: int, pulses: Pulses | None) -> tuple[Walk, int]:
-    """Walk as `walker.batch.walk` does, the constants made before; also what ended it."""
-    log, strikes, offs = np.zeros(1, SEGMENT), np.empty(steps), np.empty(steps)
-    apex = start_apex(model, None)
-    counts = walk_steps(model, log, *_torque_changes(pulses), apex, strikes, offs)
-    walk = Walk(np.concatenate([[0.0], strikes[: counts[0]]]), offs[: counts[1]])
-    return walk, int(log[0]["ends"])
+@dataclass(frozen=True)
+class Shares:
+    """What became of walks from initial phases spread evenly over the stride."""
+
+    outcomes: tuple[Outcome, ...]
+    drawn: dict[LockedGait, float]
+    """Share of the initial phases that each stable lock draws."""
+
+
+def shares_of(
+    gait: PulsedGait, period: float, locks: Sequence[LockedGait], phases: int = 32
+) -> Shares:
+    """Walk from `phases` initial phases at a pulse period [s] and see which lock each ends in."""
+    distance = max(abs(period - gait.unperturbed_period), 1e-4)
+    enough = _SETTLING_STRIDES + int(1.5 * gait.unperturbed_period / distance)
+    outcomes, lags = [], []
+    for phase in np.arange(phases) / phases:
+        strides = min(enough, _LONGEST)
+        while True:
+            walked = walk_under_pulses(
+                gait.parameters, gait.torque, gait.width, period, float(phase), strides
+            )
+            outcome = walked.outcome()
+            if outcome is not Outcome.CENSORED or strides >= _LONGEST:
+                break
+            strides = min(4 * strides, _LONGEST)
+        outcomes.append(outcome)
+        lags.append(float(walked.lags[-1]) if outcome is Outcome.LOCKED else np.nan)
+    stable = [lock for lock in locks if lock.stable]
+    drawn = {lock: float(np.mean(np.abs(np.array(lags) - lock.lag) < _NEAR)) for lock in stable}
+    return Shares(tuple(outcomes), drawn)

@@ -4,24 +4,28 @@
 """The paper's numerical experiments, repeated with the walker in time."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.walker import Samples, Walker
-from gait_entrainment_studies.locking import Outcome, PulsedGait, PulsedWalk, walk_under_pulses
-from gait_entrainment_studies.locking.pulsed_gait import Floats
+from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
+from gait_entrainment_studies.locking.roots import Floats
+from gait_entrainment_studies.locking.walked import Outcome, PulsedWalk, walk_under_pulses
 
 PULSE_WIDTH = 0.1
 TORQUE_FRACTION = 0.1
 
-# Before a collision by this much [ns] the walker is surely in single stance.
+# This long before a collision [ns] the walker is certainly in single stance.
 _BEFORE_STRIKE = 10**6
+# No step from a speed near that of the gait takes longer [ns].
+_LONGEST_STEP = 4 * 10**9
 
 
 def paper_pulses(parameters: WalkerParameters, steps_per_pulse: int = 2) -> PulsedGait:
-    """Return the walker under the paper's pulses: 0.1 s, a tenth of the peak ankle torque."""
+    """Return the gaits under the paper's pulses: 0.1 s, a tenth of the peak ankle torque."""
     torque = TORQUE_FRACTION * parameters.peak_torque
     return PulsedGait(parameters, torque, PULSE_WIDTH, steps_per_pulse)
 
@@ -39,20 +43,15 @@ def speeds_after_collisions(
     parameters: WalkerParameters, initial_speed: float, steps: int
 ) -> Floats:
     """
-    Walk from an initial speed [m/s] and return the speed after that many collisions.
+    Walk from an initial speed [m/s] and return the speeds after that many collisions.
 
-    Sampled in the single stance before and carried to the collision by energy, so that the
-    rounding of the collision's instant to nanoseconds does not enter.
+    They are sampled in the single stance before and carried to the collision by energy, so that
+    the rounding of its instant to nanoseconds does not matter.
     """
     p = parameters
     walker = Walker(p, Side.RIGHT, initial_speed)
-    strikes: list[int] = []
-    seconds = 1
-    while len(strikes) < steps and walker.ending is None:
-        walker = Walker(p, Side.RIGHT, initial_speed)
-        seconds *= 2
-        events = walker.advance(seconds * 10**9)
-        strikes = [e.stamp for e in events if e.kind is EventKind.HEEL_STRIKE and e.step > 0]
+    events = walker.advance(steps * _LONGEST_STEP)
+    strikes = [e.stamp for e in events if e.kind is EventKind.HEEL_STRIKE and e.step > 0]
     samples = walker.sample(np.array(strikes[:steps], np.int64) - _BEFORE_STRIKE)
     index = np.arange(samples.leading.size)
     rate = samples.velocity[index, samples.leading]
@@ -99,9 +98,9 @@ def outcomes_along(
     parameters: WalkerParameters, offsets: Floats, initial_phases: Floats
 ) -> list[Outcome]:
     """
-    Walk at each pulse period offset [s] from every initial phase; the worst outcome of each.
+    Walk at each pulse period offset [s] from every initial phase; return the worst outcomes.
 
-    Locked counts only if all are; a walk is made long enough to slip through a whole cycle.
+    A walk is made long enough to slip through a whole cycle.
     """
     period = paper_pulses(parameters).unperturbed_period
     found = []
@@ -111,21 +110,14 @@ def outcomes_along(
             paper_walk(parameters, float(offset), float(phase), strides).outcome()
             for phase in initial_phases
         ]
-        order = [
-            Outcome.LOCKED,
-            Outcome.CENSORED,
-            Outcome.SLIPPING,
-            Outcome.FELL,
-            Outcome.FLEW_OFF,
-        ]
-        found.append(max(outcomes, key=order.index))
+        found.append(max(outcomes, key=list(Outcome).index))
     return found
 
 
 def torque_profiles(
     parameters: WalkerParameters, walk: PulsedWalk, points: int
 ) -> list[tuple[Floats, Samples]]:
-    """Sample a walk under the paper's pulses anew: per stride, time since heel strike, samples."""
+    """Repeat a walk under the paper's pulses and sample it: times and samples of each stride."""
     gait = paper_pulses(parameters)
     walker = Walker(parameters, Side.RIGHT)
     onsets = np.rint(walk.onsets * 1e9).astype(np.int64)
@@ -135,7 +127,7 @@ def torque_profiles(
     walker.extend_torque(Side.LEFT, [], [], 2 * end)
     walker.advance(end)
     strides = []
-    for begin, stop in zip(walk.heel_strikes[:-1], walk.heel_strikes[1:], strict=True):
+    for begin, stop in pairwise(walk.heel_strikes):
         stamps = np.linspace(begin * 1e9, stop * 1e9, points).astype(np.int64)
         strides.append(((stamps - stamps[0]) * 1e-9, walker.sample(np.minimum(stamps, end))))
     return strides

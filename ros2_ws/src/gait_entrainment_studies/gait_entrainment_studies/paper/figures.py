@@ -1,30 +1,19 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""
-The paper's figures 4 to 8 from our model, in the paper's layout.
-
-matplotlib is imported only when a figure is drawn: it takes longer than the simulations.
-"""
+"""The paper's figures 4 to 8 from our model, in the paper's layout."""
 
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from gait_entrainment import drawing
 from gait_entrainment.conventions import Side
-from gait_entrainment.drawing import (
-    BLACK,
-    BLUE,
-    COLOURS,
-    DASHES,
-    GREEN,
-    GREY,
-    ORANGE,
-    new_figure,
-    save_figure,
-)
+from gait_entrainment.drawing import BESIDE, BLACK, COLOURS, DASHES, GREY, ORANGE
 from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment_studies.locking.branches import branches_of
+from gait_entrainment_studies.locking.figures import PLACE_COLOURS
 from gait_entrainment_studies.paper.experiments import (
     paper_pulses,
     paper_walk,
@@ -37,22 +26,24 @@ _ENTRAINED = (-76, -60, -50, -40, -20)
 _NOT_ENTRAINED = (-100, -80, 20, 60, 100)
 
 
-def draw_figures(folder: Path, parameters: WalkerParameters | None = None) -> list[Path]:
+def draw_figures(folder: Path) -> list[Path]:
     """Draw all figures as PNG and SVG into a folder; return their paths."""
-    p = WalkerParameters() if parameters is None else parameters
     figures = {
-        "figure_4": _convergence(p),
-        "figure_5": _entrainment(p),
-        "figure_6b": _phase_locking(p),
-        "figure_7": _torque_profiles(p),
-        "figure_8": _speed_curve(p),
+        "figure_4": _convergence,
+        "figure_5": _entrainment,
+        "figure_6b": _phase_locking,
+        "figure_7": _torque_profiles,
+        "figure_8": _speed_curve,
     }
-    return [path for name, drawn in figures.items() for path in save_figure(drawn, folder, name)]
+    paths = []
+    for name, draw in figures.items():
+        paths += drawing.save_figure(draw(WalkerParameters()), folder, name)
+    return paths
 
 
 def _convergence(p: WalkerParameters) -> Any:
     """Fig. 4: errors of the angular velocity after the collisions."""
-    figure, axes = new_figure()
+    figure, axes = drawing.new_figure()
     fixed, steps = p.speed_after_collision, 6
     for factor, colour, dash in zip((1.2, 1.1, 1.05, 0.95, 0.9), COLOURS, DASHES, strict=False):
         speeds = speeds_after_collisions(p, factor * fixed, steps)
@@ -63,13 +54,13 @@ def _convergence(p: WalkerParameters) -> Any:
     axes.axhline(0, color=GREY, lw=0.8)
     axes.set(xlabel="step", ylabel="error of angular velocity [rad/s]")
     axes.set_title("Fig. 4: asymptotic stability of the period-one gait", fontsize=11)
-    axes.legend(frameon=False)
+    drawing.add_legend(axes, fontsize=10)
     return figure
 
 
 def _entrainment(p: WalkerParameters) -> Any:
     """Fig. 5: stride period against stride number, entrained and not."""
-    figure, panels = new_figure(2, size=(7.2, 7.0), sharex=True, sharey=True)
+    figure, panels = drawing.new_figure(2, size=(7.2, 7.0), sharex=True, sharey=True)
     period = paper_pulses(p).unperturbed_period
     titles = ("(a) entrained", "(b) not entrained")
     for axes, offsets, title in zip(panels, (_ENTRAINED, _NOT_ENTRAINED), titles, strict=True):
@@ -80,7 +71,7 @@ def _entrainment(p: WalkerParameters) -> Any:
             number = np.arange(1, strides.size + 1)
             axes.plot(number, strides, color=colour, ls=dash, lw=1.3, label=label)
         axes.set(ylabel="stride period [s]", title=title)
-        axes.legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
+        drawing.add_legend(axes, **BESIDE)
     panels[0].annotate(
         r"$2\tau_0$", (100, period), textcoords="offset points", xytext=(2, 3), color=GREY
     )
@@ -91,12 +82,12 @@ def _entrainment(p: WalkerParameters) -> Any:
 
 def _phase_locking(p: WalkerParameters) -> Any:
     """Fig. 6b: pulse onset after toe-off, from many initial phases."""
-    figure, axes = new_figure()
+    figure, axes = drawing.new_figure()
     axes.axhline(0, color=GREY, ls="--", lw=1.0)
     axes.annotate("toe-off", (60, 0), textcoords="offset points", xytext=(-40, 4), color=GREY)
     for i, phase in enumerate(np.arange(16) / 16):
         lags = paper_walk(p, -0.05, float(phase), 62).lags[:61]
-        # Where the lag wraps by a stride the line is broken.
+        # Break the line where the lag wraps by a stride.
         lags = np.where(np.abs(np.diff(lags, prepend=lags[0])) > 1, np.nan, lags)
         axes.plot(lags, color=COLOURS[i % len(COLOURS)], ls=DASHES[i // 6], lw=1.1)
     axes.set(xlabel="stride", ylabel="pulse onset after toe-off [s]")
@@ -110,7 +101,7 @@ def _torque_profiles(p: WalkerParameters) -> Any:
     """Fig. 7: torque of the trailing ankle, stride by stride."""
     count = 20
     walk = paper_walk(p, -0.05, 0.86, count + 2)
-    figure, axes = new_figure(size=(7.2, 7.0))
+    figure, axes = drawing.new_figure(size=(7.2, 7.0))
     spacing = 0.62 * p.peak_torque
     for number, (time, samples) in enumerate(torque_profiles(p, walk, 1200)[:count], start=1):
         base = -number * spacing
@@ -138,7 +129,7 @@ def _torque_profiles(p: WalkerParameters) -> Any:
     axes.annotate("stride period [s]", (1.9, 0.2 * spacing), color="#C00000", fontsize=8)
     axes.plot([], [], color=ORANGE, lw=6, label="pulse, acting")
     axes.plot([], [], color=ORANGE, ls=":", label="pulse, without effect")
-    axes.legend(frameon=False, loc="upper center", fontsize=8, ncols=2)
+    drawing.add_legend(axes, loc="upper center", ncols=2)
     title = rf"Fig. 7: ankle torque under pulses every {walk.period:.4f} s ($2\tau_0 - 50$ ms)"
     axes.set_title(title, fontsize=11)
     return figure
@@ -146,34 +137,23 @@ def _torque_profiles(p: WalkerParameters) -> Any:
 
 def _speed_curve(p: WalkerParameters) -> Any:
     """Fig. 8: average speed against the onset of the pulse after the start of double stance."""
-    figure, axes = new_figure()
+    figure, axes = drawing.new_figure()
     for steps, dash, every in ((2, "-", "stride"), (1, "--", "step")):
         gait = paper_pulses(p, steps)
         slowest = steps * p.step_length / gait.unperturbed_period
-        branches = (
-            (gait.early(np.linspace(gait.heel_strike, gait.first_end, 100)), ORANGE),
-            (gait.inside(np.linspace(gait.heel_strike, gait.last_start, 100)), BLUE),
-            (gait.late(np.linspace(gait.last_start, gait.toe_off, 100)), GREEN),
-        )
-        for gaits, colour in branches:
+        for place, first, last, _ in branches_of(gait):
+            gaits = gait.gaits(place, np.linspace(first, last, 100))
             speed = steps * p.step_length / gaits.period
-            axes.plot(gaits.onset, speed, color=colour, ls=dash, lw=1.8)
+            axes.plot(gaits.onset, speed, color=PLACE_COLOURS[place], ls=dash, lw=1.8)
         axes.plot([], [], color=BLACK, ls=dash, label=f"pulse in every {every}")
     toe_off = float(gaits.double_stance[-1])
     axes.plot([-0.25, -0.1], [slowest] * 2, color=GREY, lw=1.8)
     axes.plot([toe_off, 0.5], [slowest] * 2, color=GREY, lw=1.8)
-    for label, colour in (
-        ("pulse begins before double stance", ORANGE),
-        ("pulse inside double stance", BLUE),
-        ("pulse outlasts double stance", GREEN),
-        ("pulse in swing", GREY),
-    ):
-        axes.plot([], [], color=colour, lw=3, label=label)
-    for place, name in ((0.0, "start of double stance"), (toe_off, "toe-off")):
-        axes.axvline(place, color=GREY, ls=":", lw=1.0)
-        axes.annotate(
-            name, (place, 1.027), textcoords="offset points", xytext=(3, 0), color=GREY, fontsize=8
-        )
+    for place, colour in PLACE_COLOURS.items():
+        axes.plot([], [], color=colour, lw=3, label=place.value)
+    axes.plot([], [], color=GREY, lw=3, label="pulse in swing")
+    drawing.mark_instant(axes, 0.0, "start of double stance", 1.027, 0)
+    drawing.mark_instant(axes, toe_off, "toe-off", 1.027, 0)
     axes.set(
         xlabel=r"pulse onset $\phi$ after the start of double stance [s]",
         ylabel="average speed [m/s]",
@@ -181,5 +161,5 @@ def _speed_curve(p: WalkerParameters) -> Any:
         xlim=(-0.25, 0.8),
     )
     axes.set_title("Fig. 8: average speed against the phase of the pulse", fontsize=11)
-    axes.legend(frameon=False, fontsize=8, loc="upper right")
+    drawing.add_legend(axes, loc="upper right")
     return figure

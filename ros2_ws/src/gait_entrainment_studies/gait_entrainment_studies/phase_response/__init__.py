@@ -2,13 +2,3 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """Response of the gait's timing to single pulses, and the lock that it predicts."""
-
-from gait_entrainment_studies.phase_response.response import (
-    PhaseResponse,
-    Prediction,
-    phase_response,
-    predictions,
-    single_pulse,
-)
-
-__all__ = ["PhaseResponse", "Prediction", "phase_response", "predictions", "single_pulse"]

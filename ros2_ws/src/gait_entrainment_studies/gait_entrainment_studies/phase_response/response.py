@@ -7,7 +7,7 @@ The phase response: what one single pulse, at each phase, does to the timing of 
 A single pulse is one in so many steps that its effect has died out before the next. So the curve
 is a branch of `locking.PulsedGait` with that many steps per pulse, exact like those, and the lock
 that the curve predicts (shift = unperturbed minus pulse period) is a locked gait of that walker.
-The prediction neglects what a pulse leaves over for the next: a factor cos(2 alpha)^4 per stride.
+The prediction neglects what a pulse leaves for the next: a factor cos(2 alpha)^4 per stride.
 """
 
 import math
@@ -16,10 +16,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment_studies.locking import LockedGait, PulsedGait, locked_gaits, pieces_of
-from gait_entrainment_studies.locking.pulsed_gait import Floats
+from gait_entrainment_studies.locking.branches import (
+    LockedGait,
+    branches_of,
+    locked_gaits,
+    pieces_of,
+)
+from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
+from gait_entrainment_studies.locking.roots import Floats
 
-# What is left of a disturbance when the gait counts as recovered: below rounding.
+# What may be left of a disturbance when the gait has recovered: less than rounding.
 _RECOVERED = 1e-17
 
 
@@ -55,7 +61,7 @@ class Prediction:
 
 
 def single_pulse(parameters: WalkerParameters, torque: float, width: float) -> PulsedGait:
-    """Return the walker with so few pulses that it has recovered from each before the next."""
+    """Return the gaits with so few pulses that the walker has recovered before the next."""
     strides = math.ceil(math.log(_RECOVERED) / math.log(parameters.floquet_multiplier) / 2)
     return PulsedGait(parameters, torque, width, steps_per_pulse=2 * max(strides, 1))
 
@@ -66,31 +72,27 @@ def phase_response(
     """
     Return the phase response with `points` points on each branch.
 
-    Where the walker would fall or fly off under the pulse the values are NaN.
+    It is NaN if the walker would fall or fly off under the pulse.
     """
     single = single_pulse(parameters, torque, width)
     step = single.unperturbed_period / single.steps_per_pulse
-    struck, off = single.heel_strike, single.toe_off
-    branches = [single.early(np.linspace(struck, single.first_end, points))]
-    if single.last_start > struck:
-        branches.append(single.inside(np.linspace(struck, single.last_start, points)))
-    branches.append(single.late(np.linspace(single.last_start, off, points)))
-    # Outside, where the leg does not trail, a pulse does nothing.
-    toe_off = float(branches[-1].double_stance[-1])
-    onsets, shifts, firsts = [np.array([-step, -width])], [np.zeros(2)], [np.zeros(2)]
-    for branch in branches:
-        sound = np.where(branch.feasible, 1.0, np.nan)
-        onsets.append(branch.onset)
-        shifts.append(sound * (single.unperturbed_period - branch.period))
-        firsts.append(sound * (step - branch.step))
-    onset = np.concatenate([*onsets, [toe_off, step]])
+    branches = [
+        single.gaits(place, np.linspace(first, last, points))
+        for place, first, last, _ in branches_of(single)
+    ]
+    whole = single.unperturbed_period
+    shifts = [np.where(one.feasible, whole - one.period, np.nan) for one in branches]
+    firsts = [np.where(one.feasible, step - one.step, np.nan) for one in branches]
+    # Before and after, when the leg does not trail, a pulse does nothing.
+    toe_off, nothing = float(branches[-1].double_stance[-1]), np.zeros(2)
+    onset = np.concatenate([[-step, -width], *(b.onset for b in branches), [toe_off, step]])
     return PhaseResponse(
         stride_period=2 * step,
         phase=(onset + step) / (2 * step),
         onset=onset,
         lag=onset - toe_off,
-        shift=np.concatenate([*shifts, np.zeros(2)]),
-        first_stride_shift=np.concatenate([*firsts, np.zeros(2)]),
+        shift=np.concatenate([nothing, *shifts, nothing]),
+        first_stride_shift=np.concatenate([nothing, *firsts, nothing]),
     )
 
 
@@ -100,8 +102,8 @@ def predictions(
     """
     Compare predicted and exact stable locks at pulse periods [s] off the unperturbed stride.
 
-    Where there are two attractors, each is compared with its like; a lock that only one of the
-    two knows is left out.
+    If there are two attractors, each is compared with its like; a lock that only one of the two
+    methods finds is left out.
     """
     single = single_pulse(parameters, torque, width)
     every = PulsedGait(parameters, torque, width)

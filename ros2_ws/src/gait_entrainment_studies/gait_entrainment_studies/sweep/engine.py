@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Who makes the rows: processes of this machine, or the workers of a Dask cluster.
+What makes the rows: processes of this machine, or the workers of a Dask cluster.
 
-Rows come back as they are made and are written at once; nothing else is kept.
+Rows come back in the order in which they are made.
 """
 
 import asyncio
@@ -13,19 +13,16 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
 from gait_entrainment_studies.sweep.plan import SweepError, SweepPlan
 from gait_entrainment_studies.sweep.row import Row, sweep_row
 
-# A scheduler that does not answer is named within this time [s].
+# A scheduler that does not answer within this time [s] is reported.
 SCHEDULER_TIMEOUT = 6.0
-
-# Rows handed out ahead of those that are made: enough to keep every worker busy.
-_AHEAD = 2
 
 Rows = Iterator[tuple[int, Row]]
 
@@ -41,47 +38,35 @@ def rows_by_processes(plan: SweepPlan, indices: Sequence[int], jobs: int) -> Row
         for index in indices:
             yield index, sweep_row(plan, index)
         return
-    # A copy of this process has everything loaded and starts at once; but a copy of one with
-    # threads may hang, so that one has its workers made by a server.
+    # A fork of this process has everything loaded and starts at once, but the fork of a process
+    # with threads may hang; that one gets its workers from a server.
     alone = threading.active_count() == 1
     context = multiprocessing.get_context("fork" if alone else "forkserver")
-    # Ctrl-C reaches every process of the terminal; only this one answers it.
+    # Ctrl-C reaches every process of the terminal; only this one reacts to it.
     pool = ProcessPoolExecutor(
         jobs, context, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)
     )
     try:
-        yield from _in_flight(lambda index: pool.submit(sweep_row, plan, index), indices, jobs)
+        futures = {pool.submit(sweep_row, plan, index): index for index in indices}
+        for future in as_completed(list(futures)):
+            yield futures.pop(future), future.result()
     except BrokenProcessPool:
         raise SweepError(
-            f"one of {jobs} processes was killed, perhaps for want of memory: give the same"
-            " command again, or with fewer --jobs; what is made is kept"
+            f"one of {jobs} processes was killed, perhaps because memory ran out: give the same"
+            " command again, perhaps with fewer --jobs; what is made is kept"
         ) from None
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
-
-
-def _in_flight(submit: Callable[[int], "Future[Row]"], indices: Sequence[int], jobs: int) -> Rows:
-    waiting = iter(indices)
-    running: dict[Future[Row], int] = {}
-    while True:
-        for index in waiting:
-            running[submit(index)] = index
-            if len(running) >= _AHEAD * jobs:
-                break
-        if not running:
-            return
-        for future in wait(running, return_when=FIRST_COMPLETED).done:
-            yield running.pop(future), future.result()
 
 
 def rows_by_dask(plan: SweepPlan, indices: Sequence[int], scheduler: str) -> Rows:
     """
     Make rows on a Dask cluster.
 
-    Raises SweepError where its scheduler does not answer or a row cannot be made there.
+    Raises SweepError if its scheduler does not answer or a row cannot be made there.
     """
     try:
-        dask: Any = importlib.import_module("distributed")
+        dask: Any = importlib.import_module("distributed")  # optional, and slow to load
     except ImportError:
         raise SweepError("--scheduler needs Dask: pip install distributed") from None
     _ask_who_it_is(dask, scheduler)
@@ -101,7 +86,7 @@ def rows_by_dask(plan: SweepPlan, indices: Sequence[int], scheduler: str) -> Row
 
 
 def _ask_who_it_is(dask: Any, scheduler: str) -> None:
-    """Let the scheduler tell its kind: Dask's client waits forever for another service."""
+    """Check that a scheduler answers: Dask's client waits forever for another service."""
 
     async def kind() -> str:
         async with dask.rpc(scheduler) as remote:
@@ -110,7 +95,7 @@ def _ask_who_it_is(dask: Any, scheduler: str) -> None:
 
     try:
         answer = asyncio.run(kind())
-    except Exception as error:  # another service answers with anything
+    except Exception as error:  # another service may answer anything
         raise SweepError(
             f"scheduler {scheduler} does not answer within {SCHEDULER_TIMEOUT:g} s"
             f" ({type(error).__name__}): start it, or leave out --scheduler"

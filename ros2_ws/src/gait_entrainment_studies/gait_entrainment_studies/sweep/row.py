@@ -1,79 +1,120 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One row of the tongue: all pulse periods at one torque, solved and walked."""
+"""What is solved and walked at one torque: the cells of a row, and the exact borders."""
 
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from gait_entrainment_studies.locking import (
-    Outcome,
-    PulsedGait,
-    pieces_of,
-    stable_intervals,
-    walk_under_pulses,
-)
+from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment_studies.locking.branches import pieces_of, stable_intervals
+from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
+from gait_entrainment_studies.locking.roots import Floats
+from gait_entrainment_studies.locking.walked import Outcome, walk_under_pulses
 from gait_entrainment_studies.sweep.plan import SweepPlan
 
 # A lag that creeps by less than this per stride [s] counts as locked by the last stride. At a
-# pulse period closer than this to a border, walking cannot tell and the exact map decides.
+# pulse period closer than this to a border walking cannot tell, and the exact map decides.
 _CREEP = 1e-5
 
-SHARES = {
-    "share_locked": Outcome.LOCKED,
-    "share_alternating": Outcome.ALTERNATING,
-    "share_slipping": Outcome.SLIPPING,
-    "share_censored": Outcome.CENSORED,
-    "share_fell": Outcome.FELL,
-    "share_flew_off": Outcome.FLEW_OFF,
-}
 
-Row = dict[str, Any]
+@dataclass(frozen=True)
+class Cell:
+    """One pulse period at one torque: the columns of the table."""
+
+    torque: float
+    """[N m]"""
+    torque_fraction: float
+    period_offset: float
+    """Pulse period minus the unperturbed stride period [s]."""
+    stable_locks: int
+    """Number of stable 1:1 locks, solved."""
+    share_locked: float = np.nan
+    """Share of the initial phases with this outcome, walked; NaN if there is a problem."""
+    share_alternating: float = np.nan
+    share_slipping: float = np.nan
+    share_censored: float = np.nan
+    share_fell: float = np.nan
+    share_flew_off: float = np.nan
+    median_lag: float = np.nan
+    """Of the last pulses of the walks that locked [s]."""
+    problem: str = ""
+    """Why the cell was not walked."""
+
+
+Row = dict[str, NDArray[np.generic]]
+"""The cells of one torque, by column."""
 
 
 def sweep_row(plan: SweepPlan, index: int) -> Row:
-    """
-    Return the columns of one torque, a cell per pulse period.
-
-    `stable_locks` is the number of stable 1:1 locks, solved; the shares are of the initial phases,
-    walked. `problem` says why a cell could not be asked: its shares are NaN then.
-    """
+    """Return the row of one torque, a cell for each pulse period."""
     fraction = float(plan.torque_fractions.values[index])
     torque = fraction * plan.walker.peak_torque
-    offsets = plan.period_offsets.values
     gait = PulsedGait(plan.walker, torque, plan.width)
     stable = stable_intervals(pieces_of(gait)) if torque != 0 else []
-    periods = gait.unperturbed_period + offsets
-    locks = np.zeros(offsets.size, np.int64)
-    for piece in stable:
-        locks += (piece.least_period.period < periods) & (periods < piece.greatest_period.period)
-    row: Row = {
-        "torque": np.full(offsets.size, torque),
-        "torque_fraction": np.full(offsets.size, fraction),
-        "period_offset": offsets,
-        "stable_locks": locks,
-        **{name: np.full(offsets.size, np.nan) for name in SHARES},
-        "median_lag": np.full(offsets.size, np.nan),
-        "problem": [""] * offsets.size,
-    }
-    for i, period in enumerate(periods):
+    cells = []
+    for offset in plan.period_offsets.values:
+        period = float(gait.unperturbed_period + offset)
+        locks = sum(
+            one.least_period.period < period < one.greatest_period.period for one in stable
+        )
         if period <= plan.width:
-            row["problem"][i] = "pulses overlap"
-            continue
-        if abs(period - gait.unperturbed_period) < _CREEP:
-            row["problem"][i] = "the stride period itself: a pulse in swing stays where it is"
-            continue
-        outcomes, lags = [], []
-        for phase in np.arange(plan.phases) / plan.phases:
-            walk = walk_under_pulses(
-                plan.walker, torque, plan.width, float(period), float(phase), plan.strides
+            walked: dict[str, Any] = {"problem": "pulses overlap"}
+        elif abs(period - gait.unperturbed_period) < _CREEP:
+            walked = {"problem": "the stride period itself: a pulse in swing stays where it is"}
+        else:
+            walked = _walked(plan, torque, period)
+        cells.append(Cell(torque, fraction, float(offset), locks, **walked))
+    return {
+        field.name: np.array([getattr(cell, field.name) for cell in cells])
+        for field in fields(Cell)
+    }
+
+
+def _walked(plan: SweepPlan, torque: float, period: float) -> dict[str, float]:
+    """Return the fields of a cell that walks from every initial phase give."""
+    walks = [
+        walk_under_pulses(plan.walker, torque, plan.width, period, float(phase), plan.strides)
+        for phase in np.arange(plan.phases) / plan.phases
+    ]
+    outcomes = [walk.outcome(_CREEP) for walk in walks]
+    shares = {
+        f"share_{outcome.name.lower()}": outcomes.count(outcome) / plan.phases
+        for outcome in Outcome
+    }
+    pairs = zip(walks, outcomes, strict=True)
+    lags = [float(walk.lags[-1]) for walk, outcome in pairs if outcome is Outcome.LOCKED]
+    return {**shares, "median_lag": float(np.median(lags)) if lags else np.nan}
+
+
+@dataclass(frozen=True)
+class StableInterval:
+    """Pulse periods with a stable lock at one torque, off the unperturbed stride period [s]."""
+
+    torque_fraction: float
+    place: str
+    shortest: float
+    shortest_border: str
+    lag_at_shortest: float
+    longest: float
+    longest_border: str
+    lag_at_longest: float
+
+
+def exact_borders(
+    walker: WalkerParameters, torque_fractions: Floats, width: float
+) -> list[StableInterval]:
+    """Solve for the borders at each torque, given as a fraction of the peak ankle torque."""
+    found = []
+    for fraction in torque_fractions[np.abs(torque_fractions) > 0].tolist():
+        gait = PulsedGait(walker, fraction * walker.peak_torque, width)
+        for piece in stable_intervals(pieces_of(gait)):
+            shortest, longest = (
+                (end.period - gait.unperturbed_period, end.border.value, end.lag)
+                for end in (piece.least_period, piece.greatest_period)
             )
-            outcomes.append(walk.outcome(_CREEP))
-            if outcomes[-1] is Outcome.LOCKED:
-                lags.append(walk.last_lag)
-        for name, outcome in SHARES.items():
-            row[name][i] = outcomes.count(outcome) / plan.phases
-        if lags:
-            row["median_lag"][i] = np.median(lags)
-    return row
+            found.append(StableInterval(fraction, piece.place.value, *shortest, *longest))
+    return found

@@ -8,17 +8,18 @@ import numpy as np
 import pytest
 
 from gait_entrainment.commands import main
+from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.protocol import Protocol, PulsePlan
 from gait_entrainment.simulation import simulate
-from gait_entrainment_studies.cohort import (
-    StudyPlan,
-    SubjectDistributions,
-    draw_subjects,
-    run_study,
-    table_1_subjects,
-    verdicts,
-)
-from gait_entrainment_studies.locking import PulsedGait, locked_gaits
+from gait_entrainment_studies.cohort.study import StudyPlan, run_study, verdicts
+from gait_entrainment_studies.cohort.subjects import SubjectDistributions, Subjects, draw_subjects
+from gait_entrainment_studies.locking.branches import locked_gaits
+from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
+
+
+def table_1_subjects(count, variation):
+    """Subjects that are all the walker of Table 1: what noise alone does."""
+    return Subjects((WalkerParameters(),) * count, np.full(count, variation), 0)
 
 
 def test_without_variability_the_trial_is_the_experiment_of_entrain_simulate():
@@ -107,13 +108,13 @@ def test_command_counts_every_subject_in_its_denominators(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--mass", "10", "6"], "mass 10 +/- 6 [kg] is out of range"),
-        (["--slope", "0.7"], "slope 0.7 rad is out of range"),
-        (["--period-offset", "-1.5"], "period_offset -1.5 s is out of range"),
-        (["--period-offset", "-0.5", "--width", "0.7"], "period_offset -0.5 s is out of range"),
-        (["--initial-phase", "inf"], "initial_phase inf is out of range; allowed: 0 to below 1"),
-        (["--subjects", "1"], "subjects 1 is out of range; allowed: at least 2"),
-        (["--seed", "-1"], "seed -1 is out of range; allowed: at least 0"),
+        (["--mass", "10", "6"], "mass: 10 +/- 6; allowed: a mean above twice"),
+        (["--slope", "0.7"], "slope: 0.7 rad; allowed: within the leg angle"),
+        (["--period-offset", "-1.5"], "period_offset: -1.5 s; allowed: within"),
+        (["--period-offset", "-0.5", "--width", "0.7"], "period_offset: -0.5 s; allowed: within"),
+        (["--initial-phase", "inf"], "initial_phase: 'inf'; allowed: at least 0 and below 1"),
+        (["--subjects", "1"], "subjects: '1'; allowed: a whole number at least 2"),
+        (["--seed", "-1"], "seed: '-1'; allowed: a whole number at least 0"),
         (["--peak-torque", "0.9", "0.001"], "hardly a subject drawn has a gait"),
     ],
 )

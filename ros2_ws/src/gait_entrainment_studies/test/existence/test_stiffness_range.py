@@ -10,7 +10,11 @@ import pytest
 from gait_entrainment.conventions import Side
 from gait_entrainment.parameters import ParameterError, WalkerParameters
 from gait_entrainment.walker import Walker
-from gait_entrainment_studies.existence import Limit, existence_map, stiffness_range
+from gait_entrainment_studies.existence.stiffness_range import (
+    Limit,
+    existence_map,
+    stiffness_range,
+)
 
 TABLE_1 = WalkerParameters()
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from walked_stride import walk_a_stride
 
 from gait_entrainment.parameters import ParameterError, WalkerParameters
-from gait_entrainment_studies.locking import PulsedGait
+from gait_entrainment_studies.locking.pulsed_gait import Place, PulsedGait
 
 TABLE_1 = WalkerParameters()
 
@@ -18,9 +18,9 @@ def gaits_of(gait):
     inner = np.linspace(0.08, 0.92, 6)
     struck, off = gait.heel_strike, gait.toe_off
     return {
-        "early": gait.early(struck + inner * (gait.first_end - struck)),
-        "inside": gait.inside(struck + inner * (gait.last_start - struck)),
-        "late": gait.late(gait.last_start + inner * (off - gait.last_start)),
+        "early": gait.gaits(Place.EARLY, struck + inner * (gait.first_end - struck)),
+        "inside": gait.gaits(Place.INSIDE, struck + inner * (gait.last_start - struck)),
+        "late": gait.gaits(Place.LATE, gait.last_start + inner * (off - gait.last_start)),
     }
 
 
@@ -84,7 +84,7 @@ def test_walkers_whose_double_stance_takes_more_nodes_have_their_gaits_too():
 def test_slope_is_the_derivative_of_the_period_along_each_branch():
     gait = PulsedGait(TABLE_1, 13.3, 0.1)
     start = np.linspace(gait.heel_strike, gait.last_start, 2001)
-    gaits = gait.inside(start)
+    gaits = gait.gaits(Place.INSIDE, start)
     assert np.gradient(gaits.period, gaits.onset)[1:-1] == pytest.approx(
         gaits.slope[1:-1], abs=1e-6
     )
@@ -115,11 +115,11 @@ def test_gaits_of_any_walker_are_walked(leg_angle, push, fraction, width, place,
         assume(False)
     struck, off, start, end = gait.heel_strike, gait.toe_off, gait.last_start, gait.first_end
     if branch == "early":
-        gaits = gait.early(np.array([struck + place * (end - struck)]))
+        gaits = gait.gaits(Place.EARLY, np.array([struck + place * (end - struck)]))
     elif branch == "inside":
-        gaits = gait.inside(np.array([struck + place * (start - struck)]))
+        gaits = gait.gaits(Place.INSIDE, np.array([struck + place * (start - struck)]))
     else:
-        gaits = gait.late(np.array([start + place * (off - start)]))
+        gaits = gait.gaits(Place.LATE, np.array([start + place * (off - start)]))
     assume(bool(gaits.feasible[0]))
     one = gaits.at(0)
     walked = walk_a_stride(parameters, gait.speed(one.apex), one.onset, torque, width)
@@ -141,5 +141,5 @@ def existence(leg_angle):
 
 
 def test_a_pulse_longer_than_a_step_is_refused():
-    with pytest.raises(ValueError, match=r"width 1 s .* a step, 0\.9666 s"):
+    with pytest.raises(ValueError, match=r"width: 1 s; .* a step, 0\.9666 s"):
         PulsedGait(TABLE_1, 13.3, 1.0)

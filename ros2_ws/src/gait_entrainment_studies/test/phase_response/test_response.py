@@ -7,7 +7,7 @@ import pytest
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.walker import Walker
-from gait_entrainment_studies.phase_response import phase_response, predictions
+from gait_entrainment_studies.phase_response.response import phase_response, predictions
 
 TABLE_1 = WalkerParameters()
 TORQUE, WIDTH = 0.1 * TABLE_1.peak_torque, 0.1

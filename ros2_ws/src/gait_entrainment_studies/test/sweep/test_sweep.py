@@ -16,22 +16,14 @@ import numpy as np
 import pytest
 
 from gait_entrainment.commands import main
+from gait_entrainment.errors import UsageError
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment_studies.locking import Outcome, walk_under_pulses
-from gait_entrainment_studies.sweep import (
-    Axis,
-    SweepError,
-    SweepPlan,
-    SweepStore,
-    engine,
-    exact_borders,
-    read_sweep,
-    rows_by_dask,
-    rows_by_processes,
-    sweep_row,
-)
-
-pytest.importorskip("pyarrow", reason="a sweep is kept as Parquet: pip install pyarrow")
+from gait_entrainment_studies.locking.walked import Outcome, walk_under_pulses
+from gait_entrainment_studies.sweep import engine
+from gait_entrainment_studies.sweep.engine import rows_by_dask, rows_by_processes
+from gait_entrainment_studies.sweep.plan import Axis, SweepError, SweepPlan
+from gait_entrainment_studies.sweep.row import exact_borders, sweep_row
+from gait_entrainment_studies.sweep.store import SweepStore, read_sweep
 
 TABLE_1 = WalkerParameters()
 
@@ -171,7 +163,7 @@ def test_a_sweep_is_resumed_only_with_its_own_plan(tmp_path):
     store = SweepStore(tmp_path, plan)
     store.add(1, sweep_row(plan, 1))
     assert SweepStore(tmp_path, plan).missing() == [0, 2]
-    with pytest.raises(SweepError, match=r"plan\.strides 120, not 99: resume it with that"):
+    with pytest.raises(UsageError, match=r"plan\.strides 120, not 99: resume it with that"):
         SweepStore(tmp_path, plan_of(strides=99))
 
 
@@ -236,12 +228,12 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path, capsys):
     ("arguments", "message"),
     [
         (["--torque-fractions", "0.2", "0.1", "3"], "torque_fractions: 0.2 to 0.1"),
-        (["--period-offsets", "-0.1", "0", "0"], "period_offsets: 0 values"),
-        (["--period-offsets", "-0.1", "0", "2.5"], "period_offsets: 2.5 values"),
-        (["--torque-fractions", "0", "0.1", "nan"], "torque_fractions: nan values"),
-        (["--width", "1.2"], "width 1.2 s is out of range"),
-        (["--jobs", "-1"], "jobs: -1; allowed: at least 1"),
-        (["--phases", "0"], "phases: 0; allowed: at least 1"),
+        (["--period-offsets", "-0.1", "0", "0"], "period_offsets: '0'; allowed: a whole"),
+        (["--period-offsets", "-0.1", "0", "2.5"], "period_offsets: '2.5'; allowed: a whole"),
+        (["--torque-fractions", "0", "0.1", "nan"], "torque_fractions: 'nan'; allowed: a whole"),
+        (["--width", "1.2"], "width: 1.2 s; allowed: above 0 and below a step"),
+        (["--jobs", "-1"], "jobs: '-1'; allowed: a whole number at least 1"),
+        (["--phases", "0"], "phases: '0'; allowed: a whole number at least 1"),
         (["--ankle-stiffness", "200"], "the walker flies off"),
     ],
 )

@@ -1,17 +1,21 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Whole walks in one compiled call: the transitions that `Walker` runs, to the same bits."""
+"""
+Whole walks in one compiled call: the transitions that `Walker` runs, without its log.
+
+A walk gives the same bits as a `Walker`. Beyond that, each push-off may have its own stiffness.
+"""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment.walker import EndingKind
 from gait_entrainment.walker.compiled import compiled
-from gait_entrainment.walker.model import Floats, Model, Stamps, make_model, start_apex
+from gait_entrainment.walker.model import Floats, Model, Stamps, start_apex
 from gait_entrainment.walker.promise import EVER
-from gait_entrainment.walker.segment import HEEL_STRIKE, SEGMENT, TOE_OFF, WORK_SIZE, Log
+from gait_entrainment.walker.segment import SEGMENT, WORK_SIZE, Log, Stance, Switch
 from gait_entrainment.walker.trajectory import SWITCHED, Torques, proceed, start_walking
 from gait_entrainment.walker.transitions import seconds
 
@@ -31,32 +35,39 @@ class Walk(NamedTuple):
 
     heel_strikes: Floats
     toe_offs: Floats
+    ending: EndingKind | None
+    """How it ended before its last step, if it did."""
 
 
 def walk(
-    parameters: WalkerParameters,
+    model: Model,
     steps: int,
     pulses: Pulses | None = None,
-    initial_speed: float | None = None,
+    initial_apex: float | None = None,
+    stiffness: Floats | None = None,
 ) -> Walk:
     """
     Walk `steps` steps from heel strike 0 of the leg whose ankle the pulses perturb.
 
-    The walk starts as a `Walker` does. If it falls or flies off, its events end there.
+    The walk starts as a `Walker` does, unless `initial_apex` (see `model`) says otherwise.
+    `stiffness` (steps,) is that of each push-off [N m/rad]; it is written into the model, which
+    must be made for that (`variability.population`). Raises ValueError for overlapping pulses.
     """
     heel_strikes, toe_offs = np.empty(steps), np.empty(steps)
-    model = make_model(parameters)
-    changes, torques = _torque_changes(pulses)
+    log = np.zeros(1, SEGMENT)
     strikes, offs = walk_steps(
         model,
-        np.zeros(1, SEGMENT),
-        changes,
-        torques,
-        start_apex(model, initial_speed),
+        log,
+        *_torque_changes(pulses),
+        start_apex(model, None) if initial_apex is None else initial_apex,
+        np.empty(0) if stiffness is None else stiffness,
         heel_strikes,
         toe_offs,
     )
-    return Walk(np.concatenate([[0.0], heel_strikes[:strikes]]), toe_offs[:offs])
+    ending = None
+    if strikes < steps:
+        ending = EndingKind.FALL if log[0]["ends"] == Switch.FALL else EndingKind.FLY_OFF
+    return Walk(np.append(0.0, heel_strikes[:strikes]), toe_offs[:offs], ending)
 
 
 def _torque_changes(pulses: Pulses | None) -> tuple[Stamps, Floats]:
@@ -83,21 +94,26 @@ def walk_steps(
     changes: Stamps,
     torques: Floats,
     apex: float,
+    stiffness: Floats,
     heel_strikes: Floats,
     toe_offs: Floats,
 ) -> tuple[int, int]:
-    """Fill in the events [s] after heel strike 0, until one array is full; returns how many."""
+    """Fill in the events [s] after heel strike 0, until one array is full; return how many."""
     segment, robot = log[0], Torques(changes, torques, 1)
     work, cursors = np.empty(WORK_SIZE), np.array([0, 1])
-    start_walking(model, segment, 1, apex)
     strikes, offs = 0, 0
+    if stiffness.size > 0:
+        model.ankle_stiffness = stiffness[0]
+    start_walking(model, segment, 1, apex)
     while strikes < heel_strikes.size:
+        if segment.stance == Stance.SINGLE and strikes + 1 < stiffness.size:
+            model.ankle_stiffness = stiffness[strikes + 1]  # of the push-off that comes next
         if proceed(model, work, segment, robot, cursors, FOREVER) != SWITCHED:
             break
-        if segment.began == HEEL_STRIKE:
+        if segment.began == Switch.HEEL_STRIKE:
             heel_strikes[strikes] = seconds(segment.stamp, segment.rest)
             strikes += 1
-        elif segment.began == TOE_OFF:
+        elif segment.began == Switch.TOE_OFF:
             toe_offs[offs] = seconds(segment.stamp, segment.rest)
             offs += 1
     return strikes, offs

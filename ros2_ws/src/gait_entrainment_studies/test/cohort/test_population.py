@@ -10,15 +10,14 @@ from scipy.integrate import solve_ivp
 from step_to_step import step_to_step
 
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment_studies.locking import walk_under_pulses
-from gait_entrainment_studies.variability import (
+from gait_entrainment_studies.cohort.population import (
     Population,
-    PopulationWalker,
     PulseTrains,
     locked_runs,
     noise_for,
     step_noise,
 )
+from gait_entrainment_studies.locking.walked import walk_under_pulses
 
 TABLE_1 = WalkerParameters()
 PERIOD = 1.9332295304390836
@@ -30,11 +29,10 @@ def test_without_noise_it_is_the_walker_of_the_paper(fraction, tolerance):
     offsets = np.array([-0.05, -0.07, 0.02, 0.06, -0.1])
     torque = fraction * TABLE_1.peak_torque
     count = offsets.size
-    walker = PopulationWalker(Population([TABLE_1] * count), 80, 0, np.zeros(count))
     trains = PulseTrains(
         np.full(count, 0.3 * PERIOD), PERIOD + offsets, 100, np.full(count, torque), 0.1
     )
-    walk = walker.walk(80, trains)
+    walk = Population([TABLE_1] * count).walk(np.zeros((80, count)), trains)
     for i, offset in enumerate(offsets):
         reference = walk_under_pulses(TABLE_1, torque, 0.1, PERIOD + offset, 0.3, 40)
         assert walk.heel_strikes[::2, i] == pytest.approx(reference.heel_strikes, abs=tolerance)
@@ -70,7 +68,7 @@ def test_a_step_on_a_slope_is_that_of_the_equations_of_motion(slope):
         return event
 
     population = Population([p], slope)
-    apex = population.periodic_apex(population.stiffness, population.stiffness) + 0.3
+    apex = population.periodic_apex() + 0.3
     square = apex[0] + 2 * p.gravity / p.leg_length * (1 - math.cos(p.leg_angle + slope))
     tight = {"rtol": 1e-11, "atol": 1e-12, "max_step": 0.01}
     double = solve_ivp(
@@ -81,17 +79,16 @@ def test_a_step_on_a_slope_is_that_of_the_equations_of_motion(slope):
         motion, (0, 3), double.y[:, -1],
         args=(False,), events=crossing(-p.leg_angle), **tight,
     )  # fmt: skip
-    zero = np.zeros(1)
-    step = population.step(apex, population.stiffness, zero, 1.0, zero)
-    assert step.double_stance[0] == pytest.approx(double.t[-1], abs=1e-8)
-    assert step.duration[0] == pytest.approx(double.t[-1] + single.t[-1], abs=1e-8)
+    walk = population.walk(np.zeros((1, 1)), apex=apex)
+    assert walk.toe_offs[0, 0] == pytest.approx(double.t[-1], abs=1e-8)
+    assert walk.heel_strikes[1, 0] == pytest.approx(double.t[-1] + single.t[-1], abs=1e-8)
 
 
 def test_noise_gives_the_chosen_variation_and_the_same_walk_for_the_same_seed():
     population = Population([TABLE_1] * 30)
     wanted = np.full(30, 0.015)
     noise = noise_for(population, wanted, seed=3, hurst=0.75)
-    walks = [PopulationWalker(population, 600, 8, noise, 0.75).walk(600) for _ in range(2)]
+    walks = [population.walk(noise * step_noise(8, 600, 30, 0.75)) for _ in range(2)]
     periods = walks[0].stride_periods
     found = periods.std(axis=0) / periods.mean(axis=0)
     assert found.mean() == pytest.approx(0.015, rel=0.03)
@@ -99,12 +96,12 @@ def test_noise_gives_the_chosen_variation_and_the_same_walk_for_the_same_seed():
 
 
 def test_long_range_noise_has_the_covariance_of_fractional_gaussian_noise():
-    draws = step_noise(np.random.default_rng(0), 2000, 100, 0.75)
+    draws = step_noise(0, 2000, 100, 0.75)
     lags = np.array([1, 4, 16])
     expected = 0.5 * ((lags + 1) ** 1.5 - 2 * lags**1.5 + (lags - 1) ** 1.5)
     found = [np.mean(draws[:-lag] * draws[lag:]) for lag in lags]
     assert found == pytest.approx(expected, abs=0.02)
-    white = step_noise(np.random.default_rng(0), 2000, 100, 0.5)
+    white = step_noise(0, 2000, 100, 0.5)
     assert abs(np.mean(white[:-1] * white[1:])) < 0.01
     assert np.abs(draws).max() <= 3
 
@@ -112,15 +109,15 @@ def test_long_range_noise_has_the_covariance_of_fractional_gaussian_noise():
 def test_falls_and_flights_are_reported_and_end_the_walk():
     weak = replace(TABLE_1, ankle_stiffness=68.0)
     strong = replace(TABLE_1, ankle_stiffness=111.0)
-    walk = PopulationWalker(Population([weak, strong]), 200, 1, np.full(2, 0.1)).walk(200)
+    walk = Population([weak, strong]).walk(0.1 * step_noise(1, 200, 2))
     assert walk.fell.tolist() == [True, False]
     assert walk.flew_off.tolist() == [False, True]
     assert np.isnan(walk.heel_strikes[-1]).all()
 
 
 def test_asymmetry_makes_steps_alternate_and_leaves_the_walk_periodic():
-    walker = PopulationWalker(Population([TABLE_1]), 80, 0, np.zeros(1), asymmetry=0.05)
-    steps = np.diff(walker.walk(80).heel_strikes[:, 0])
+    walk = Population([TABLE_1], asymmetry=0.05).walk(np.zeros((80, 1)))
+    steps = np.diff(walk.heel_strikes[:, 0])
     assert steps[-1] == pytest.approx(steps[-3], abs=1e-12)
     assert steps[-2] - steps[-1] > 0.05
 
@@ -135,11 +132,14 @@ def test_locked_runs_count_strides_near_the_lock():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Population([TABLE_1], 0.6), "slope 0.6 rad is out of range"),
-        (lambda: step_noise(np.random.default_rng(0), 9, 1, 1.0), "hurst 1 is out of range"),
+        (lambda: Population([TABLE_1], 0.6), "slope: 0.6 rad; allowed: within the leg angle"),
         (
-            lambda: PopulationWalker(Population([TABLE_1]), 2, 0, np.zeros(1), asymmetry=2),
-            "asymmetry 2 is out of range",
+            lambda: step_noise(0, 9, 1, 1.0),
+            "hurst: 1; allowed: at least 0.5",
+        ),
+        (
+            lambda: Population([TABLE_1], asymmetry=2),
+            "asymmetry: 2; allowed: above -1",
         ),
     ],
 )
@@ -150,10 +150,7 @@ def test_values_out_of_range_are_refused(make, message):
 
 @pytest.mark.parametrize(("slope", "asymmetry"), [(-0.02, 0.0), (0.02, 0.0), (0.0, 0.04)])
 def test_a_walk_begins_in_the_gait_of_its_slope_and_legs(slope, asymmetry):
-    walker = PopulationWalker(
-        Population([TABLE_1], slope), 20, 0, np.zeros(1), asymmetry=asymmetry
-    )
-    periods = walker.walk(20).stride_periods
+    periods = Population([TABLE_1], slope, asymmetry).walk(np.zeros((20, 1))).stride_periods
     assert periods == pytest.approx(np.full_like(periods, periods[-1]), abs=1e-8)
 
 
@@ -161,7 +158,7 @@ def test_the_coefficient_of_variation_on_a_slope_is_that_asked_for():
     # Little variation: a transient from the level gait would outweigh it.
     population = Population([TABLE_1] * 8, 0.02)
     noise = noise_for(population, np.full(8, 0.002), 1)
-    periods = PopulationWalker(population, 800, 1, noise).walk(800).stride_periods[5:]
+    periods = population.walk(noise * step_noise(1, 800, 8)).stride_periods[5:]
     assert periods.std(axis=0, ddof=1) / periods.mean(axis=0) == pytest.approx(0.002, rel=0.02)
 
 
@@ -169,9 +166,11 @@ def test_a_walker_outlives_a_pulse_under_which_it_would_fall_if_it_lasted():
     onset = np.array([0.02, 0.16, -0.01, 0.1, -0.134])
     torque = np.array([-100.0, -75.0, -95.0, -160.0, 60.0])
     population = Population([TABLE_1] * 5)
-    apex = population.periodic_apex(population.stiffness, population.stiffness)
-    steps = population.step(apex, population.stiffness, onset, 0.1, torque)
+    # The perturbed leg trails in the second step, from heel strike 1 on.
+    trains = PulseTrains(PERIOD / 2 + onset, np.full(5, PERIOD), 1, torque, 0.1)
+    walk = population.walk(np.zeros((2, 5)), trains)
     reference = step_to_step(TABLE_1, TABLE_1.speed_after_collision, onset, 0.1, torque)
     # The last has ended before heel strike, where it would lift the leading leg.
-    assert not (steps.fell | steps.flew_off)[[0, 1, 2, 4]].any()
-    assert steps.duration == pytest.approx(reference.duration, abs=1e-5, nan_ok=True)
+    assert not (walk.fell | walk.flew_off)[[0, 1, 2, 4]].any()
+    duration = np.diff(walk.heel_strikes, axis=0)[1]
+    assert duration == pytest.approx(reference.duration, abs=1e-5, nan_ok=True)
