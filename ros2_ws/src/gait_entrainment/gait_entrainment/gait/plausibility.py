@@ -11,11 +11,11 @@ what is believed here, so the rule is the same in the node, in a simulation and 
 import math
 import statistics
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
-from gait_entrainment.gait.event import GaitEvent
-from gait_entrainment.settings import check_settings, setting
+from gait_entrainment.gait.strides import GaitEvent
+from gait_entrainment.settings import check_settings, setting, settings_of
 
 # Strides whose median is the person's own: enough that two wrong ones do not move it.
 _OWN_STRIDES = 7
@@ -33,8 +33,8 @@ class GaitLimits:
     to 3 %, patients by up to 10 % (Hausdorff, J. NeuroEng. Rehabil. 2, 19, 2005).
     """
 
-    stride_least: float = setting(0.3, "shortest stride", "s", (0.01, 10.0))
-    stride_most: float = setting(5.0, "longest stride", "s", (0.1, 100.0))
+    stride_least: float = setting(0.3, "shortest stride", "s", (1e-6, 1e6))
+    stride_most: float = setting(5.0, "longest stride", "s", (1e-6, 1e6))
     stride_change: float = setting(
         0.4, "largest departure of a stride from the person's own median", "1", (0.01, 1.0)
     )
@@ -51,6 +51,15 @@ class GaitLimits:
     def __post_init__(self) -> None:
         """Check every field."""
         check_settings(self)
+
+    def scaled(self, factor: float) -> "GaitLimits":
+        """Return the limits with their times multiplied, as far as a setting allows."""
+        told = settings_of(type(self))
+        times = {
+            name: min(max(getattr(self, name) * factor, told[name].least), told[name].most)
+            for name in ("stride_least", "stride_most")
+        }
+        return replace(self, **times)
 
 
 class GaitWatch:

@@ -132,7 +132,9 @@ class Population:
         for index, model in enumerate(self._models):
             one = model.copy()
             pulses = None if trains is None else trains.of(index)
-            walked = walk(one, steps, pulses, apex[index], one["ankle_stiffness"] * factors[:, index])
+            walked = walk(
+                one, steps, pulses, apex[index], one["ankle_stiffness"] * factors[:, index]
+            )
             strikes[: walked.heel_strikes.size, index] = walked.heel_strikes
             offs[: walked.toe_offs.size, index] = walked.toe_offs
             endings.append(walked.ending)
