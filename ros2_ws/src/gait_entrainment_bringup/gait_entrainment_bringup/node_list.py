@@ -35,6 +35,8 @@ LEAD_TIME = 0.3
 # A real robot's torque is known only once it has been measured and promised: by so much the walker
 # lags behind the wall clock to show what it felt [s].
 MEASURED_DELAY = 0.1
+# How long any node, or the operator, may be silent while a real robot is worn [s].
+PERSON_SILENCE = 0.25
 
 # Names at the root that are moved into a namespace: each experiment keeps its own time.
 MOVED = (
@@ -113,6 +115,15 @@ def parameters(
     }
     if real_time:
         given["experiment"]["longest_lookahead"] = lead_time
+    if measured:
+        # A person wears it: who falls silent ends the torque, and so does a record that cannot
+        # be written. Whoever is silent is to be named before the robot misses the experiment.
+        given["experiment"]["silence_timeout"] = PERSON_SILENCE
+        given["perturbator"] |= {
+            "limits.silence": PERSON_SILENCE + 0.05,
+            "operator_timeout": PERSON_SILENCE,
+        }
+        given["bag_recorder"]["required"] = True
     return {name: given[name] | {"use_sim_time": not real_time} for name in given}
 
 

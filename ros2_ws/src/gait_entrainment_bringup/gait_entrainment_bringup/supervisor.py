@@ -18,6 +18,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 from gait_entrainment_bringup.node_process import prepare, start_node
+from gait_entrainment_bringup.signals import undisturbed
 from gait_entrainment_nodes.messaging.environment import PACKAGE, set_environment
 from gait_entrainment_nodes.messaging.errors import NodeError
 
@@ -86,7 +87,7 @@ class Supervisor:
         ended = self.ended()
         running = [node for node in order if node in self._processes and node not in ended]
         killed = []
-        with _undisturbed():
+        with undisturbed():
             for group in (running[:1], running[1:-1], running[1:][-1:]):
                 self.request_stop(group)
                 deadline = time.monotonic() + PATIENCE
@@ -131,14 +132,3 @@ def supervised(
         except NodeError as error:
             lines = supervisor.last_lines(error.node)
             raise NodeError(f"{error}{remains()}" + (f"\n{lines}" if lines else "")) from None
-
-
-@contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Let neither SIGINT nor SIGTERM break in: for what is about to end."""
-    handlers = {n: signal.signal(n, signal.SIG_IGN) for n in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)

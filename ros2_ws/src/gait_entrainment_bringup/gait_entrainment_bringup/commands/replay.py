@@ -5,7 +5,6 @@
 
 import argparse
 import json
-import signal
 from pathlib import Path
 
 from gait_entrainment.errors import UsageError
@@ -15,6 +14,7 @@ from gait_entrainment_bags import BagReader
 from gait_entrainment_bags.recorded_run import RecordedRun, read_run
 from gait_entrainment_bringup.node_list import MOVED, parameter_arguments, replay_parameters
 from gait_entrainment_bringup.run_options import check_output, is_utf8
+from gait_entrainment_bringup.signals import stop_on_signals
 from gait_entrainment_bringup.supervisor import supervised
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 
@@ -51,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
         options.rate = _RATE.parse("--rate", options.rate)
     if options.out is not None:
         check_output(options.out)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    stop_on_signals()
     recorded = read_run(options.bag, torques=False)
     with claimed_domain() as domain:
         results = replay(options, domain)

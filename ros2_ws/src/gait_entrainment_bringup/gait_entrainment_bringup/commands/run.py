@@ -7,16 +7,22 @@ import argparse
 import importlib
 import os
 import shutil
-import signal
 import threading
 from functools import partial
 from pathlib import Path
 
 from gait_entrainment.errors import UsageError
 from gait_entrainment.protocol import Protocol, write_protocol
+from gait_entrainment.robot import find_driver
 from gait_entrainment_bags import BagError, BagReader, UnreadableBagError, recover
-from gait_entrainment_bringup.node_list import NODES, STOP_ORDER, parameter_arguments
+from gait_entrainment_bringup.node_list import (
+    NODES,
+    PERSON_SILENCE,
+    STOP_ORDER,
+    parameter_arguments,
+)
 from gait_entrainment_bringup.run_options import add_run_options, checked_run, chosen_parameters
+from gait_entrainment_bringup.signals import stop_on_signals
 from gait_entrainment_bringup.supervisor import supervised
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 
@@ -52,11 +58,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run one experiment and print its outcome."""
+    # Stopping from outside takes the same path as Ctrl-C: torque first, then the rest.
+    stop_on_signals()
     protocol, bag = checked_run(options)
     if options.elsewhere and "ROS_DOMAIN_ID" not in os.environ:
         raise UsageError("--elsewhere: set ROS_DOMAIN_ID, to the same number on every host")
-    # Stopping from outside takes the same path as Ctrl-C: torque first, then the rest.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     with claimed_domain() as domain:
         run_experiment(protocol, bag, domain, options)
     return 0
@@ -76,7 +82,10 @@ def run_experiment(
         for node in NODES:
             if node not in options.elsewhere:
                 supervisor.start(node, arguments)
-        conduct(supervisor, protocol, partial(load_report, figures), quiet=options.json)
+        real = not find_driver(protocol.driver).simulated
+        silence = {"silence": PERSON_SILENCE} if real else {}
+        load = partial(load_report, figures)
+        conduct(supervisor, protocol, load, quiet=options.json, **silence)
         supervisor.wait_for_record()
         # No torque is left and the record is closed: in which order the rest ends does not matter.
         supervisor.request_stop(NODES)

@@ -9,6 +9,7 @@ it will change (perturbator_run.py). It knows nothing of gait. Torque ends with 
 cancelling, with the latched stop service and with the process, whatever ends that.
 """
 
+import math
 import time
 from dataclasses import dataclass
 from typing import Any
@@ -28,7 +29,8 @@ from gait_entrainment.robot import (
     PulseTrain,
     find_driver,
 )
-from gait_entrainment.robot.faults import NOT_STOPPED
+from gait_entrainment.robot.faults import NOT_STOPPED, OPERATOR_SILENT
+from gait_entrainment.robot.stop_channel import StopAnswer
 from gait_entrainment.settings import setting
 from gait_entrainment_msgs.action import DeliverPulseTrain
 from gait_entrainment_msgs.msg import Horizon, Trouble
@@ -39,6 +41,7 @@ from gait_entrainment_nodes.nodes.one_goal import OneGoalServer
 from gait_entrainment_nodes.nodes.participant import Participant
 from gait_entrainment_nodes.nodes.perturbator_run import Result, Run
 from gait_entrainment_nodes.nodes.rclpy_internals import TolerantLifecycleNode
+from gait_entrainment_nodes.nodes.stop_thread import StopThread
 
 # How often what a real robot has measured is promised [s].
 MEASURED_PERIOD = 0.01
@@ -53,6 +56,12 @@ class Settings:
     seed: int = setting(0, "seed of a driver that draws random numbers", "1", (0, 2**32 - 1))
     armed: bool = setting(
         False, "arm a real robot on activation; else a person does it by the service ~/arm"
+    )
+    operator_timeout: float = setting(
+        0.0,
+        "longest silence of operator/heartbeat while torque may come; 0: nobody need watch",
+        "s",
+        (0.0, 60.0),
     )
 
     def __post_init__(self) -> None:
@@ -70,15 +79,19 @@ class Perturbator(Participant, TolerantLifecycleNode):
         super().__init__("perturbator")
         self.begin_participation(settings=Settings, limits=(DeviceLimits, "limits."))
         self._robot: GuardedRobot | None = None  # from configuring to cleaning up
-        self._stop_latched = False  # the stop service was called while there was no robot
+        self._stop_latched = False  # somebody stopped while there was no robot
         self._reported: tuple[Fault, ...] = ()  # faults that have been published
         for topic in (topics.TORQUE_PROFILE, topics.PULSES, topics.ROBOT_STATE, topics.TROUBLE):
             self.offer(topic)
         self._now = 0  # latest instant that is known to be over [ns since 1970]
         self._latest_run = 0  # number of the latest run
         self._look_at: float | None = None  # when to look after a real robot, steady time [s]
+        self._operator_at = -math.inf  # when the operator was heard last, steady time [s]
+        self._stop_thread = StopThread(self.get_name(), self._stop_at_once)
 
         self.subscribe(topics.HORIZON, self._on_horizon)
+        self.subscribe(topics.OPERATOR_HEARTBEAT, self._on_heartbeat)
+        self.subscribe(topics.EMERGENCY_STOP, self._on_emergency_stop)
         self.create_service(Trigger, "~/stop", self.on_stop_service)
         self.create_service(Trigger, "~/arm", self._on_arm_service)
         name = "~/deliver_pulse_train"
@@ -169,6 +182,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
             self._end_torque("the perturbator was shut down")
         finally:
             self._release()
+            self._stop_thread.close()
 
     def _release(self) -> None:
         """Bring the torque to zero and let go of the robot."""
@@ -195,17 +209,38 @@ class Perturbator(Participant, TolerantLifecycleNode):
             self.diagnose(self._now, DiagnosticStatus.OK, "armed")
         return response
 
+    def _stop_at_once(self) -> StopAnswer:
+        """Bring the torque to zero and keep it there; from any thread."""
+        robot = self._robot
+        if robot is None:
+            self._stop_latched = True
+            return StopAnswer(True, "no robot is configured; the next configuring is refused")
+        robot.stop()
+        if NOT_STOPPED in robot.faults:
+            return StopAnswer(False, NOT_STOPPED.meaning)
+        return StopAnswer(True, "the stop is latched")
+
     def on_stop_service(self, _: Trigger.Request, response: Trigger.Response) -> Any:
         """Bring the torque to zero and keep it there until cleanup and configure."""
-        if self._robot is not None:
-            self._robot.stop()
-            self._report_faults("the stop service was called")
-        else:
-            self._stop_latched = True
-        response.success, response.message = True, "torque is zero, latched"
-        if self._robot is not None and NOT_STOPPED in self._robot.faults:
-            response.success, response.message = False, NOT_STOPPED.meaning
+        answer = self._stop_at_once()
+        self._report_faults("the stop service was called")
+        response.success, response.message = answer.done, answer.message
         return response
+
+    def _on_emergency_stop(self, message: Any) -> None:
+        if message.data:
+            self._stop_at_once()
+            self._report_faults("the emergency stop was pressed")
+
+    def _on_heartbeat(self, _: Any) -> None:
+        self._operator_at = time.monotonic()
+
+    def _require_operator(self) -> None:
+        """End the torque if whoever started the run does not watch it any more."""
+        robot, timeout = self._robot, self.settings.operator_timeout
+        silence = time.monotonic() - self._operator_at
+        if robot is not None and timeout and robot.train is not None and silence > timeout:
+            robot.stop(OPERATOR_SILENT)
 
     def _end_torque(self, reason: str, outcome: int = Result.STOPPED) -> None:
         """Bring the torque to zero now, whatever was promised."""
@@ -317,6 +352,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
         if self._robot is None:
             return
         self._look_at = time.monotonic() + MEASURED_PERIOD
+        self._require_operator()
         try:
             if self.run is not None:
                 self.run.look_after()

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""entrain stop: torque to zero, latched, on every perturbator that can be found."""
+"""entrain stop-ros: the stop service of every perturbator that ROS can find."""
 
 import argparse
 import json
@@ -26,7 +26,8 @@ STOP, TRAIN = "/stop", "/deliver_pulse_train/_action/send_goal"
 DESCRIPTION = (
     "Call the stop service of every perturbator: in ROS_DOMAIN_ID if it is set, else in "
     "every domain in which a run of this machine goes on. Latched until the perturbator is "
-    "cleaned up and configured again. No substitute for a switch in the hand: see docs/safety.md."
+    "cleaned up and configured again. For robots that another host drives; discovery takes one to "
+    "two seconds, so on this machine use entrain stop."
 )
 
 
@@ -42,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
         if (wanted := wanted_domain()) is not None:
             domains = {wanted: PATIENCE}
     except DomainError as error:
-        print(f"entrain stop: {error}; stopping every run", file=sys.stderr)
+        print(f"entrain stop-ros: {error}; stopping every run", file=sys.stderr)
     answers: dict[str, str | None] = {}
     # Side by side: no run waits for another one to be stopped.
     with ThreadPoolExecutor(len(domains)) as threads:
@@ -55,9 +56,9 @@ def run(options: argparse.Namespace) -> int:
         for name, answer in answers.items():
             print(f"{name}: {answer or 'did not confirm the stop'}")
     if not answers:
-        print("entrain stop: no perturbator was found: is a run going on?", file=sys.stderr)
+        print("entrain stop-ros: no perturbator was found: is a run going on?", file=sys.stderr)
     elif silent:
-        print(f"entrain stop: no stop of {', '.join(silent)}: cut the power", file=sys.stderr)
+        print(f"entrain stop-ros: no stop of {', '.join(silent)}: cut the power", file=sys.stderr)
     return 0 if answers and not silent else 1
 
 
