@@ -87,7 +87,8 @@ class TorqueLoop:
                 if self._enabled:
                     self._tick()
                 else:
-                    select.select([self._link, self._stop_channel], [], [], _IDLE_PERIOD)
+                    ends: list[Link | StopListener] = [self._link, self._stop_channel]
+                    select.select(ends, [], [], _IDLE_PERIOD)
                     self._listen()
         finally:
             self._disable()
