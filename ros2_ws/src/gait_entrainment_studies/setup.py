@@ -12,7 +12,7 @@ setup(
     author="The gait_entrainment authors",
     license="Apache-2.0",
     packages=find_packages(include=[NAME, NAME + ".*"]),
-    package_data={NAME: ["py.typed", "commands/*.md"]},
+    package_data={NAME: ["py.typed", "*/*.md", "*/*.yaml"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/" + NAME]),
         ("share/" + NAME, ["package.xml"]),

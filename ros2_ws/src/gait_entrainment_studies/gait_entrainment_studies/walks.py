@@ -51,7 +51,7 @@ def walk(
 
     The walk starts as a `Walker` does, unless `initial_apex` (see `model`) says otherwise.
     `stiffness` (steps,) is that of each push-off [N m/rad]; it is written into the model, which
-    must be made for that (`variability.population`). Raises ValueError for overlapping pulses.
+    must be made for that (`cohort.population`). Raises ValueError for overlapping pulses.
     """
     heel_strikes, toe_offs = np.empty(steps), np.empty(steps)
     log = np.zeros(1, SEGMENT)
@@ -72,19 +72,18 @@ def walk(
 
 def _torque_changes(pulses: Pulses | None) -> tuple[Stamps, Floats]:
     """Changes of both sides as `trajectory` wants them, the left one first and never perturbed."""
-    left = np.array([EVER]), np.zeros(1)
     if pulses is None:
-        return np.concatenate([left[0], left[0]]), np.zeros(2)
+        return np.array([EVER, EVER]), np.zeros(2)
     onsets = np.asarray(pulses.onsets, np.int64)
     if pulses.width <= 0 or np.any(np.diff(onsets) < pulses.width):
         raise ValueError(f"pulses of {pulses.width} ns must be wider than 0 and not overlap")
     changes = np.append(EVER, np.stack([onsets, onsets + pulses.width], axis=1))
     torques = np.append(0.0, np.tile([pulses.torque, 0.0], onsets.size))
-    # Of two changes of one stamp the later counts, and one that changes nothing is no switch.
+    # The later of two changes of one stamp counts, and one that changes nothing is no switch.
     last = np.append(np.diff(changes) != 0, True)
     changes, torques = changes[last], torques[last]
     real = np.append(True, np.diff(torques) != 0.0)
-    return np.append(left[0], changes[real]), np.append(left[1], torques[real])
+    return np.append(EVER, changes[real]), np.append(0.0, torques[real])
 
 
 @compiled

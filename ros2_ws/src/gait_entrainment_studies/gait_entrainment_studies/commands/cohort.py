@@ -157,30 +157,30 @@ def _summary(outcome: dict[str, Any]) -> str:
             f" {shown(row['mean_run'], '{:.1f}')} |"
             f" {shown(row['lag_of_entrained'], '{:.1f}', 1e3)} |"
         )
-    lines += [
-        "",
-        "* within 5 % of the stride of the lock without noise; over the subjects that have one",
-    ]
-    solved, measured = outcome["basin_solved_percent"], outcome["basin_measured_percent"]
+    lines.append(
+        "\n* within 5 % of the stride of the lock without noise; over the subjects that have one"
+    )
     for row in outcome["periods"]:
         if row["period_offset"] == _HEADLINE:
             entrained = row["verdicts"].get("entrained", 0)
-            lines += ["", f"entrained at {_HEADLINE * 1e3:+.0f} ms: {_of(entrained, count)}"]
+            lines.append(f"\nentrained at {_HEADLINE * 1e3:+.0f} ms: {_of(entrained, count)}")
     lines.append(
         f"entrained at some period: {_of(outcome['entrained_at_some_period'], count)}"
         f" (human: {_of(18, 19)})"
     )
-    if solved is not None:
+    if outcome["basin_solved_percent"] is not None:
+        mean, deviation = outcome["basin_solved_percent"]
         shortest, longest = outcome["basin_ends_percent"]
         lines.append(
-            f"basin without noise, solved: {solved[0]:.2f} +/- {solved[1]:.2f} % of the stride,"
+            f"basin without noise, solved: {mean:.2f} +/- {deviation:.2f} % of the stride,"
             f" from {shortest:+.2f} to {longest:+.2f} % on average (human: 6.7 +/- 3.6 %, to both"
             " sides)"
         )
-    lines += [
-        f"furthest period found entrained: {measured[0]:.2f} +/- {measured[1]:.2f} %",
+    mean, deviation = outcome["basin_measured_percent"]
+    lines.append(
+        f"furthest period found entrained: {mean:.2f} +/- {deviation:.2f} %\n"
         "Fed in: body sizes, peak torque, variability and its correlation, the pulse. Predicted:"
         " who entrains, the locked phase, the mean basin. The spread of the basin is mostly fed"
-        " in.",
-    ]
+        " in."
+    )
     return "\n".join(lines)

@@ -44,7 +44,7 @@ def run(options: argparse.Namespace) -> int:
     phases = _PHASES.parse("phases", options.phases)
     pieces = pieces_of(gait)
     locks = locked_gaits(gait, period, pieces)
-    shares = shares_of(gait, period, locks, phases)
+    outcomes, drawn = shares_of(gait, period, locks, phases)
     outcome = {
         "unperturbed_stride_period": gait.unperturbed_period,
         "pulse_period": period,
@@ -55,11 +55,11 @@ def run(options: argparse.Namespace) -> int:
             {
                 **asdict(lock),
                 "multipliers": [[m.real, m.imag] for m in lock.multipliers],
-                "share_of_initial_phases": shares.drawn.get(lock),
+                "share_of_initial_phases": drawn.get(lock),
             }
             for lock in locks
         ],
-        "walked": {kind.value: count for kind, count in Counter(shares.outcomes).items()},
+        "walked": {kind.value: count for kind, count in Counter(outcomes).items()},
     }
     return question.answer(
         options,
@@ -88,27 +88,23 @@ def _summary(outcome: dict[str, Any]) -> str:
         "Branches, by pulse onset; periods off the unperturbed one [ms]:",
     ]
     for piece in outcome["branches"]:
-        ends = [
-            f"{_offset(end['period'], unperturbed)} ({end['border'].value})"
+        first, last = (
+            ("-" if end["period"] is None else f"{(end['period'] - unperturbed) * 1e3:+.6f}")
+            + f" ({end['border'].value})"
             for end in (piece["first"], piece["last"])
-        ]
+        )
         kind = "stable  " if piece["stable"] else "unstable" if piece["feasible"] else "no gait "
-        lines.append(f"  {kind} {piece['place'].value}: {ends[0]} to {ends[1]}")
+        lines.append(f"  {kind} {piece['place'].value}: {first} to {last}")
     lines += ["", f"Locked gaits at {offset:+.3f} ms:"]
     for lock in outcome["locked_gaits"]:
-        first, second = (complex(*m) for m in lock["multipliers"])
+        multipliers = " ".join(f"{complex(*m):.4f}" for m in lock["multipliers"])
         share = lock["share_of_initial_phases"]
         lines.append(
             f"  {'stable  ' if lock['stable'] else 'unstable'} lag {lock['lag'] * 1e3:+.6f} ms,"
-            f" phase {lock['phase']:.6f}, speed {lock['speed']:.6f} m/s, multipliers"
-            f" {first:.4f} {second:.4f}"
-            + (f", draws {share:.1%} of the initial phases" if share is not None else "")
+            f" phase {lock['phase']:.6f}, speed {lock['speed']:.6f} m/s, multipliers {multipliers}"
+            + ("" if share is None else f", draws {share:.1%} of the initial phases")
         )
     if not outcome["locked_gaits"]:
         lines.append("  none")
     walked = ", ".join(f"{count} {name}" for name, count in outcome["walked"].items())
     return "\n".join([*lines, "", f"Walked from evenly spread initial phases: {walked}"])
-
-
-def _offset(period: float | None, unperturbed: float) -> str:
-    return "-" if period is None else f"{(period - unperturbed) * 1e3:+.6f}"

@@ -178,8 +178,7 @@ class PulsedGait:
         self._start_apex = (p.speed_after_collision / p.leg_length) ** 2 - self._strike_gain
         self._step_gain = self._per_energy * p.push_off_work
         # From here on a negative pulse cancels the spring: the trailing foot is unloaded.
-        unloaded = self.toe_off + min(torque, 0.0) / p.ankle_stiffness
-        self._unloaded = max(unloaded, self.heel_strike)
+        self._unloaded = max(self.toe_off + min(torque, 0.0) / p.ankle_stiffness, self.heel_strike)
         here = np.array([self.heel_strike])
         plain = self._gaits(here, here, None)
         self.unperturbed_period = float(plain.period[0])
@@ -209,9 +208,7 @@ class PulsedGait:
         """Ankle angle where a pulse from heel strike on ends; toe-off if it lasts longer."""
         struck = self.heel_strike
         return first_root(
-            lambda end: self._pulse_time(np.full_like(end, struck), end).time - self.width,
-            struck,
-            self.toe_off,
+            lambda end: self._excess(np.full_like(end, struck), end), struck, self.toe_off
         )
 
     @cached_property
@@ -219,10 +216,12 @@ class PulsedGait:
         """Ankle angle where a pulse up to toe-off begins; heel strike if it lasts longer."""
         off = self.toe_off
         return first_root(
-            lambda start: self._pulse_time(start, np.full_like(start, off)).time - self.width,
-            off,
-            self.heel_strike,
+            lambda start: self._excess(start, np.full_like(start, off)), off, self.heel_strike
         )
+
+    def _excess(self, start: Floats, end: Floats) -> Floats:
+        """How much longer than the pulse the gait with a pulse between two angles takes [s]."""
+        return self._pulse_time(start, end).time - self.width
 
     def _end_of_pulse(self, start: Floats) -> Floats:
         """Ankle angle where a pulse that begins at `start` ends, in the gait that it sustains."""
@@ -345,11 +344,8 @@ class PulsedGait:
         apex = np.where(moving, apex, np.nan)
         p = self.parameters
         # The way to an apex after toe-off adds to the time, that from an apex before it takes off.
-        for sign, angle in (
-            (math.copysign(1, p.toe_off_angle), p.toe_off_angle),
-            (1, p.leg_angle),
-        ):
-            z = math.sin(angle / 2) ** 2
+        for angle in (p.toe_off_angle, p.leg_angle):
+            sign, z = math.copysign(1, angle), math.sin(angle / 2) ** 2
             x, y, w = apex * (1 - z), apex + 2 * self._per_drop * z, apex
             time += sign * 2 * math.sqrt(z) * elliprf(x, y, w)
             derivative = (1 - z) * elliprd(y, w, x) + elliprd(x, w, y) + elliprd(x, y, w)
@@ -380,10 +376,8 @@ class PulsedGait:
         onset = pulse.time - self.width if place is Place.EARLY else before.time
 
         # Forward differentiation by (apex, onset), in the order of the motion.
-        one, none = np.ones_like(apex), np.zeros_like(apex)
-        d_apex = np.stack([one, none], axis=-1)
-        d_onset = np.stack([none, one], axis=-1)
-        column = np.newaxis
+        one, none, column = np.ones_like(apex), np.zeros_like(apex), np.newaxis
+        d_apex, d_onset = np.stack([one, none], axis=-1), np.stack([none, one], axis=-1)
         begins, ends = place in (Place.INSIDE, Place.LATE), place in (Place.INSIDE, Place.EARLY)
         d_start = d_end = np.zeros_like(d_apex)
         with np.errstate(invalid="ignore"):

@@ -150,22 +150,18 @@ def _prepared(parameters: WalkerParameters) -> tuple[Model, float]:
     return model, float(walk(model, 2).heel_strikes[-1])
 
 
-@dataclass(frozen=True)
-class Shares:
-    """What became of walks from initial phases spread evenly over the stride."""
-
-    outcomes: tuple[Outcome, ...]
-    drawn: dict[LockedGait, float]
-    """Share of the initial phases that each stable lock draws."""
-
-
 def shares_of(
     gait: PulsedGait, period: float, locks: Sequence[LockedGait], phases: int = 32
-) -> Shares:
-    """Walk from `phases` initial phases at a pulse period [s] and see which lock each ends in."""
+) -> tuple[list[Outcome], dict[LockedGait, float]]:
+    """
+    Walk from `phases` initial phases, spread evenly over the stride, at a pulse period [s].
+
+    Return what became of the walks, and the share of them that each stable lock draws.
+    """
     distance = max(abs(period - gait.unperturbed_period), 1e-4)
     enough = _SETTLING_STRIDES + int(1.5 * gait.unperturbed_period / distance)
-    outcomes, lags = [], []
+    outcomes: list[Outcome] = []
+    lags: list[float] = []
     for phase in np.arange(phases) / phases:
         strides = min(enough, _LONGEST)
         while True:
@@ -180,4 +176,4 @@ def shares_of(
         lags.append(float(walked.lags[-1]) if outcome is Outcome.LOCKED else np.nan)
     stable = [lock for lock in locks if lock.stable]
     drawn = {lock: float(np.mean(np.abs(np.array(lags) - lock.lag) < _NEAR)) for lock in stable}
-    return Shares(tuple(outcomes), drawn)
+    return outcomes, drawn

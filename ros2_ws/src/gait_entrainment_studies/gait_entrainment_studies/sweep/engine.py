@@ -72,17 +72,15 @@ def rows_by_dask(plan: SweepPlan, indices: Sequence[int], scheduler: str) -> Row
     _ask_who_it_is(dask, scheduler)
     with dask.Client(scheduler, timeout=SCHEDULER_TIMEOUT) as client:
         futures = {client.submit(sweep_row, plan, index, pure=False): index for index in indices}
-        for future in dask.as_completed(list(futures)):
-            try:
-                row = future.result()
-            except Exception as error:  # whatever a worker raised, or that it is gone
-                what = f"{type(error).__name__}: {error}".partition("\n")[0]
-                raise SweepError(
-                    f"scheduler {scheduler}: a row could not be made ({what}): see that it runs,"
-                    " its workers with this version of gait_entrainment; the same command goes on"
-                ) from None
-            yield futures.pop(future), row
-            future.release()
+        try:
+            for future in dask.as_completed(list(futures)):
+                yield futures.pop(future), future.result()
+        except Exception as error:  # whatever a worker raised, or that it is gone
+            what = f"{type(error).__name__}: {error}".partition("\n")[0]
+            raise SweepError(
+                f"scheduler {scheduler}: a row could not be made ({what}): see that it runs, its"
+                " workers with this version of gait_entrainment; the same command goes on"
+            ) from None
 
 
 def _ask_who_it_is(dask: Any, scheduler: str) -> None:

@@ -98,8 +98,8 @@ def test_dorsiflexion_pulses_lock_to_longer_periods_where_they_are_solved_to():
     period = gait.unperturbed_period + 0.05
     stable = [lock for lock in locked_gaits(gait, period) if lock.stable]
     assert [lock.place for lock in stable] == [Place.EARLY]
-    shares = shares_of(gait, period, stable, 8)
-    assert list(shares.drawn.values()) == [1.0]
+    _, drawn = shares_of(gait, period, stable, 8)
+    assert list(drawn.values()) == [1.0]
     walk = walk_under_pulses(TABLE_1, gait.torque, 0.1, period, 0.3, 200)
     # To the end of the walk, though its strides are longer than the unperturbed ones.
     assert walk.lags[-1] == pytest.approx(stable[0].lag, abs=5e-9)
