@@ -63,7 +63,7 @@ class Conductor:
         limits: GaitLimits | None = None,
     ) -> None:
         self.protocol = protocol
-        self.train: PulseTrain | None = None  # planned where the last baseline stride starts
+        self.train: PulseTrain | None = None  # planned when the last baseline stride starts
         # Mean stride period over the baseline [s] and its standard error; NaN if not measured.
         self.measured_period = math.nan
         self.measured_period_error = math.nan

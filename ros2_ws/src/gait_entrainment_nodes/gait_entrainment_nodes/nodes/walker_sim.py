@@ -24,7 +24,6 @@ from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
 from gait_entrainment.messages import nanoseconds_of, profile_of, stop_of
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.settings import setting
-from gait_entrainment.walker import Stretch, WalkerRun
 from gait_entrainment_msgs import msg
 from gait_entrainment_msgs.srv import StartRun
 from gait_entrainment_nodes.messaging import topics
@@ -32,6 +31,7 @@ from gait_entrainment_nodes.messaging.raw_messages import MessageTemplate, mark
 from gait_entrainment_nodes.messaging.stamps import header, to_time
 from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.participant import Participant
+from gait_entrainment_nodes.nodes.walker_run import Stretch, WalkerRun
 from gait_entrainment_nodes.nodes.walker_sim_run import LockStepRun, RealTimeRun, Run, Starved
 
 JOINTS = ["l_hip", "r_hip", "l_ankle", "r_ankle"]
