@@ -74,7 +74,9 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def run_experiment(protocol: Protocol, bag: Path, domain: int, options: argparse.Namespace) -> None:
+def run_experiment(
+    protocol: Protocol, bag: Path, domain: int, options: argparse.Namespace
+) -> None:
     """Start the nodes, conduct the protocol, stop the nodes, report."""
     environment = set_environment(domain)
     prepare()

@@ -109,7 +109,7 @@ class Population:
         turn = model["max_plantarflexion"] - model["double_stance_start"]
         # A step maps the apex linearly; from zero, two of them give the map's constant.
         for side in self._sides:
-            k = side * model["stiffness"]
+            k = side * model["ankle_stiffness"]
             apex += model["per_energy"] * torque_work(turn, k * turn, k)
             apex = kept * (apex + model["strike_gain"]) - model["start_gain"]
         return float(apex / (1 - kept**2))
@@ -132,7 +132,9 @@ class Population:
         for index, model in enumerate(self._models):
             one = model.copy()
             pulses = None if trains is None else trains.of(index)
-            walked = walk(one, steps, pulses, apex[index], one["stiffness"] * factors[:, index])
+            walked = walk(
+                one, steps, pulses, apex[index], one["ankle_stiffness"] * factors[:, index]
+            )
             strikes[: walked.heel_strikes.size, index] = walked.heel_strikes
             offs[: walked.toe_offs.size, index] = walked.toe_offs
             endings.append(walked.ending)
