@@ -26,7 +26,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from std_srvs.srv import Trigger
 
-from gait_entrainment.experiment import Phase
+from gait_entrainment.experiment import Part
 from gait_entrainment.protocol import read_protocol
 from gait_entrainment.simulation import simulate
 from gait_entrainment_bags import BagReader
@@ -212,7 +212,7 @@ def assert_failed_in_washout(run, words, status):
     topics = ["/experiment/state", "/perturbator/state", "/perturbation/torque_profile"]
     with BagReader(run.bag) as reader:
         phases, states, profiles = ([m for _, m in reader.decoded([topic])] for topic in topics)
-    assert [state.phase for state in phases[-2:]] == [Phase.WASHOUT, Phase.FAILED]
+    assert [state.phase for state in phases[-2:]] == [Part.WASHOUT, Part.FAILED]
     assert states[-1].status == status
     assert sum(profile.stop for profile in profiles) == 1
 
@@ -221,7 +221,7 @@ def test_stop_in_the_washout_fails_the_run(tmp_path):
     with entrain_run(tmp_path / "bag", "--real-time", *WASHED_OUT) as run:
         with probe(run.domain()) as listener:
             states = listener.listen(EXPERIMENT_STATE)
-            listener.until(lambda: states and states[-1].phase == Phase.WASHOUT, "washout")
+            listener.until(lambda: states and states[-1].phase == Part.WASHOUT, "washout")
             assert listener.call(Trigger, "perturbator/stop").success
         words = "perturbator: latched: stopped: the stop service was called"
         assert_failed_in_washout(run, words, AnkleRobotState.STOPPED)

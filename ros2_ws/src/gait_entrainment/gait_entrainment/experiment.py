@@ -22,7 +22,7 @@ from gait_entrainment.protocol import Protocol, ProtocolError
 from gait_entrainment.robot import PulseTrain
 
 
-class Phase(enum.IntEnum):
+class Part(enum.IntEnum):
     """Part of the protocol that is under way."""
 
     WAITING = 0
@@ -72,14 +72,14 @@ class Conductor:
         """Strides of the perturbed leg completed so far."""
         return max(self._tracker.stride_in_progress - 1, 0)
 
-    def phase(self, known_until: int) -> Phase:
+    def part(self, known_until: int) -> Part:
         """Return the part of the protocol that is under way at an instant [ns]."""
         train = self.train
         if self._closing_strike is not None:
-            return Phase.FINISHED
+            return Part.FINISHED
         if train is None or known_until < train.first_onset:
-            return Phase.BASELINE
-        return Phase.PULSES if known_until < train.end(train.count - 1) else Phase.WASHOUT
+            return Part.BASELINE
+        return Part.PULSES if known_until < train.end(train.count - 1) else Part.WASHOUT
 
     def add_event(self, event: GaitEvent) -> PulseTrain | None:
         """

@@ -11,7 +11,8 @@ count from 1970, the core's instants from wherever the caller wants: each functi
 """
 
 from dataclasses import fields
-from typing import Any
+from enum import IntEnum
+from typing import Any, TypeVar
 
 from gait_entrainment.conventions import EventKind, Side, nanoseconds_of
 from gait_entrainment.errors import UsageError
@@ -19,20 +20,18 @@ from gait_entrainment.gait import GaitEvent, PulsePhase, Stride
 from gait_entrainment.gait.analyzer import Result
 from gait_entrainment.robot import RobotState, TorqueProfile
 
+_E = TypeVar("_E", bound=IntEnum)
+
 
 class MessageError(UsageError):
     """A message that has no meaning, such as one about a third leg."""
 
 
 def event_of(message: Any, start: int = 0) -> GaitEvent:
-    """Return the gait event of a GaitEvent message; raises MessageError for an unknown kind."""
-    try:
-        kind = EventKind(message.kind)
-    except ValueError:
-        allowed = ", ".join(f"{kind.value} ({kind.name.lower()})" for kind in EventKind)
-        raise MessageError(f"kind: {message.kind}; allowed: {allowed}") from None
+    """Return the event of a GaitEvent message; raises MessageError for an unknown kind or side."""
     stamp = nanoseconds_of(message.header.stamp) - start
-    return GaitEvent(stamp, kind, _side_of(message), int(message.step))
+    kind, side = _member(EventKind, "kind", message.kind), _member(Side, "side", message.side)
+    return GaitEvent(stamp, kind, side, int(message.step))
 
 
 def stop_of(message: Any, start: int = 0) -> int | None:
@@ -52,7 +51,7 @@ def profile_of(message: Any, start: int = 0) -> TorqueProfile:
     MessageError for an unknown side.
     """
     return TorqueProfile(
-        side=_side_of(message),
+        side=_member(Side, "side", message.side),
         times=tuple(nanoseconds_of(stamp) - start for stamp in message.times),
         torques=tuple(message.torques),
         onsets=tuple(nanoseconds_of(stamp) - start for stamp in message.onsets),
@@ -100,9 +99,9 @@ def result_values(result: Result, side: Side) -> dict[str, Any]:
     return values | {"header": result.stamp, "entrained_since_stride": since}
 
 
-def _side_of(message: Any) -> Side:
+def _member(enumeration: type[_E], field: str, value: int) -> _E:
     try:
-        return Side(message.side)
+        return enumeration(value)
     except ValueError:
-        allowed = ", ".join(f"{side.value} ({side.name.lower()})" for side in Side)
-        raise MessageError(f"side: {message.side}; allowed: {allowed}") from None
+        allowed = ", ".join(f"{member.value} ({member.name.lower()})" for member in enumeration)
+        raise MessageError(f"{field}: {value}; allowed: {allowed}") from None

@@ -6,7 +6,7 @@
 import pytest
 
 from gait_entrainment.conventions import EventKind, Side
-from gait_entrainment.experiment import Conductor, Phase
+from gait_entrainment.experiment import Conductor, Part
 from gait_entrainment.messages import nanoseconds_of
 from gait_entrainment.protocol import Protocol, PulsePlan
 from gait_entrainment_msgs.msg import GaitEvent, Progress, TorqueProfile, Trouble
@@ -104,7 +104,7 @@ def test_each_progress_is_answered_once_all_that_it_covers_is_here(bench):
     bench.report(11 * SECOND)
     assert len(bench.horizons) == 2
     shown = [message for topic, message in bench.published if topic is EXPERIMENT_STATE]
-    assert [state.phase for state in shown] == [Phase.BASELINE]
+    assert [state.phase for state in shown] == [Part.BASELINE]
 
 
 def test_nothing_is_promised_while_pulses_are_requested(bench):
@@ -117,7 +117,7 @@ def test_nothing_is_promised_while_pulses_are_requested(bench):
     assert len(bench.horizons) == count
     bench.run.take_answer(True)
     assert len(bench.horizons) == count + 1
-    state = bench.run.state(Phase.PULSES)
+    state = bench.run.state(Part.PULSES)
     assert state.pulse_period == train.period
     assert nanoseconds_of(state.first_onset) == train.first_onset
 

@@ -14,6 +14,7 @@ from typing import Final
 from gait_entrainment.walker.compiled import compiled
 from gait_entrainment.walker.model import Floats, Model
 from gait_entrainment.walker.segment import (
+    Motion,
     Segment,
     Stance,
     double_stance_time,
@@ -32,28 +33,16 @@ MOST_STEPS: Final = 100
 @compiled
 def travel_time(model: Model, work: Floats, segment: Segment, start: float, end: float) -> float:
     """Time [s] from position `start` to `end` of the segment, negative if `end` is before it."""
-    if end < start:
-        return -travel_time_onward(model, work, segment, end, start)
-    return travel_time_onward(model, work, segment, start, end)
-
-
-@compiled
-def travel_time_onward(
-    model: Model, work: Floats, segment: Segment, start: float, end: float
-) -> float:
-    """Time [s] from one position of the segment to a later one."""
+    first, last = min(start, end), max(start, end)
     if segment.stance == Stance.SINGLE:
-        return pendulum_time(model.per_drop, segment.apex, start, end)
-    return double_stance_time(model, work, segment, start, end)
+        time = pendulum_time(model.per_drop, segment.apex, first, last)
+    else:
+        time = double_stance_time(model, work, segment, first, last)
+    return -time if end < start else time
 
 
 @compiled
-def quintic(
-    span: float,
-    elapsed: float,
-    start: tuple[float, float, float],
-    end: tuple[float, float, float],
-) -> float:
+def quintic(span: float, elapsed: float, start: Motion, end: Motion) -> float:
     """Value after `elapsed` of `span` [s], from value, velocity and acceleration at both ends."""
     s = elapsed / span
     v0, v1 = start[1] * span, end[1] * span
@@ -74,9 +63,8 @@ def position_at(model: Model, work: Floats, segment: Segment, elapsed: float) ->
         return low
     if elapsed >= segment.duration:
         return high
-    guess = quintic(
-        segment.duration, elapsed, motion(model, segment, low), motion(model, segment, high)
-    )
+    start, end = motion(model, segment, low), motion(model, segment, high)
+    guess = quintic(segment.duration, elapsed, start, end)
     position = position_of(model, segment.stance, guess)
     if not low < position < high:
         position = 0.5 * (low + high)

@@ -74,6 +74,7 @@ class Segment(Protocol):
 
 SEGMENT = np.dtype([(name, kind) for name, kind in Segment.__annotations__.items()])
 Log = Any  # an array of SEGMENT, the segments of a stretch in order
+Motion = tuple[float, float, float]  # value, velocity and acceleration of a coordinate
 
 # Widest panel [rad]: keeps the Taylor series of `panel` to rounding.
 PANEL_WIDTH: Final = 1.6
@@ -152,9 +153,9 @@ def leading_force(model: Model, segment: Segment, position: float) -> float:
 
 
 @compiled
-def motion(model: Model, segment: Segment, position: float) -> tuple[float, float, float]:
+def motion(model: Model, segment: Segment, position: float) -> Motion:
     """
-    Value, velocity and acceleration of a coordinate that is smooth in time.
+    How a coordinate moves that is smooth in time.
 
     In single stance the position, in double stance sin(theta): psi itself speeds up twentyfold.
     theta_ddot is half the derivative of theta_dot^2 by theta.
@@ -264,18 +265,6 @@ def dot(weights: Floats, values: Floats) -> float:
 
 
 @compiled
-def ordered_sum(values: Floats, count: int) -> float:
-    """Sum of the first `count` values, a multiple of 4, as four sums side by side."""
-    s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
-    for i in range(0, count, 4):
-        s0 += values[i]
-        s1 += values[i + 1]
-        s2 += values[i + 2]
-        s3 += values[i + 3]
-    return (s0 + s1) + (s2 + s3)
-
-
-@compiled
 def short_sine(x: float) -> float:
     """sin(x) for |x| <= 0.8 to rounding: Taylor to x^17, odd and even terms side by side."""
     y = x * x
@@ -328,12 +317,11 @@ def double_stance_time(
             part, converged = stall_panel(model, work, segment, here, there)
         else:
             part, converged = panel(model, work, segment, here, there)
-        if not converged and to_stall:
-            converged = smooth(
-                model, segment, segment.end - here * here, segment.end - there * there
-            )
-        elif not converged:
-            converged = smooth(model, segment, here, there)
+        if not converged:
+            first, last = here, there
+            if to_stall:
+                first, last = segment.end - here * here, segment.end - there * there
+            converged = smooth(model, segment, first, last)
         if converged or abs(width) < NARROWEST_PANEL:
             total += part
             if not total < LONGEST:

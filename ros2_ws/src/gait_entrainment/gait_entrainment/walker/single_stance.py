@@ -110,13 +110,3 @@ def turning_point(model: Model, apex: float) -> tuple[float, float]:
     if low >= high:
         return model.toe_off_position, 0.0
     return -2.0 * math.asin(math.sqrt(low)), time_on_one_side(model.per_drop, apex, low, high, 0.0)
-
-
-@compiled
-def lift_off_position(model: Model, apex: float) -> float:
-    """
-    Position after the apex at which gravity no longer holds the mass on the stance leg.
-
-    m g cos(theta) = m L (apex + 2 (g / L)(1 - cos(theta))), solved for the cosine.
-    """
-    return math.acos(min(1.0, (model.leg_length * apex / model.gravity + 2.0) / 3.0))

@@ -31,10 +31,9 @@ from gait_entrainment.walker.segment import (
     double_stance_time,
     gained_apex,
     leading_force,
-    ordered_sum,
     squared_rate,
 )
-from gait_entrainment.walker.single_stance import lift_off_position, pendulum_time, turning_point
+from gait_entrainment.walker.single_stance import pendulum_time, turning_point
 
 NANO: Final = 1e9
 
@@ -124,8 +123,10 @@ def look_ahead_single_stance(model: Model, segment: Segment, work: Floats) -> No
     # The mass is lowest and fastest at heel strike, so the force is least there.
     force = model.strike_hold - model.mass * model.leg_length * segment.apex
     if force < 0.0:
+        # Where m g cos(theta) = m L (apex + 2 (g / L)(1 - cos(theta))).
+        cosine = (model.leg_length * segment.apex / model.gravity + 2.0) / 3.0
         segment.ends = Switch.FLY_OFF
-        segment.end = max(segment.position, lift_off_position(model, segment.apex))
+        segment.end = max(segment.position, math.acos(min(1.0, cosine)))
         segment.shortfall = -force
     if segment.ends == Switch.HEEL_STRIKE and segment.apex >= model.whole_single_stance_apex:
         segment.duration = whole_time(model.whole_single_stance, work, segment.apex)
@@ -162,7 +163,13 @@ def whole_time(whole: Floats, work: Floats, apex: float) -> float:
     gain, weights = whole[0], whole[1]
     for i in range(gain.size):
         work[i] = weights[i] / math.sqrt(apex + gain[i])
-    return ordered_sum(work, gain.size)
+    s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0  # side by side; the number of nodes is a multiple of 4
+    for i in range(0, gain.size, 4):
+        s0 += work[i]
+        s1 += work[i + 1]
+        s2 += work[i + 2]
+        s3 += work[i + 3]
+    return (s0 + s1) + (s2 + s3)
 
 
 @compiled

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gait_entrainment.conventions import EventKind, Side
-from gait_entrainment.experiment import Conductor, Phase
+from gait_entrainment.experiment import Conductor, Part
 from gait_entrainment.gait import GaitEvent
 from gait_entrainment.protocol import Protocol, ProtocolError, PulsePlan
 
@@ -106,16 +106,16 @@ def test_phases_follow_the_plan():
     protocol = Protocol(baseline=2, washout=1, pulses=PulsePlan(count=2))
     conductor = Conductor(protocol)
     events = walk([1.2] * 6)
-    assert conductor.phase(0) is Phase.BASELINE
+    assert conductor.part(0) is Part.BASELINE
     for event in events[:9]:
         conductor.add_event(event)
     train = conductor.train
-    assert conductor.phase(train.first_onset - 1) is Phase.BASELINE
-    assert conductor.phase(train.first_onset) is Phase.PULSES
-    assert conductor.phase(train.end(1)) is Phase.WASHOUT
+    assert conductor.part(train.first_onset - 1) is Part.BASELINE
+    assert conductor.part(train.first_onset) is Part.PULSES
+    assert conductor.part(train.end(1)) is Part.WASHOUT
     for event in events[9:]:
         conductor.add_event(event)
-    assert conductor.phase(train.end(1)) is Phase.FINISHED
+    assert conductor.part(train.end(1)) is Part.FINISHED
 
 
 def test_a_baseline_without_a_complete_stride_says_so():

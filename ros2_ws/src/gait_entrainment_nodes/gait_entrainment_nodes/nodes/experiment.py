@@ -20,7 +20,7 @@ from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
 from rclpy.task import Future
 
-from gait_entrainment.experiment import Conductor, Phase
+from gait_entrainment.experiment import Conductor, Part
 from gait_entrainment.messages import nanoseconds_of
 from gait_entrainment.protocol import ProtocolError, read_protocol
 from gait_entrainment.robot import PulseTrain
@@ -177,7 +177,7 @@ class Experiment(Participant):
             final = await self._conduct_run(run, protocol)
             result.outcome, result.reproducible = result.FINISHED, final.reproducible
             result.message = final.message or "every stride of the protocol was walked"
-            self.publish(topics.EXPERIMENT_STATE, run.state(Phase.FINISHED, result.message))
+            self.publish(topics.EXPERIMENT_STATE, run.state(Part.FINISHED, result.message))
             self.note_state(DiagnosticStatus.OK, f"run {run.number} finished")
         except (ExperimentError, ProtocolError) as failure:
             result.message, result.blamed = str(failure), getattr(failure, "blamed", "")
@@ -222,7 +222,7 @@ class Experiment(Participant):
 
     async def _give_up(self, run: Run, reason: str) -> None:
         """End a failed run, torque first, as far as the others still answer."""
-        self.publish(topics.EXPERIMENT_STATE, run.state(Phase.FAILED, reason))
+        self.publish(topics.EXPERIMENT_STATE, run.state(Part.FAILED, reason))
         self.diagnose(run.known_until, DiagnosticStatus.ERROR, reason)
         if run.activated:
             with contextlib.suppress(ExperimentError):

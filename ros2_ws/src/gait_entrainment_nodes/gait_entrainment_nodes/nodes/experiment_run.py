@@ -15,7 +15,7 @@ from collections.abc import Callable
 from typing import Any
 
 from gait_entrainment.errors import EntrainmentError
-from gait_entrainment.experiment import Conductor, Phase
+from gait_entrainment.experiment import Conductor, Part
 from gait_entrainment.messages import event_of, nanoseconds_of
 from gait_entrainment.protocol import ProtocolError
 from gait_entrainment.robot import PulseTrain
@@ -81,7 +81,7 @@ class Run:
         self._grant = self._recorded_grant = -1
         self._horizons = self._profiles = 0  # sent, and received in answer
         self._planning = False  # pulses were requested and not accepted yet
-        self._shown: tuple[Phase, int] | None = None
+        self._shown: tuple[Part, int] | None = None
         self.forgive()
 
     @property
@@ -113,7 +113,7 @@ class Run:
         self.known_until = max(self.promised_until, self.known_until)
         self._send_horizon(self.known_until, last=True)
 
-    def state(self, phase: Phase, message: str = "") -> msg.ExperimentState:
+    def state(self, phase: Part, message: str = "") -> msg.ExperimentState:
         """Return phase and progress of the protocol, for people."""
         state = msg.ExperimentState(
             header=header(self.known_until),
@@ -213,7 +213,7 @@ class Run:
             self.final = progress
             return
         self._promise(conductor, self.known_until)
-        shown = (conductor.phase(self.known_until), conductor.strides)
+        shown = (conductor.part(self.known_until), conductor.strides)
         if shown != self._shown:
             self._shown = shown
             self._publish(topics.EXPERIMENT_STATE, self.state(shown[0]))
