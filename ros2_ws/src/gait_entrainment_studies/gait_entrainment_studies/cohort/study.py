@@ -110,12 +110,8 @@ def run_study(subjects: Subjects, plan: StudyPlan) -> Study:
     Raises UsageError if the plan cannot be conducted.
     """
     population = Population(subjects.walkers, plan.slope, plan.asymmetry)
-    noise = noise_for(
-        Population(subjects.walkers, plan.slope),
-        subjects.variation,
-        (plan.seed, _PILOT),
-        plan.hurst,
-    )
+    alike = Population(subjects.walkers, plan.slope)
+    noise = noise_for(alike, subjects.variation, (plan.seed, _PILOT), plan.hurst)
     gaits = [PulsedGait(walker, plan.torque, plan.width) for walker in subjects.walkers]
     pieces = [pieces_of(gait) for gait in gaits]
     # Half the stride is room enough for any stride that noise makes; less the pulse, so that no

@@ -25,7 +25,6 @@ EXAMPLES = """examples:
   entrain lock --torque-fraction -0.1 --period-offset 0.02 --out figures
 """
 
-
 _PHASES = Setting("initial phases walked from", int, least=1)
 
 

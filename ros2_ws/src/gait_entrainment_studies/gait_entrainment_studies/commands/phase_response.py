@@ -31,8 +31,6 @@ EXAMPLES = """examples:
 
 _COLUMNS = ("phase", "onset", "lag", "shift", "first_stride_shift")
 _HEADER = "phase [1],onset [s],lag [s],shift [s],first_stride_shift [s]"
-
-
 _POINTS = Setting("points on each branch", int, least=2)
 
 
@@ -50,9 +48,8 @@ def run(options: argparse.Namespace) -> int:
     gait = question.chosen_gait(options)
     texts = options.period_offset or ["-0.05"]
     offsets = np.array([question.chosen_offset(text, gait) for text in texts])
-    pulse = gait.parameters, gait.torque, gait.width
-    response = phase_response(*pulse, _POINTS.parse("points", options.points))
-    found = predictions(*pulse, offsets)
+    response = phase_response(gait, _POINTS.parse("points", options.points))
+    found = predictions(gait, offsets)
     curve = np.column_stack([getattr(response, name) for name in _COLUMNS])
     locks = [
         {

@@ -62,15 +62,12 @@ def add_settings(group: Group, owner: type) -> None:
 
 def chosen(options: argparse.Namespace, owner: type[Chosen], **rest: Any) -> Chosen:
     """Return the dataclass that the options describe; raises SettingError."""
-    texts = vars(options)
-    return owner(
-        **{
-            name: told.parse(name, texts[name])
-            for name, told in settings_of(owner).items()
-            if texts[name] is not None
-        },
-        **rest,
-    )
+    given = {
+        name: told.parse(name, text)
+        for name, told in settings_of(owner).items()
+        if (text := getattr(options, name)) is not None
+    }
+    return owner(**given, **rest)
 
 
 def add_walker_options(parser: argparse.ArgumentParser) -> None:
@@ -89,10 +86,8 @@ def chosen_gait(options: argparse.Namespace) -> PulsedGait:
     if options.torque is not None and options.torque_fraction is not None:
         raise UsageError("torque: give either torque or torque_fraction")
     walker, pulse = chosen(options, WalkerParameters), chosen(options, PulseOptions)
-    torque = pulse.torque
-    if torque is None:
-        torque = pulse.torque_fraction * walker.peak_torque
-    return PulsedGait(walker, torque, pulse.width)
+    fraction = pulse.torque_fraction * walker.peak_torque
+    return PulsedGait(walker, fraction if pulse.torque is None else pulse.torque, pulse.width)
 
 
 def chosen_offset(text: str, gait: PulsedGait) -> float:

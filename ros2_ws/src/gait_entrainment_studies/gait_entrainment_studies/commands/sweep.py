@@ -37,7 +37,6 @@ EXAMPLES = """examples:
   entrain sweep --out tongue --scheduler tcp://host:8786
 """
 
-
 _JOBS = Setting("processes; default: all cores", int, least=1)
 _OFFSET = Setting("pulse period minus stride period", unit="s")
 _FRACTION = Setting("torque over the peak ankle torque", unit="1")

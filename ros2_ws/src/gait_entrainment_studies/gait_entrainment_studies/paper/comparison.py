@@ -118,15 +118,12 @@ def _entrainment(p: WalkerParameters) -> list[Comparison]:
     lags = np.array([walk.lags[-1] for walk in walks])
     lock = next(one for one in locked_gaits(gait, period - 0.05, pieces) if one.stable)
     last = float(walks[0].stride_periods[-1])
-    none_longer = longest == 0 and max(locked) < 0
+    none_longer, none_shorter = longest == 0 and max(locked) < 0, shortest > -0.08 and least > -80
     # A pulse that reaches over toe-off begins at most its width before.
     close = bool(np.ptp(lags) < 1e-8 and -PULSE_WIDTH < lags.mean() <= 0)
     found: dict[str, Found] = {
         "longer": "none" if none_longer else f"up to {longest * 1e3:+.3f} ms",
-        "shorter": (
-            f"none; from {shortest * 1e3:.4f} ms on",
-            shortest > -0.080 and least > -80,
-        ),
+        "shorter": (f"none; from {shortest * 1e3:.4f} ms on", none_shorter),
         "basin": 100 * (longest - shortest) / period,
         "coarse_basin": -0.1 * coarse / period,
         "phase": (f"one, {lags.mean() * 1e3:.3f} ms from toe-off", close),

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment_studies.locking.branches import (
     LockedGait,
     branches_of,
@@ -60,21 +59,20 @@ class Prediction:
         return self.predicted.lag - self.exact.lag
 
 
-def single_pulse(parameters: WalkerParameters, torque: float, width: float) -> PulsedGait:
-    """Return the gaits with so few pulses that the walker has recovered before the next."""
-    strides = math.ceil(math.log(_RECOVERED) / math.log(parameters.floquet_multiplier) / 2)
-    return PulsedGait(parameters, torque, width, steps_per_pulse=2 * max(strides, 1))
+def single_pulse(gait: PulsedGait) -> PulsedGait:
+    """Return its gaits with so few pulses that the walker has recovered before the next."""
+    kept = gait.parameters.floquet_multiplier
+    strides = math.ceil(math.log(_RECOVERED) / math.log(kept) / 2)
+    return PulsedGait(gait.parameters, gait.torque, gait.width, 2 * max(strides, 1))
 
 
-def phase_response(
-    parameters: WalkerParameters, torque: float, width: float, points: int = 201
-) -> PhaseResponse:
+def phase_response(gait: PulsedGait, points: int = 201) -> PhaseResponse:
     """
-    Return the phase response with `points` points on each branch.
+    Return the response to a single pulse of a gait, with `points` points on each branch.
 
     It is NaN if the walker would fall or fly off under the pulse.
     """
-    single = single_pulse(parameters, torque, width)
+    single = single_pulse(gait)
     step = single.unperturbed_period / single.steps_per_pulse
     branches = [
         single.gaits(place, np.linspace(first, last, points))
@@ -85,7 +83,7 @@ def phase_response(
     firsts = [np.where(one.feasible, step - one.step, np.nan) for one in branches]
     # Before and after, when the leg does not trail, a pulse does nothing.
     toe_off, nothing = float(branches[-1].double_stance[-1]), np.zeros(2)
-    onset = np.concatenate([[-step, -width], *(b.onset for b in branches), [toe_off, step]])
+    onset = np.concatenate([[-step, -gait.width], *(b.onset for b in branches), [toe_off, step]])
     return PhaseResponse(
         stride_period=2 * step,
         phase=(onset + step) / (2 * step),
@@ -96,23 +94,20 @@ def phase_response(
     )
 
 
-def predictions(
-    parameters: WalkerParameters, torque: float, width: float, period_offsets: Floats
-) -> list[Prediction]:
+def predictions(gait: PulsedGait, period_offsets: Floats) -> list[Prediction]:
     """
     Compare predicted and exact stable locks at pulse periods [s] off the unperturbed stride.
 
     If there are two attractors, each is compared with its like; a lock that only one of the two
     methods finds is left out.
     """
-    single = single_pulse(parameters, torque, width)
-    every = PulsedGait(parameters, torque, width)
-    single_pieces, pieces = pieces_of(single), pieces_of(every)
+    single = single_pulse(gait)
+    single_pieces, pieces = pieces_of(single), pieces_of(gait)
     found = []
     for offset in period_offsets:
         predicted = locked_gaits(single, single.unperturbed_period + offset, single_pieces)
-        exact = locked_gaits(every, every.unperturbed_period + offset, pieces)
-        for lock in (gait for gait in exact if gait.stable):
+        exact = locked_gaits(gait, gait.unperturbed_period + offset, pieces)
+        for lock in (one for one in exact if one.stable):
             likes = [like for like in predicted if like.stable and like.place is lock.place]
             found += [Prediction(float(offset), like, lock) for like in likes]
     return found

@@ -46,15 +46,8 @@ def draw_tongue(
     ):
         torques, periods = np.nonzero(np.nan_to_num(_cells(plan, table, column)))
         if torques.size:
-            right.plot(
-                offsets[periods],
-                fractions[torques],
-                marker,
-                color=ORANGE,
-                ms=3,
-                mew=0,
-                label=label,
-            )
+            cells = offsets[periods], fractions[torques]
+            right.plot(*cells, marker, color=ORANGE, ms=3, mew=0, label=label)
     if np.isnan(share).any():
         right.fill_between([], [], [], fc="white", ec=GREY, lw=0.6, label="not asked")
     drawing.add_legend(right, **BELOW, ncols=3)

@@ -7,6 +7,7 @@ import pytest
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.walker import Walker
+from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
 from gait_entrainment_studies.phase_response.response import phase_response, predictions
 
 TABLE_1 = WalkerParameters()
@@ -27,7 +28,7 @@ def heel_strikes(onset, torque):
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_the_curve_is_that_of_the_walker_with_and_without_a_pulse(sign):
-    response = phase_response(TABLE_1, sign * TORQUE, WIDTH, 9)
+    response = phase_response(PulsedGait(TABLE_1, sign * TORQUE, WIDTH), 9)
     period = response.stride_period
     plain = heel_strikes(1.0, 0.0)
     assert np.all(np.diff(response.phase) >= -1e-12)
@@ -43,7 +44,7 @@ def test_the_curve_is_that_of_the_walker_with_and_without_a_pulse(sign):
 
 
 def test_a_pulse_in_swing_or_on_the_leading_leg_does_nothing():
-    response = phase_response(TABLE_1, TORQUE, WIDTH)
+    response = phase_response(PulsedGait(TABLE_1, TORQUE, WIDTH))
     outside = (response.onset <= -WIDTH) | (response.lag >= 0)
     assert np.abs(response.shift[outside]).max() < 1e-12
     assert (response.shift[~outside] > 0).all()
@@ -51,7 +52,7 @@ def test_a_pulse_in_swing_or_on_the_leading_leg_does_nothing():
 
 def test_prediction_is_good_to_what_a_pulse_leaves_for_the_next_stride():
     small, large = (
-        predictions(TABLE_1, fraction * TORQUE, WIDTH, np.array([fraction * -0.05]))[0]
+        predictions(PulsedGait(TABLE_1, fraction * TORQUE, WIDTH), np.array([fraction * -0.05]))[0]
         for fraction in (0.2, 1.0)
     )
     assert abs(large.lag_error) < 1e-3
