@@ -200,7 +200,7 @@ def test_node_refuses_a_real_robot_in_simulated_time(tmp_path):
             assert not nodes.probe.call(ChangeState, "perturbator/change_state", request).success
             status = nodes.probe.until(lambda: heard and heard[-1].status[0], "a reason")
         finally:
-            nodes.probe.close()
+            nodes.probe.client.close()
             nodes.supervisor.stop(STOP_ORDER)
     assert status.message == "driver: ak_mit_can runs in real time only: use_sim_time must be off"
 
