@@ -13,17 +13,37 @@ lets loops run in vector registers.
 import contextlib
 import hashlib
 import os
+import sys
 import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-import numba
-
 from gait_entrainment import geometry
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-config: Any = numba.config
+
+
+def _load_numba() -> Any:
+    """
+    Load numba without the package coverage, which would take a tenth of the start of a command.
+
+    Numba uses coverage only while that measures, and then it is loaded already. A None among the
+    modules is how Python is told not to find one.
+    """
+    idle = "coverage" not in sys.modules
+    if idle:
+        sys.modules["coverage"] = None  # type: ignore[assignment]
+    try:
+        import numba
+    finally:
+        if idle:
+            del sys.modules["coverage"]
+    return numba
+
+
+numba: Any = _load_numba()
+config = numba.config
 
 
 def _cache_folder() -> str:
