@@ -13,10 +13,12 @@ import shutil
 import sys
 from pathlib import Path
 
+import numpy as np
+
 from gait_entrainment.commands import main
-from gait_entrainment.conventions import Side, nanoseconds
+from gait_entrainment.conventions import nanoseconds
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment.walker import WalkerRun
+from gait_entrainment.walker import Walker
 from gait_entrainment.walker.compiled import CACHE_FOLDER
 from gait_entrainment.walker.model import make_model
 from gait_entrainment_studies.walks import walk
@@ -26,7 +28,8 @@ if __name__ == "__main__":
         for folder in Path(CACHE_FOLDER).parent.glob("walker-*"):
             if folder != Path(CACHE_FOLDER):
                 shutil.rmtree(folder, ignore_errors=True)
-    run = WalkerRun(WalkerParameters(), first_heel_strike=Side.RIGHT, sample_rate=200.0)
-    run.advance(nanoseconds(2.0))
+    walker = Walker(WalkerParameters())
+    walker.advance(nanoseconds(2.0))
+    walker.sample(np.arange(0, walker.time_reached, nanoseconds(0.005)))
     walk(make_model(WalkerParameters()), 2)
     sys.exit(main(["simulate", "--json"]))

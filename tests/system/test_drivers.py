@@ -263,7 +263,7 @@ FAULTS = {
         "stopping_in_mid_pulse: .*\n.*No profile with the stop flag",
     ),
     "cancelling without effect": (
-        "def on_cancel(self, _):\n        return perturbator.CancelResponse.ACCEPT",
+        "def on_cancel(self):\n        pass",
         "cancelling: .*\n.*No profile with the stop flag",
     ),
     "pulses not announced": (

@@ -162,7 +162,7 @@ def test_an_analyzer_that_hangs_is_named(monkeypatch: pytest.MonkeyPatch) -> Non
     def call_and_stall(client: Any, kind: Any, name: str, *arguments: Any, **options: Any) -> Any:
         answer = call(client, kind, name, *arguments, **options)
         if name == "bag_player/resume":
-            client._supervisor._processes["gait_analyzer"].send_signal(signal.SIGSTOP)
+            os.kill(client._supervisor._processes["gait_analyzer"].pid, signal.SIGSTOP)
         return answer
 
     monkeypatch.setattr(replay_client.ReplayClient, "call", call_and_stall)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a person can be told in one line: every error that a user can cause is one of these."""
+"""Errors that a user can cause; the message of each is one line."""
 
 
 class EntrainmentError(Exception):

@@ -17,7 +17,8 @@ import statistics
 from dataclasses import dataclass
 
 from gait_entrainment.conventions import EventKind, nanoseconds
-from gait_entrainment.gait import GaitEvent, StrideTracker
+from gait_entrainment.errors import EntrainmentError
+from gait_entrainment.gait import GaitEvent, GaitLimits, GaitWatch, StrideTracker
 from gait_entrainment.protocol import Protocol, ProtocolError
 from gait_entrainment.robot import PulseTrain
 
@@ -41,22 +42,35 @@ class Horizon:
     last: bool
 
 
+class GaitError(EntrainmentError):
+    """The gait is not one that torque may follow; the message says why, with the figures."""
+
+
 class Conductor:
     """
     Conducts one protocol.
 
     ``longest_lookahead`` [s] bounds how far ahead it promises. In lock-step that is a stride,
     which is where the speed comes from; in real time a short one leaves more to be decided late.
+    ``limits`` say which strides can be believed, of a person; for a walker of another size they
+    are scaled by sqrt(L / g).
     """
 
-    def __init__(self, protocol: Protocol, longest_lookahead: float = math.inf) -> None:
+    def __init__(
+        self,
+        protocol: Protocol,
+        longest_lookahead: float = math.inf,
+        limits: GaitLimits | None = None,
+    ) -> None:
         self.protocol = protocol
-        self.train: PulseTrain | None = None  # planned where the last baseline stride starts
+        self.train: PulseTrain | None = None  # planned when the last baseline stride starts
         # Mean stride period over the baseline [s] and its standard error; NaN if not measured.
         self.measured_period = math.nan
         self.measured_period_error = math.nan
         self._tracker = StrideTracker(protocol.side)
-        self._periods: list[float] = []  # of the complete baseline strides [s]
+        self._limits = limits or GaitLimits()
+        self._watch = GaitWatch(protocol.side, self._limits.scaled(protocol.walker.time_scale))
+        self._periods: list[float] = []  # of the baseline strides that are believed [s]
         self._longest_lookahead = longest_lookahead
         self._lookahead = min(_shortest_stride(protocol), longest_lookahead)
         self._longest_promise = self._lookahead
@@ -85,12 +99,17 @@ class Conductor:
         """
         Take one gait event; return the pulses to request, if this event lets them be planned.
 
-        Raises ProtocolError if they would overlap at the resulting period.
+        Raises ProtocolError if they would overlap at the resulting period, GaitError if the
+        baseline is not one to measure a period by.
         """
+        accepted = self._tracker.counts.accepted
         stride = self._tracker.add(event)
+        if self._tracker.counts.accepted == accepted:
+            return None  # the tracker has dropped it
+        believed = self._watch.believes(event)
         if event.side is not self.protocol.side or event.kind is not EventKind.HEEL_STRIKE:
             return None
-        if stride is not None and self.train is None:
+        if stride is not None and believed and self.train is None:
             self._periods.append(stride.period)
             # A promise must end before the next strike can be an onset's reference: see horizon.
             self._lookahead = min(self._longest_lookahead, *self._periods)
@@ -112,14 +131,20 @@ class Conductor:
         entered the measured period: so no promise ever covers an onset that is not yet planned.
         The run ends at a fixed distance after its closing strike, which no promise made before
         that strike can have passed: the end does not depend on how the run was cut into grants.
+
+        Raises GaitError if pulses are planned and nobody walks any more.
         """
         if self._closing_strike is not None:
             return Horizon(self._closing_strike + nanoseconds(self._longest_promise), last=True)
+        stopped = self._watch.stopped(known_until) if self.train is not None else ""
+        if stopped:
+            raise GaitError(stopped)
         return Horizon(known_until + nanoseconds(self._lookahead), last=False)
 
     def _plan(self, strike: int) -> PulseTrain:
         """Plan the pulses at the strike [ns] that starts the last baseline stride."""
         protocol, plan = self.protocol, self.protocol.pulses
+        self._require_steady_baseline()
         if self._periods:
             stride = self.measured_period = statistics.fmean(self._periods)
         elif plan.period is not None:  # the best guess if no complete stride was asked for
@@ -140,6 +165,24 @@ class Conductor:
             torque=protocol.pulse_torque,
             duration=plan.width,
         )
+
+    def _require_steady_baseline(self) -> None:
+        """Raise GaitError if the baseline's strides are not those of one steady gait."""
+        doubted, periods = self._watch.disbelieved, self._periods
+        if doubted > len(periods):
+            raise GaitError(
+                f"baseline: {doubted} of {doubted + len(periods)} strides cannot be: check the "
+                "sensor, or whether the person stood still"
+            )
+        if len(periods) < 3:
+            return
+        mean, spread = statistics.fmean(periods), statistics.stdev(periods)
+        if spread > self._limits.baseline_spread * mean:
+            raise GaitError(
+                f"baseline: strides of {min(periods):.3g} to {max(periods):.3g} s, which vary by "
+                f"{100 * spread / mean:.0f} % of their mean; allowed: "
+                f"{100 * self._limits.baseline_spread:g} %"
+            )
 
 
 def _shortest_stride(protocol: Protocol) -> float:

@@ -36,7 +36,7 @@ def event_of(message: Any, start: int = 0) -> GaitEvent:
 
 def stop_of(message: Any, start: int = 0) -> int | None:
     """
-    Return the instant [ns] of the stop that a TorqueProfile message reports; None if it is none.
+    Return the instant [ns] of the stop that a TorqueProfile message reports, if it reports one.
 
     From that instant on there is no torque, and every profile before loses what it promised.
     """

@@ -133,6 +133,11 @@ class WalkerParameters:
                 f" allowed: {least:.6g} to {most:.6g} N m/rad"
             )
 
+    @property
+    def time_scale(self) -> float:
+        """sqrt(L / g), relative to that of a person with legs of 1 m on earth."""
+        return math.sqrt(self.leg_length / self.gravity * 9.81)
+
     # Linkage
 
     @property

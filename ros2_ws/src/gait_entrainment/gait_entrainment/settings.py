@@ -128,8 +128,8 @@ def setting(
     """Return a field of a dataclass that can be set; ``more`` are further fields of Setting."""
     least, most = within
     kind = more.pop("kind", type(default))
-    told = Setting(meaning, kind, unit, least, most, **more)
-    return field(default=default, metadata={"setting": told})
+    rule = Setting(meaning, kind, unit, least, most, **more)
+    return field(default=default, metadata={"setting": rule})
 
 
 def settings_of(dataclass_type: Any) -> dict[str, Setting]:
@@ -141,5 +141,5 @@ def settings_of(dataclass_type: Any) -> dict[str, Setting]:
 
 def check_settings(instance: Any) -> None:
     """Check every setting of a dataclass, as its ``__post_init__``; floats become floats."""
-    for name, told in settings_of(type(instance)).items():
-        object.__setattr__(instance, name, told.check(name, getattr(instance, name)))
+    for name, rule in settings_of(type(instance)).items():
+        object.__setattr__(instance, name, rule.check(name, getattr(instance, name)))

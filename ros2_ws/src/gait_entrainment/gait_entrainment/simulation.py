@@ -21,7 +21,7 @@ from gait_entrainment.robot import (
     PulseTrain,
     find_driver,
 )
-from gait_entrainment.walker import Ending, WalkerRun
+from gait_entrainment.walker import Ending, Walker
 
 
 @dataclass(frozen=True)
@@ -59,12 +59,12 @@ def simulate(
     robot.activate()
     robot.begin(0)
     conductor = Conductor(protocol)
-    run = WalkerRun(protocol.walker, first_heel_strike=protocol.side, sample_rate=None)
+    walker, ended = Walker(protocol.walker, first_heel_strike=protocol.side), False
     events: list[GaitEvent] = []
     onsets: list[int] = []
     measured = MeasuredOnsets()
-    while not run.ended:
-        horizon = conductor.horizon(run.reached)
+    while not ended:
+        horizon = conductor.horizon(walker.time_reached)
         profile = robot.promise(horizon.until)
         onsets += profile.onsets
         measured.add_promise(profile.onsets, profile.valid_until)
@@ -72,13 +72,14 @@ def simulate(
             measured.add_pulse(onset, protocol.pulse_torque, protocol.pulses.width)
         for state in robot.read():
             measured.add_state(state)
-        run.accept(profile)
-        for transition in run.advance(horizon.until, last=horizon.last).transitions:
+        walker.promise(profile)
+        for transition in walker.advance(horizon.until):
             event = GaitEvent(transition.stamp, transition.kind, transition.side, transition.step)
             events.append(event)
             train = conductor.add_event(event)
             if train is not None:
                 robot.schedule(train)
+        ended = horizon.last or walker.ending is not None
     measured.finish()
     if measured_onsets:
         onsets = [timing.onset for timing in measured.timings]
@@ -90,6 +91,6 @@ def simulate(
         train=conductor.train,
         measured_period=conductor.measured_period,
         pulse_period=conductor.pulse_period,
-        ending=run.ending,
+        ending=walker.ending,
         analysis=analyze(events, onsets, protocol.side, settings),
     )

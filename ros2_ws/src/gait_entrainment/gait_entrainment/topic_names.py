@@ -23,10 +23,14 @@ TORQUE_PROFILE = "perturbation/torque_profile"
 PULSES = "perturbation/pulses"
 ROBOT_STATE = "perturbator/state"
 TROUBLE = "perturbator/trouble"
+EMERGENCY_STOP = "perturbator/emergency_stop"
 
 # Of the experiment.
 HORIZON = "experiment/horizon"
 EXPERIMENT_STATE = "experiment/state"
+
+# Of whoever started the run.
+OPERATOR_HEARTBEAT = "operator/heartbeat"
 
 # Of the analyzer.
 STRIDES = "gait/strides"

@@ -8,8 +8,13 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from launch import Action, LaunchContext
-from launch.actions import DeclareLaunchArgument, RegisterEventHandler, SetEnvironmentVariable
+from launch import Action, LaunchContext, LaunchDescription
+from launch.actions import (
+    DeclareLaunchArgument,
+    OpaqueFunction,
+    RegisterEventHandler,
+    SetEnvironmentVariable,
+)
 from launch.event_handlers import OnProcessExit
 from launch.events.process import ProcessExited
 from launch.substitutions import EnvironmentVariable, LaunchConfiguration
@@ -18,18 +23,14 @@ from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.utilities import make_namespace_absolute, prefix_namespace
 
 from gait_entrainment.errors import EntrainmentError
-from gait_entrainment_bringup.node_list import DISPLAY, MOVED, settings_file
+from gait_entrainment_bringup.node_list import DISPLAY, MOVED, Parameters, settings_file
 from gait_entrainment_nodes.messaging.client import Client
 from gait_entrainment_nodes.messaging.environment import PACKAGE, fastdds_profiles, shared_file
 
 # Argument of a launch file: name, default (None if it must be given), what --show-args says.
 Argument = tuple[str, str | None, str]
 NAMESPACE: Argument = ("namespace", "", "of all nodes and topics, for several side by side")
-PARAMETERS_FILE: Argument = (
-    "params_file",
-    str(settings_file()),
-    "what may be set of the nodes (YAML)",
-)
+PARAMETERS_FILE: Argument = ("params_file", str(settings_file()), "values for the nodes (YAML)")
 RVIZ: Argument = ("rviz", "false", "show the walker in RViz: true or false")
 
 
@@ -37,21 +38,27 @@ class LaunchError(EntrainmentError):
     """The launch ends with exit code 1; the message says why."""
 
 
-def declared(*arguments: Argument) -> list[Action]:
-    """
-    Declare arguments of a launch file.
+class _OverError(Exception):
+    """The launch has ended meanwhile."""
 
-    Fast DDS gets the shared memory that a lock-step run needs, unless the user has a profile.
+
+def description(
+    nodes: Callable[[LaunchContext], list[Action]], *arguments: Argument
+) -> LaunchDescription:
     """
-    profile = "FASTRTPS_DEFAULT_PROFILES_FILE"
-    own = str(fastdds_profiles())
-    return [
-        *(
-            DeclareLaunchArgument(name, default_value=default, description=text)
-            for name, default, text in arguments
-        ),
-        SetEnvironmentVariable(profile, EnvironmentVariable(profile, default_value=own)),
-    ]
+    Describe a launch that makes nodes once the arguments are known.
+
+    Fast DDS gets the profiles of this project unless the user has chosen others.
+    """
+    profiles = "FASTRTPS_DEFAULT_PROFILES_FILE"
+    ours = EnvironmentVariable(profiles, default_value=str(fastdds_profiles()))
+    return LaunchDescription(
+        [
+            *(DeclareLaunchArgument(n, default_value=d, description=t) for n, d, t in arguments),
+            SetEnvironmentVariable(profiles, ours),
+            OpaqueFunction(function=nodes),
+        ]
+    )
 
 
 def value(context: LaunchContext, name: str) -> str:
@@ -74,19 +81,11 @@ def full_namespace(context: LaunchContext, namespace: str) -> str:
 
 
 def make_node(
-    context: LaunchContext,
-    name: str,
-    namespace: str,
-    given: dict[str, Any],
-    **options: Any,
+    context: LaunchContext, name: str, namespace: str, given: dict[str, Any], **options: Any
 ) -> Node:
-    """
-    Return the action that runs a node; what is given wins over the parameter file.
-
-    Raises LaunchError if that file is not there: launch_ros would go on without it.
-    """
+    """Return the action that runs a node; what is given wins over the parameter file."""
     file = value(context, "params_file")
-    if not Path(file).is_file():
+    if not Path(file).is_file():  # launch_ros would go on without it
         raise LaunchError(f"params_file: {file}: no such file")
     # Text stays text even if it reads like YAML, as a protocol does.
     typed = {
@@ -103,39 +102,22 @@ def make_node(
     )
 
 
-def rviz(context: LaunchContext, namespace: str, given: dict[str, Any]) -> list[Action]:
-    """
-    Return RViz, if it is wanted, and the node that draws the walker.
-
-    ``given`` holds parameters by node name; without those of the display, the bag holds a picture.
-    """
+def rviz(context: LaunchContext, namespace: str, given: Parameters) -> list[Action]:
+    """Return RViz, if wanted, and the node that draws the walker, if it is given parameters."""
     if not is_true(context, "rviz"):
         return []
     picture = shared_file("gait_entrainment_bringup", "rviz/walker.rviz")
-    viewer = make_node(
-        context,
-        "rviz",
-        namespace,
-        {"use_sim_time": given["gait_analyzer"]["use_sim_time"]},
-        package="rviz2",
-        executable="rviz2",
-        arguments=["-d", str(picture)],
-    )
-    if DISPLAY not in given:
-        return [viewer]
-    return [make_node(context, DISPLAY, namespace, given[DISPLAY]), viewer]
-
-
-class _OverError(Exception):
-    """The launch has ended meanwhile."""
+    program = {"package": "rviz2", "executable": "rviz2", "arguments": ["-d", str(picture)]}
+    time = {"use_sim_time": given["gait_analyzer"]["use_sim_time"]}
+    drawing = [DISPLAY] if DISPLAY in given else []
+    return [
+        *(make_node(context, name, namespace, given[name]) for name in drawing),
+        make_node(context, "rviz", namespace, time, **program),
+    ]
 
 
 def in_background(context: LaunchContext, work: Callable[[Client], None]) -> None:
-    """
-    Do work with a client in a thread, until the launch ends.
-
-    An exception in it ends the launch with exit code 1.
-    """
+    """Do work with a client in a thread until the launch ends; an exception ends it with 1."""
 
     def go_on() -> None:
         if context.is_shutdown:
@@ -152,16 +134,8 @@ def ended_by(nodes: list[Node], last: set[str], over: list[Action]) -> list[Acti
     """
     Return the handlers that end the launch with its nodes.
 
-    Parameters
-    ----------
-    nodes
-        The launch ends with exit code 1 if one of them ends with another exit code than 0, or
-        should have stayed.
-    last
-        Names of the nodes that end by themselves.
-    over
-        What to do once all of these have ended well.
-
+    Those named in ``last`` end by themselves; once all of them have ended well, ``over`` is done.
+    If another node ends, or one with another exit code than 0, the launch ends with exit code 1.
     """
     waited_for = set(last)
 

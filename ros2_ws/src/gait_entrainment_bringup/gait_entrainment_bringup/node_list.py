@@ -9,6 +9,7 @@ the bag.
 """
 
 import json
+from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -34,6 +35,8 @@ LEAD_TIME = 0.3
 # A real robot's torque is known only once it has been measured and promised: by so much the walker
 # lags behind the wall clock to show what it felt [s].
 MEASURED_DELAY = 0.1
+# How long any node, or the operator, may be silent while a real robot is worn [s].
+PERSON_SILENCE = 0.25
 
 # Names at the root that are moved into a namespace: each experiment keeps its own time.
 MOVED = (
@@ -79,30 +82,17 @@ def parameters(
     lead_time: float = LEAD_TIME,
 ) -> Parameters:
     """
-    Return the parameters of every node for one run.
+    Return the parameters of every node for a run that is recorded into the folder ``bag``.
 
-    Parameters
-    ----------
-    protocol
-        What to conduct.
-    bag
-        Folder of the bag to record.
-    real_time
-        Real time instead of lock-step.
-    armed
-        Whether a real robot may deliver torque without another word.
-    onset
-        When the analyzer takes a pulse to begin: "commanded" or "measured".
-    lead_time
-        In real time: how far promised torque leads [s].
-
+    If ``armed``, a real robot may deliver torque without another word; ``onset`` is when the
+    analyzer takes a pulse to begin, "commanded" or "measured"; promised torque leads by
+    ``lead_time`` [s] in real time.
     """
     side = protocol.side.name.lower()
-    walker = {name: getattr(protocol.walker, name) for name in protocol.walker.__match_args__}
     measured = real_time and not find_driver(protocol.driver).simulated
     given: Parameters = {
         "walker_sim": {
-            **walker,
+            **asdict(protocol.walker),
             "first_heel_strike": side,
             "real_time": real_time,
             "acknowledged": not real_time,
@@ -125,6 +115,15 @@ def parameters(
     }
     if real_time:
         given["experiment"]["longest_lookahead"] = lead_time
+    if measured:
+        # A person wears it: who falls silent ends the torque, and so does a record that cannot
+        # be written. Whoever is silent is to be named before the robot misses the experiment.
+        given["experiment"]["silence_timeout"] = PERSON_SILENCE
+        given["perturbator"] |= {
+            "limits.silence": PERSON_SILENCE + 0.05,
+            "operator_timeout": PERSON_SILENCE,
+        }
+        given["bag_recorder"]["required"] = True
     return {name: given[name] | {"use_sim_time": not real_time} for name in given}
 
 
@@ -137,29 +136,11 @@ def replay_parameters(
     path: Path, namespace: str | None = None, out: Path | None = None
 ) -> tuple[str, Parameters]:
     """
-    Return what a replay of a bag to the analyzer needs.
+    Return the namespace and the parameters of a replay of a bag, a folder or an ``.mcap`` file.
 
-    Parameters
-    ----------
-    path
-        The bag: a folder or an ``.mcap`` file.
-    namespace
-        To play into, with a slash before it; None for the one that was recorded.
-    out
-        Folder to record the replay into; None for no record.
-
-    Returns
-    -------
-    namespace
-        Of the replay, without a slash at its end; "" for the root.
-    parameters
-        Of the display only if the bag holds no picture of its own.
-
-    Raises
-    ------
-    BagError
-        if the bag cannot be read, or holds no run of this project.
-
+    It goes into a namespace, by default into the one that was recorded, which is returned without
+    a slash at its end, and is recorded into ``out``, if given. There are parameters of the display
+    only if the bag holds no picture. BagError if the bag cannot be read or is no run of ours.
     """
     with BagReader(path) as bag:
         topics = list(bag.topics)
@@ -168,7 +149,7 @@ def replay_parameters(
             raise BagError(f"{path}: not a run of this project: no protocol or no gait events")
         protocol = read_protocol(bag.custom_data["protocol"])
         custom_data = bag.custom_data
-    onset = custom_data.get("onset", "commanded")
+    side, onset = protocol.side.name.lower(), custom_data.get("onset", "commanded")
     recorded = recorded.removesuffix("/gait_events")
     namespace = recorded if namespace is None else namespace.rstrip("/")
     moved = [name for name in topics if namespace != recorded and name.startswith(f"{recorded}/")]
@@ -184,11 +165,7 @@ def replay_parameters(
             "expect": expected if out is None else expected * 2,
             "use_sim_time": False,
         },
-        "gait_analyzer": {
-            "side": protocol.side.name.lower(),
-            "onset": onset,
-            "use_sim_time": True,
-        },
+        "gait_analyzer": {"side": side, "onset": onset, "use_sim_time": True},
     }
     if out is not None:
         given["bag_recorder"] = {
@@ -208,11 +185,7 @@ def bag_folder(protocol: Protocol) -> Path:
 
 
 def parameter_arguments(given: Parameters, folder: Path) -> list[str]:
-    """
-    Write parameters into a file in a folder.
-
-    Returns the arguments by which a node loads config/nodes.yaml and then that file.
-    """
+    """Return arguments by which a node loads config/nodes.yaml, then these, from a folder."""
     file = folder / "parameters.yaml"
     file.write_text(yaml.safe_dump({f"/**/{n}": {"ros__parameters": p} for n, p in given.items()}))
     files = (settings_file(), file)

@@ -6,8 +6,8 @@ One node as a process, forked from a server that has loaded what all nodes need.
 
 To load ROS, numpy and the messages takes a node longer than anything else before a run. The server
 (multiprocessing's forkserver) does so once, with one thread and no ROS context, so that it can be
-forked safely; each node becomes a process of its own with a session, a log, an environment and a
-name of its own.
+forked safely; each node becomes a process with a session, a log, an environment and a name of its
+own.
 """
 
 import ctypes
@@ -27,7 +27,7 @@ from gait_entrainment_nodes.messaging.environment import PACKAGE
 _PRELOADED = [f"{PACKAGE}.nodes.{node}" for node in ("gait_analyzer", "bag_recorder")]
 _PR_SET_PDEATHSIG, _PR_SET_NAME = 1, 15
 # Where in /proc/self/stat the addresses of the command line are, counted behind the name.
-_ARGUMENTS_START, _ARGUMENTS_END = 45, 46
+_ARGUMENTS = slice(45, 47)
 
 
 def prepare() -> None:
@@ -39,15 +39,10 @@ def prepare() -> None:
 def start_node(
     module: str, arguments: Sequence[str], log: Path, environment: Mapping[str, str]
 ) -> BaseProcess:
-    """
-    Start a node: ``main`` of a module, which is given arguments.
-
-    It gets SIGTERM if this process dies.
-    """
+    """Run ``main`` of a module with arguments; it gets SIGTERM if this process dies."""
     prepare()
-    context = multiprocessing.get_context("forkserver")
     words = [module.rpartition(".")[2], *arguments]
-    process = context.Process(
+    process = multiprocessing.get_context("forkserver").Process(
         target=_run, args=(module, words, log, dict(environment)), daemon=True
     )
     process.start()
@@ -63,15 +58,15 @@ def _run(module: str, words: Sequence[str], log: Path, environment: Mapping[str,
     if os.getppid() == 1:  # the server died before the line above
         return
     with log.open("wb") as file:
-        for stream in (sys.stdout, sys.stderr):
-            os.dup2(file.fileno(), stream.fileno())
+        os.dup2(file.fileno(), sys.stdout.fileno())
+        os.dup2(file.fileno(), sys.stderr.fileno())
     os.environ.clear()
     os.environ.update(environment)
     sys.argv = list(words)
     library.prctl(_PR_SET_NAME, words[0].encode(), 0, 0, 0)
     # What ps shows of the command line lies in memory that is the process's own.
     fields = Path("/proc/self/stat").read_text().rpartition(")")[2].split()
-    start, end = int(fields[_ARGUMENTS_START]), int(fields[_ARGUMENTS_END])
+    start, end = map(int, fields[_ARGUMENTS])
     shown = "\0".join(words).encode()[: end - start - 1]
     ctypes.memmove(start, shown.ljust(end - start, b"\0"), end - start)
     sys.exit(importlib.import_module(module).main())

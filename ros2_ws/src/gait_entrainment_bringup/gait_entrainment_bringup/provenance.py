@@ -11,7 +11,7 @@ from pathlib import Path
 from gait_entrainment.protocol import Protocol, write_protocol
 
 
-def provenance(protocol: Protocol, *, real_time: bool, onset: str = "commanded") -> dict[str, str]:
+def provenance(protocol: Protocol, *, real_time: bool, onset: str) -> dict[str, str]:
     """Return what the bag keeps of how it came about."""
     packages = ("gait_entrainment", "numpy", "mcap")
     return {
@@ -21,21 +21,19 @@ def provenance(protocol: Protocol, *, real_time: bool, onset: str = "commanded")
         "mode": "real time" if real_time else "lock-step",
         "onset": onset,
         "versions": json.dumps({package: version(package) for package in packages}),
-        "commit": commit(),
+        "commit": _commit(),
     }
 
 
-def commit() -> str:
-    """Return the git commit of the sources that run, "+" where they were changed since."""
-    git = ["git", "-C", str(Path(__file__).resolve().parent)]
+def _commit() -> str:
+    """Return the git commit of the sources that run, "+" if they were changed since."""
+    here = Path(__file__).resolve().parent
+    status = ["status", "--porcelain", "-uno", "--", ":/ros2_ws/src"]
     try:
         head, changes = (
-            subprocess.run([*git, *words], capture_output=True, text=True, check=True).stdout
-            for words in (
-                ["rev-parse", "HEAD"],
-                ["status", "--porcelain", "-uno", "--", ":/ros2_ws/src"],
-            )
+            subprocess.check_output(["git", "-C", here, *words], stderr=subprocess.DEVNULL).strip()
+            for words in (["rev-parse", "HEAD"], status)
         )
     except (OSError, subprocess.CalledProcessError):
         return "unknown: the sources are not under git"
-    return head.strip() + ("+" if changes.strip() else "")
+    return head.decode() + ("+" if changes else "")

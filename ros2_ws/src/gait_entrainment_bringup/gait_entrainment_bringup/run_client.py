@@ -10,6 +10,7 @@ from action_msgs.msg import GoalStatus
 from tqdm import tqdm
 
 from gait_entrainment.protocol import Protocol, write_protocol
+from gait_entrainment_bringup.operator_console import Operator, keys_at_once
 from gait_entrainment_bringup.supervisor import Supervisor
 from gait_entrainment_bringup.watch import Watch
 from gait_entrainment_msgs.action import RunProtocol
@@ -27,12 +28,18 @@ SILENCE_TIMEOUT = 3.0
 
 
 def conduct(
-    supervisor: Supervisor, protocol: Protocol, on_start: Callable[[], None], *, quiet: bool
+    supervisor: Supervisor,
+    protocol: Protocol,
+    on_start: Callable[[], None],
+    *,
+    quiet: bool,
+    silence: float = SILENCE_TIMEOUT,
 ) -> None:
     """
     Conduct a protocol through the experiment node to its end, and watch the processes meanwhile.
 
-    ``on_start`` is called once the experiment has accepted it.
+    ``on_start`` is called once the experiment has accepted it. Nodes that nobody else watches may
+    be silent for ``silence`` [s].
 
     Raises
     ------
@@ -41,7 +48,7 @@ def conduct(
 
     """
     bar = tqdm(total=protocol.strides, unit="stride", disable=True if quiet else None, leave=False)
-    with bar, Client("entrain_run") as client:
+    with bar, keys_at_once(), Client("entrain_run") as client:
         latest: dict[str, str] = {}
 
         def show(**values: str) -> None:
@@ -55,9 +62,14 @@ def conduct(
         client.subscribe(PULSE_PHASES, lambda p: show(pulse=f"lag {p.phase_lag * 1e3:+.0f} ms"))
         client.action(RunProtocol, ACTION)
         # The recorder ends by itself once the record is complete.
-        client.each_round = Watch(
-            client, supervisor, may_end=("bag_recorder",), asked=ASKED, silence=SILENCE_TIMEOUT
-        )
+        watch = Watch(client, supervisor, may_end=("bag_recorder",), asked=ASKED, silence=silence)
+        operator = Operator(client)
+
+        def look() -> None:
+            watch()
+            operator()
+
+        client.each_round = look
         client.wait_to_be_known("experiment", APPEARANCE_TIMEOUT)
         goal = RunProtocol.Goal(protocol=write_protocol(protocol))
         handle = client.send_goal(RunProtocol, ACTION, goal, on_feedback=on_feedback)

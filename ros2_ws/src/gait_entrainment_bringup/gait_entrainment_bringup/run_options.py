@@ -14,86 +14,72 @@ from gait_entrainment.errors import UsageError
 from gait_entrainment.protocol import Protocol
 from gait_entrainment.robot import DeviceLimits, LimitError, find_driver
 from gait_entrainment.settings import Setting
-from gait_entrainment_bringup.node_list import LEAD_TIME, Parameters, parameters
+from gait_entrainment_bringup.node_list import LEAD_TIME, Parameters, bag_folder, parameters
 
-_SAMPLE_RATE = Setting(
-    "samples per second; 0 samples at gait events only (default 200)",
-    unit="Hz",
-    least=0,
-    most=1000,
-)
-_LEAD_TIME = Setting(
-    f"real time: how far promised torque leads; more for a slow network (default {LEAD_TIME:g} s)",
-    unit="s",
-    least=0.05,
-    most=10,
-)
+_SWITCHES = {
+    "--real-time": "at the pace of the wall clock, not in lock-step",
+    "--arm": "let a real ankle robot deliver torque (docs/safety.md)",
+    "--require-record": "end the run if nothing more can be recorded, as on a full disk",
+    "--no-ground-reaction": "leave out the ground reaction forces",
+}
+_NUMBERS = {
+    "lead_time": Setting(
+        f"real time: lead of promised torque (default {LEAD_TIME:g}); more for a slow network",
+        unit="s",
+        least=0.05,
+        most=10,
+    ),
+    "sample_rate": Setting(
+        "samples per second (default 200); 0 samples at gait events only",
+        unit="Hz",
+        least=0,
+        most=1000,
+    ),
+}
 
 
 def add_run_options(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     add_protocol_options(parser)
-    parser.add_argument(
-        "--real-time", action="store_true", help="at the pace of the wall clock, not in lock-step"
-    )
-    for option, told in (("--lead-time", _LEAD_TIME), ("--sample-rate", _SAMPLE_RATE)):
-        parser.add_argument(option, metavar="FLOAT", help=f"{told.meaning}; {told.allowed}")
-    parser.add_argument(
-        "--arm", action="store_true", help="let a real ankle robot deliver torque (docs/safety.md)"
-    )
+    for option, text in _SWITCHES.items():
+        parser.add_argument(option, action="store_true", help=text)
+    for name, told in _NUMBERS.items():
+        text = f"{told.meaning}; {told.allowed}"
+        parser.add_argument(_option(name), metavar="FLOAT", help=text)
     parser.add_argument("--out", type=Path, help="folder of the bag; default bags/<time>_<name>")
-    parser.add_argument(
-        "--require-record",
-        action="store_true",
-        help="end the run if nothing more can be recorded, as on a full disk",
-    )
-    parser.add_argument(
-        "--no-ground-reaction", action="store_true", help="leave out the ground reaction forces"
-    )
     add_onset_option(parser)
 
 
-def checked_protocol(options: argparse.Namespace) -> Protocol:
+def _option(name: str) -> str:
+    return "--" + name.replace("_", "-")
+
+
+def checked_run(
+    options: argparse.Namespace, *, drives: bool = True, records: bool = True
+) -> tuple[Protocol, Path]:
     """
-    Return the protocol that the options name, checked with them.
+    Return the protocol that the options name and the folder of the bag; checks all that they say.
 
-    Raises
-    ------
-    UsageError, LimitError
-        One line: field or option, what is allowed.
-
+    The driver is checked only if this process ``drives`` the robot, the folder if it ``records``.
+    Raises UsageError, LimitError or DeviceError.
     """
     protocol = chosen_protocol(options)
     DeviceLimits().check_pulse(protocol.pulse_torque, protocol.pulses.width)
-    if options.sample_rate is not None:
-        options.sample_rate = _SAMPLE_RATE.parse("--sample-rate", options.sample_rate)
-    if options.lead_time is not None:
-        options.lead_time = _LEAD_TIME.parse("--lead-time", options.lead_time)
-    return protocol
-
-
-def check_driver(text: str, options: argparse.Namespace) -> None:
-    """
-    Check that a driver can be had and suits the run.
-
-    Raises
-    ------
-    LimitError
-        if there is no such driver, or it is a real one and the run is in lock-step or nobody has
-        armed it.
-    DeviceError
-        if it cannot be loaded.
-
-    """
-    driver = find_driver(text)
-    if driver.simulated:
-        return
-    if not options.real_time:
-        raise LimitError(f"driver: {driver.name} runs in real time only; add --real-time")
-    if not options.arm:
-        raise LimitError(
-            f"driver: {driver.name} applies real torque: see that all is well, then add --arm"
-        )
+    for name, told in _NUMBERS.items():
+        if (text := getattr(options, name)) is not None:
+            setattr(options, name, told.parse(_option(name), text))
+    driver = find_driver(protocol.driver) if drives else None
+    if driver and not driver.simulated:
+        if not options.real_time:
+            raise LimitError(f"driver: {driver.name} runs in real time only; add --real-time")
+        if not options.arm:
+            raise LimitError(
+                f"driver: {driver.name} applies real torque: see that all is well, then add --arm"
+            )
+    bag = options.out or bag_folder(protocol)
+    if records:
+        check_output(bag)
+    return protocol, bag
 
 
 def check_output(bag: Path) -> None:

@@ -13,12 +13,13 @@ import signal
 import tempfile
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
-from gait_entrainment_bringup.node_process import start_node
-from gait_entrainment_nodes.messaging.environment import PACKAGE
+from gait_entrainment_bringup.node_process import prepare, start_node
+from gait_entrainment_bringup.signals import undisturbed
+from gait_entrainment_nodes.messaging.environment import PACKAGE, set_environment
 from gait_entrainment_nodes.messaging.errors import NodeError
 
 # How long a process may take to stop by itself [s]; all together take less than five seconds.
@@ -37,10 +38,10 @@ class Supervisor:
         self._processes: dict[str, BaseProcess] = {}
 
     def start(self, node: str, arguments: Sequence[str]) -> None:
-        """Start a node of the package; it gets SIGTERM if this process dies."""
-        module = f"{PACKAGE}.nodes.{node}"
-        process = start_node(module, arguments, self._log(node), self._environment)
-        self._processes[node] = process
+        """Start a node of the package."""
+        self._processes[node] = start_node(
+            f"{PACKAGE}.nodes.{node}", arguments, self._log(node), self._environment
+        )
 
     def ended(self) -> dict[str, int]:
         """Return the exit codes of the processes that have ended."""
@@ -48,15 +49,7 @@ class Supervisor:
         return {node: code for node, code in codes.items() if code is not None}
 
     def check(self, may_end: Collection[str]) -> dict[str, int]:
-        """
-        Return the exit codes of the processes that have ended, and may.
-
-        Raises
-        ------
-        NodeError
-            if one has failed, or has ended and is not one that may.
-
-        """
+        """Return ``ended``; NodeError if one has failed, or is not one that may end."""
         ended = self.ended()
         for node, code in ended.items():
             if code != 0 or node not in may_end:
@@ -69,7 +62,7 @@ class Supervisor:
         return self._processes[node].exitcode
 
     def wait_for_record(self) -> None:
-        """Wait until the recorder has closed the bag and ended; raises NodeError if it has not."""
+        """Wait until the recorder has closed the bag and ended; NodeError if it has not."""
         if self.wait("bag_recorder", CLOSING_TIMEOUT) != 0:
             raise NodeError("bag_recorder did not complete the record", "bag_recorder")
 
@@ -79,8 +72,9 @@ class Supervisor:
             process = self._processes.get(node)
             if process is not None and process.is_alive():
                 process.terminate()
-                # A suspended process can only obey once it goes on.
-                os.kill(process.pid or 0, signal.SIGCONT)
+                with suppress(ProcessLookupError):  # it may have ended by now
+                    # A suspended process can only obey once it goes on.
+                    os.kill(process.pid or 0, signal.SIGCONT)
 
     def stop(self, order: Sequence[str]) -> list[str]:
         """
@@ -93,7 +87,7 @@ class Supervisor:
         ended = self.ended()
         running = [node for node in order if node in self._processes and node not in ended]
         killed = []
-        with _undisturbed():
+        with undisturbed():
             for group in (running[:1], running[1:-1], running[1:][-1:]):
                 self.request_stop(group)
                 deadline = time.monotonic() + PATIENCE
@@ -106,10 +100,8 @@ class Supervisor:
 
     def last_lines(self, node: str) -> str:
         """Return the end of a process's log."""
-        try:
-            lines = self._log(node).read_text(errors="replace").splitlines()
-        except OSError:
-            return ""
+        log = self._log(node)
+        lines = log.read_text(errors="replace").splitlines() if log.exists() else []
         return "\n".join(f"  {node}| {line}" for line in lines[-LOG_LINES:])
 
     def _log(self, node: str) -> Path:
@@ -118,16 +110,16 @@ class Supervisor:
 
 @contextmanager
 def supervised(
-    environment: Mapping[str, str],
-    order: Sequence[str],
-    remains: Callable[[], str] = lambda: "",
+    domain: int, order: Sequence[str], remains: Callable[[], str] = lambda: ""
 ) -> Iterator[Supervisor]:
     """
-    Give a supervisor, and stop its processes in order at the end.
+    Give a supervisor of processes in a ROS domain, and stop these in order at the end.
 
     What fails or is interrupted meanwhile becomes a NodeError: the reason, what ``remains`` says
     once everything has stopped, and the end of the log of the node to blame.
     """
+    environment = set_environment(domain)
+    prepare()
     with tempfile.TemporaryDirectory(prefix="entrain_") as folder:
         supervisor = Supervisor(Path(folder), environment)
         try:
@@ -140,14 +132,3 @@ def supervised(
         except NodeError as error:
             lines = supervisor.last_lines(error.node)
             raise NodeError(f"{error}{remains()}" + (f"\n{lines}" if lines else "")) from None
-
-
-@contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Let neither SIGINT nor SIGTERM break in: for what is about to end."""
-    handlers = {n: signal.signal(n, signal.SIG_IGN) for n in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)

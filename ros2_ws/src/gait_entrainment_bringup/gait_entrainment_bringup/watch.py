@@ -11,8 +11,6 @@ from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.client import Client
 from gait_entrainment_nodes.messaging.errors import NodeError
 
-# How often a node is asked for a sign of life [s].
-ASKING_PERIOD = 0.5
 # A pause between two looks that is so long [s] says that this process was held up itself.
 HELD_UP = 1.0
 
@@ -21,19 +19,9 @@ class Watch:
     """
     Called in each round of a client, ends its waiting by a NodeError that names the culprit.
 
-    Parameters
-    ----------
-    client
-        Asks for signs of life.
-    supervisor
-        Whose processes may not fail.
-    may_end
-        Nodes that end by themselves; others may not.
-    asked
-        Nodes that are asked for signs of life from their first answer on.
-    silence
-        How long they may owe one [s].
-
+    Of the supervisor's processes only those that ``may_end`` end by themselves. Nodes that are
+    ``asked`` for signs of life may owe one for a time of ``silence`` [s], once they have answered;
+    they are asked six times as often.
     """
 
     def __init__(
@@ -46,9 +34,9 @@ class Watch:
         silence: float,
     ) -> None:
         self._supervisor, self._may_end, self._silence = supervisor, may_end, silence
+        never, period = (lambda _: False), silence / 6
         self._signs = {
-            node: client.ask(Ready, f"{node}/ready", accept=lambda _: False, period=ASKING_PERIOD)
-            for node in asked
+            node: client.ask(Ready, f"{node}/ready", accept=never, period=period) for node in asked
         }
         self._looked_at = self._since = time.monotonic()
 
@@ -61,6 +49,6 @@ class Watch:
         self._looked_at = now
         for node, sign in self._signs.items():
             sign.answer()
-            answered = sign.latest is not None and node not in ended
-            if answered and now - max(sign.answered_at, self._since) > self._silence:
+            answers = sign.latest is not None and node not in ended
+            if answers and now - max(sign.answered_at, self._since) > self._silence:
                 raise NodeError(f"{node} has been silent for {self._silence:g} s", node)

@@ -13,22 +13,10 @@ import math
 from functools import partial
 
 from launch import Action, LaunchContext, LaunchDescription
-from launch.actions import OpaqueFunction
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 
-from gait_entrainment_bringup.launch_nodes import (
-    NAMESPACE,
-    PARAMETERS_FILE,
-    LaunchError,
-    declared,
-    ended_by,
-    full_namespace,
-    in_background,
-    is_true,
-    make_node,
-    value,
-)
+from gait_entrainment_bringup import launch_nodes as shared
 from gait_entrainment_nodes.messaging.client import Client
 
 TRANSITIONS = {
@@ -39,15 +27,15 @@ TRANSITIONS = {
 
 def nodes(context: LaunchContext) -> list[Action]:
     """Make the nodes, and bring the perturbator up meanwhile."""
-    namespace, side = value(context, "namespace"), value(context, "side")
-    given = {"side": side, "driver": value(context, "driver"), "armed": is_true(context, "arm")}
+    namespace, side, driver = (shared.value(context, n) for n in ("namespace", "side", "driver"))
+    given = {"side": side, "driver": driver, "armed": shared.is_true(context, "arm")}
     made = [
-        make_node(context, "perturbator", namespace, given),
-        make_node(context, "gait_analyzer", namespace, {"side": side}),
+        shared.make_node(context, "perturbator", namespace, given),
+        shared.make_node(context, "gait_analyzer", namespace, {"side": side}),
     ]
-    perturbator = f"{full_namespace(context, namespace).rstrip('/')}/perturbator"
-    in_background(context, partial(bring_up, perturbator))
-    return [*ended_by(made, set(), []), *made]
+    perturbator = f"{shared.full_namespace(context, namespace).rstrip('/')}/perturbator"
+    shared.in_background(context, partial(bring_up, perturbator))
+    return [*shared.ended_by(made, set(), []), *made]
 
 
 def bring_up(perturbator: str, client: Client) -> None:
@@ -59,24 +47,16 @@ def bring_up(perturbator: str, client: Client) -> None:
         request = ChangeState.Request(transition=Transition(id=number))
         answer = client.call(ChangeState, service, request, period=math.inf, patience=math.inf)
         if not answer.success:
-            raise LaunchError(f"perturbator refused to {name}; its log says why")
+            raise shared.LaunchError(f"perturbator refused to {name}; its log says why")
 
 
 def generate_launch_description() -> LaunchDescription:
     """Declare the arguments, then make the nodes."""
-    return LaunchDescription(
-        [
-            *declared(
-                (
-                    "driver",
-                    None,
-                    "ankle robot: NAME or NAME:OPTION=VALUE,... (entrain driver list)",
-                ),
-                ("side", "right", "ankle on which the robot sits: left or right"),
-                ("arm", "false", "let a real ankle robot deliver torque at once: see safety.md"),
-                NAMESPACE,
-                PARAMETERS_FILE,
-            ),
-            OpaqueFunction(function=nodes),
-        ]
+    return shared.description(
+        nodes,
+        ("driver", None, "ankle robot: NAME or NAME:OPTION=VALUE,... (entrain driver list)"),
+        ("side", "right", "ankle on which the robot sits: left or right"),
+        ("arm", "false", "let a real ankle robot deliver torque at once: see safety.md"),
+        shared.NAMESPACE,
+        shared.PARAMETERS_FILE,
     )

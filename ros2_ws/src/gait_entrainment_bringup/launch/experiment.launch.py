@@ -11,60 +11,42 @@ launch ends with the experiment: exit code 0 once it is over and recorded, 1 if 
 from pathlib import Path
 
 from launch import Action, LaunchContext, LaunchDescription
-from launch.actions import EmitEvent, OpaqueFunction
+from launch.actions import EmitEvent
 from launch.events import Shutdown
 
 from gait_entrainment.protocol import read_protocol, write_protocol
-from gait_entrainment_bringup.launch_nodes import (
-    NAMESPACE,
-    PARAMETERS_FILE,
-    RVIZ,
-    declared,
-    ended_by,
-    is_true,
-    make_node,
-    rviz,
-    value,
-)
+from gait_entrainment_bringup import launch_nodes as shared
 from gait_entrainment_bringup.node_list import NODES, bag_folder, parameters
 
 
 def nodes(context: LaunchContext) -> list[Action]:
     """Make the nodes once the arguments are known: the protocol says what they are given."""
-    protocol = read_protocol(value(context, "protocol") or None)
-    bag = value(context, "bag")
+    protocol = read_protocol(shared.value(context, "protocol") or None)
     given = parameters(
         protocol,
-        Path(bag) if bag else bag_folder(protocol),
-        real_time=is_true(context, "real_time"),
-        armed=is_true(context, "arm"),
-        onset=value(context, "onset"),
+        Path(shared.value(context, "bag") or bag_folder(protocol)),
+        real_time=shared.is_true(context, "real_time"),
+        armed=shared.is_true(context, "arm"),
+        onset=shared.value(context, "onset"),
     )
     given["experiment"]["protocol"] = write_protocol(protocol)
-    namespace = value(context, "namespace")
-    made = [make_node(context, name, namespace, given[name]) for name in NODES]
+    namespace = shared.value(context, "namespace")
+    made = [shared.make_node(context, name, namespace, given[name]) for name in NODES]
     over = [EmitEvent(event=Shutdown(reason="the experiment is over and recorded"))]
-    return [
-        *ended_by(made, {"experiment", "bag_recorder"}, over),
-        *rviz(context, namespace, given),
-        *made,
-    ]
+    ending = shared.ended_by(made, {"experiment", "bag_recorder"}, over)
+    return [*ending, *shared.rviz(context, namespace, given), *made]
 
 
 def generate_launch_description() -> LaunchDescription:
     """Declare the arguments, then make the nodes."""
-    return LaunchDescription(
-        [
-            *declared(
-                ("protocol", "", "protocol file (YAML); empty: the paper's example"),
-                ("real_time", "false", "at the pace of the wall clock, not in lock-step"),
-                ("arm", "false", "let a real ankle robot deliver torque at once: see safety.md"),
-                ("onset", "commanded", "when the analyzer takes a pulse to begin: or measured"),
-                ("bag", "", "folder of the bag; empty: bags/<time>_<name>"),
-                NAMESPACE,
-                PARAMETERS_FILE,
-                RVIZ,
-            ),
-            OpaqueFunction(function=nodes),
-        ]
+    return shared.description(
+        nodes,
+        ("protocol", "", "protocol file (YAML); empty: the paper's example"),
+        ("real_time", "false", "at the pace of the wall clock, not in lock-step"),
+        ("arm", "false", "let a real ankle robot deliver torque at once: see safety.md"),
+        ("onset", "commanded", "when the analyzer takes a pulse to begin: or measured"),
+        ("bag", "", "folder of the bag; empty: bags/<time>_<name>"),
+        shared.NAMESPACE,
+        shared.PARAMETERS_FILE,
+        shared.RVIZ,
     )

@@ -15,30 +15,20 @@ from launch.actions import OpaqueFunction
 from launch.events import Shutdown
 from std_srvs.srv import Trigger
 
-from gait_entrainment_bringup.launch_nodes import (
-    PARAMETERS_FILE,
-    RVIZ,
-    declared,
-    ended_by,
-    full_namespace,
-    in_background,
-    make_node,
-    rviz,
-    value,
-)
+from gait_entrainment_bringup import launch_nodes as shared
 from gait_entrainment_bringup.node_list import REPLAY_NODES, replay_parameters
 from gait_entrainment_nodes.messaging.client import Client
 
 
 def nodes(context: LaunchContext) -> list[Action]:
     """Make the nodes once the arguments are known: the bag says what they are given."""
-    chosen = value(context, "namespace")
-    namespace, given = replay_parameters(
-        Path(value(context, "bag")), full_namespace(context, chosen) if chosen else None
-    )
-    if value(context, "rate"):
-        given["bag_player"]["rate"] = float(value(context, "rate"))
-    made = [make_node(context, name, namespace or "/", given[name]) for name in REPLAY_NODES]
+    chosen = shared.value(context, "namespace")
+    into = shared.full_namespace(context, chosen) if chosen else None
+    namespace, given = replay_parameters(Path(shared.value(context, "bag")), into)
+    if rate := shared.value(context, "rate"):
+        given["bag_player"]["rate"] = float(rate)
+    place = namespace or "/"
+    made = [shared.make_node(context, name, place, given[name]) for name in REPLAY_NODES]
 
     def finish(client: Client) -> None:
         """Let the analyzer publish its last word, then end the launch."""
@@ -46,26 +36,18 @@ def nodes(context: LaunchContext) -> list[Action]:
         over = Shutdown(reason="the bag is played and analyzed")
         context.asyncio_loop.call_soon_threadsafe(context.emit_event_sync, over)
 
-    last_word = OpaqueFunction(function=in_background, args=[finish])
-
-    return [
-        *ended_by(made, {"bag_player"}, [last_word]),
-        *rviz(context, namespace or "/", given),
-        *made,
-    ]
+    last_word = OpaqueFunction(function=shared.in_background, args=[finish])
+    ending = shared.ended_by(made, {"bag_player"}, [last_word])
+    return [*ending, *shared.rviz(context, place, given), *made]
 
 
 def generate_launch_description() -> LaunchDescription:
     """Declare the arguments, then make the nodes."""
-    return LaunchDescription(
-        [
-            *declared(
-                ("bag", None, "bag to play: a folder or an .mcap file"),
-                ("rate", "", "seconds of the bag per second; 0: as fast as it goes; empty: 1"),
-                ("namespace", "", "to play into; empty: the one that was recorded"),
-                PARAMETERS_FILE,
-                RVIZ,
-            ),
-            OpaqueFunction(function=nodes),
-        ]
+    return shared.description(
+        nodes,
+        ("bag", None, "bag to play: a folder or an .mcap file"),
+        ("rate", "", "seconds of the bag per second; 0: as fast as it goes; empty: 1"),
+        ("namespace", "", "to play into; empty: the one that was recorded"),
+        shared.PARAMETERS_FILE,
+        shared.RVIZ,
     )

@@ -17,6 +17,7 @@ firmware, and a motor does not tell which it is. Check them before anyone is str
 weighing: a motor asked for a torque must show it at a lever on a scale.
 """
 
+import math
 from dataclasses import dataclass
 
 from gait_entrainment.robot.faults import Fault
@@ -75,6 +76,7 @@ class Reply:
     velocity: float  # [rad/s]
     torque: float  # [N m]
     error: int = 0  # 0 if all is well, or if the firmware does not tell
+    temperature: float = math.nan  # of the motor [deg C]; NaN if the firmware does not tell
 
 
 def pack_command(command: Command, motor: AkMotor) -> bytes:
@@ -119,6 +121,7 @@ def unpack_reply(data: bytes, motor: AkMotor) -> Reply | None:
         velocity=_decode(bits >> 12, -motor.velocity, motor.velocity, 12),
         torque=_decode(bits, -motor.torque, motor.torque, 12),
         error=data[7] if len(data) == 8 else 0,
+        temperature=float(data[6] - 40) if len(data) == 8 else math.nan,
     )
 
 

@@ -7,13 +7,12 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
-from gait_entrainment.conventions import Side
-from gait_entrainment.robot.faults import DeviceError, Fault
+from gait_entrainment.robot.faults import DeviceError, Fault, LimitError
 from gait_entrainment.settings import setting
 from gait_entrainment_drivers import ak_mit
-from gait_entrainment_drivers.can_bus import send
-from gait_entrainment_drivers.can_motor import CanMotorOptions, CanMotorRobot
-from gait_entrainment_drivers.host_loop import Reading
+from gait_entrainment_drivers.can_motor import CanMotor, CanMotorOptions
+from gait_entrainment_drivers.device import Reading
+from gait_entrainment_drivers.host_timed import HostTimedRobot
 
 
 @dataclass(frozen=True)
@@ -22,37 +21,46 @@ class AkMitCanOptions(CanMotorOptions):
 
     motor: str = setting("AK80-9", "type, which fixes the ranges", choices=tuple(ak_mit.MOTORS))
     motor_id: int = setting(1, "id of the motor", "", (1, 127))
+    host_id: int = setting(0, "id to which the motor replies", "", (0, 2047))
+
+    def __post_init__(self) -> None:
+        """Check every field, and that commands and replies can be told apart."""
+        super().__post_init__()
+        if self.host_id == self.motor_id:
+            raise LimitError(f"driver: host_id: {self.host_id}; allowed: not the motor_id")
 
 
-class AkMitCanRobot(CanMotorRobot):
-    """See the module's docstring; docs/drivers.md has wiring and hazards."""
+class AkMotorOnCan(CanMotor):
+    """The motor, as the torque loop sees it; docs/drivers.md has wiring and hazards."""
 
-    Options = AkMitCanOptions
     PROTOCOL = "in MIT mode"
     CHECK = "mode and motor_id"
 
-    def __init__(self, side: Side, options: AkMitCanOptions, seed: int) -> None:  # noqa: ARG002
+    def __init__(self, options: AkMitCanOptions) -> None:
         self._motor = ak_mit.MOTORS[options.motor]
-        super().__init__(side, options, f"motor {options.motor_id}", self._motor.torque)
+        super().__init__(options, f"motor {options.motor_id}", self._motor.torque)
         self._resolution = ak_mit.resolution(self._motor) * abs(options.ratio)
 
-    def _open(self) -> None:
+    def open(self) -> None:
+        """Connect, and see that the motor answers without an error."""
         self._open_bus()
         # Leaving motor mode is harmless whatever the motor is doing, and is answered.
         reply = self._ask(lambda: self._tell(ak_mit.EXIT), self._reply)
         if reply.error:
             raise DeviceError(
-                f"{self._name} reports: {_fault(reply.error).meaning} "
+                f"{self.name} reports: {_fault(reply.error).meaning} "
                 "Remove the cause and switch the motor off and on"
             )
 
-    def _enable(self) -> None:
+    def enable(self) -> None:
+        """Enter motor mode at zero torque."""
         # The motor holds its last command, also across modes: zero before and after.
         self._command(0.0)
         self._ask(lambda: self._tell(ak_mit.ENTER), self._reply)
         self._require_zero_torque(f"is it {self._options.motor}?")
 
-    def _exchange(self, torque: float, patience: float) -> Reading | None:
+    def exchange(self, torque: float, patience: float) -> Reading | None:
+        """Send a torque; return the newest reply."""
         ratio = self._options.ratio
         self._command(torque / ratio)
         reply = self._answer(self._reply, time.monotonic() + patience)
@@ -62,9 +70,16 @@ class AkMitCanRobot(CanMotorRobot):
         if abs(measured) < self._resolution:  # zero has no code of its own
             measured = 0.0
         faults = (_fault(reply.error),) if reply.error else ()
-        return Reading(measured, reply.position / ratio, faults)
+        return Reading(
+            measured,
+            reply.position / ratio,
+            reply.velocity / ratio,
+            reply.temperature,
+            (*faults, *self._masters),
+        )
 
-    def _disable(self) -> None:
+    def disable(self) -> None:
+        """Ask for zero and leave motor mode."""
         self._command(0.0)
         self._tell(ak_mit.EXIT)
 
@@ -72,14 +87,26 @@ class AkMitCanRobot(CanMotorRobot):
         self._tell(ak_mit.pack_command(ak_mit.Command(torque=torque), self._motor))
 
     def _tell(self, data: bytes) -> None:
-        send(self._bus, self._options.motor_id, data)
+        self._send(self._options.motor_id, data)
 
     def _reply(self, message: Any) -> ak_mit.Reply | None:
+        """Understand a reply of this motor to the host; anything else is no reply."""
+        if message.arbitration_id == self._options.motor_id:
+            self._note_command(message)
+        if message.arbitration_id != self._options.host_id:
+            return None
         reply = ak_mit.unpack_reply(bytes(message.data), self._motor)
         if reply is None or reply.motor_id == self._options.motor_id:
             return reply
         self._others.add(reply.motor_id)
         return None
+
+
+class AkMitCanRobot(HostTimedRobot):
+    """See the module's docstring; docs/drivers.md has wiring and hazards."""
+
+    Options = AkMitCanOptions
+    Device = AkMotorOnCan
 
 
 def _fault(error: int) -> Fault:

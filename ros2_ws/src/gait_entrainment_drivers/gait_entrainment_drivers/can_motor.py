@@ -6,16 +6,17 @@
 import contextlib
 import math
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
 
-from gait_entrainment.conventions import Side
 from gait_entrainment.robot.contract import Capabilities
-from gait_entrainment.robot.faults import DeviceError, LimitError
+from gait_entrainment.robot.faults import DeviceError, Fault, LimitError
 from gait_entrainment.settings import setting
-from gait_entrainment_drivers.can_bus import open_bus
-from gait_entrainment_drivers.host_loop import HostTimedRobot
+from gait_entrainment_drivers.can_bus import open_bus, send
+from gait_entrainment_drivers.device import TorqueDevice
+from gait_entrainment_drivers.host_timed import LoopOptions
 
 _T = TypeVar("_T")
 
@@ -23,10 +24,15 @@ _T = TypeVar("_T")
 ANSWER_TIMEOUT = 0.5
 # How often a question is repeated while waiting, since a frame may be lost [s].
 _ASK_PERIOD = 0.05
+# Commands remembered to tell an echo of one's own from somebody else's: 0.2 s of them.
+_REMEMBERED = 100
+SECOND_MASTER = Fault(
+    "second_master", "Somebody else on the bus sends commands to this motor: find and stop it."
+)
 
 
 @dataclass(frozen=True)
-class CanMotorOptions:
+class CanMotorOptions(LoopOptions):
     """Bus, transmission and loop."""
 
     interface: str = setting("socketcan", "python-can interface")
@@ -39,22 +45,20 @@ class CanMotorOptions:
         "1",
         (-20.0, 20.0),
     )
-    rate: float = setting(500.0, "torque commands per second", "Hz", (50.0, 1000.0))
-    silence: float = setting(0.05, "longest silence of the motor", "s", (0.005, 1.0))
-    lateness: float = setting(0.05, "by which the loop may wake up late", "s", (0.005, 1.0))
 
     def __post_init__(self) -> None:
-        """Check what has no range of its own."""
+        """Check every field, and what has no range of its own."""
+        super().__post_init__()
         if self.ratio == 0:
             raise LimitError("driver: ratio: 0; allowed: any other number")
 
 
-class CanMotorRobot(HostTimedRobot):
+class CanMotor(TorqueDevice):
     """
     A motor whose torque is streamed to it in frames with 11-bit ids.
 
-    A subclass names its protocol, opens the bus first of all in ``_open``, and implements
-    ``_enable``, ``_exchange`` and ``_disable``; ``_disable`` must bring zero torque.
+    A subclass names its protocol, opens the bus first of all in ``open``, and implements
+    ``enable``, ``exchange`` and ``disable``; ``disable`` must bring zero torque.
 
     ``name`` is the motor's, in messages; ``motor_torque`` its peak [N m] before the transmission.
     """
@@ -62,31 +66,53 @@ class CanMotorRobot(HostTimedRobot):
     PROTOCOL: ClassVar[str]  # as in "motor 1 does not answer PROTOCOL on can0"
     CHECK: ClassVar[str]  # what a person should check, besides power, wiring and bit rate
 
-    def __init__(self, side: Side, options: Any, name: str, motor_torque: float) -> None:
-        super().__init__(side, options.rate, options.silence, options.lateness)
-        self._options = options
-        self._name = name
+    def __init__(self, options: Any, name: str, motor_torque: float) -> None:
+        self.name, self._options = name, options
         self._bus: Any = None
         self._others: set[int] = set()  # ids of other motors that were heard
+        self._sent: deque[tuple[int, bytes]] = deque(maxlen=_REMEMBERED)
+        self._second_master = False  # somebody else has sent a command to this motor
         self.capabilities = Capabilities(
             peak_torque=motor_torque * abs(options.ratio),
             torque_rate=math.inf,
             measures_torque=True,
             simulated=False,
             state_rate=options.rate,
+            torque_bandwidth=options.bandwidth,
         )
 
     def _open_bus(self) -> None:
         options = self._options
         self._others.clear()
+        self._sent.clear()
+        self._second_master = False
         self._bus = open_bus(options.interface, options.channel, options.bitrate, options.port)
 
-    def _shut(self) -> None:
+    def shut(self) -> None:
+        """Close the bus, having asked for zero torque."""
         if self._bus is not None:
             with contextlib.suppress(Exception):
-                self._disable()
+                self.disable()
             self._bus.shutdown()
             self._bus = None
+
+    def _send(self, identifier: int, data: bytes = b"", *, remote: bool = False) -> None:
+        if not remote:
+            self._sent.append((identifier, data))
+        send(self._bus, identifier, data, remote=remote)
+
+    def _note_command(self, message: Any) -> None:
+        """Note a command to this motor that was seen on the bus; some adapters echo one's own."""
+        sent = message.arbitration_id, bytes(message.data)
+        if sent in self._sent:
+            self._sent.remove(sent)
+        else:
+            self._second_master = True
+
+    @property
+    def _masters(self) -> tuple[Fault, ...]:
+        """The fault of a second master, if there is one."""
+        return (SECOND_MASTER,) if self._second_master else ()
 
     def _answer(self, understand: Callable[[Any], _T | None], give_up: float) -> _T | None:
         """
@@ -116,7 +142,7 @@ class CanMotorRobot(HostTimedRobot):
         options = self._options
         others = f" (others do: {', '.join(map(str, sorted(self._others)))})"
         raise DeviceError(
-            f"{self._name} does not answer {self.PROTOCOL} on {options.interface} "
+            f"{self.name} does not answer {self.PROTOCOL} on {options.interface} "
             f"{options.channel}{others if self._others else ''}: check its power, wiring, "
             f"{self.CHECK}, and that the bus runs at {options.bitrate} bit/s"
         )
@@ -125,13 +151,12 @@ class CanMotorRobot(HostTimedRobot):
         """Raise DeviceError if the motor, enabled, keeps showing torque at zero command."""
         give_up = time.monotonic() + ANSWER_TIMEOUT
         while True:
-            reading = self._exchange(0.0, _ASK_PERIOD)
+            reading = self.exchange(0.0, _ASK_PERIOD)
             torque = math.nan if reading is None else reading.torque
             if abs(torque) <= 0.05 * self.capabilities.peak_torque:
                 return
             if time.monotonic() > give_up:
                 raise DeviceError(
-                    f"{self._name} shows {torque:g} N m at zero command: {doubt} "
-                    "is the joint free?"
+                    f"{self.name} shows {torque:g} N m at zero command: {doubt} is the joint free?"
                 )
             time.sleep(1 / self._options.rate)

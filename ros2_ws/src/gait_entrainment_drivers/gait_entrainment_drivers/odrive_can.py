@@ -8,16 +8,22 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
-from gait_entrainment.conventions import Side
-from gait_entrainment.robot.faults import DeviceError
+from gait_entrainment.robot.faults import DeviceError, Fault
 from gait_entrainment.settings import setting
 from gait_entrainment_drivers import odrive
-from gait_entrainment_drivers.can_bus import send
-from gait_entrainment_drivers.can_motor import ANSWER_TIMEOUT, CanMotorOptions, CanMotorRobot
-from gait_entrainment_drivers.host_loop import Reading
+from gait_entrainment_drivers.can_motor import ANSWER_TIMEOUT, CanMotor, CanMotorOptions
+from gait_entrainment_drivers.device import Reading
+from gait_entrainment_drivers.host_timed import HostTimedRobot
 
 # An axis that does not send its heartbeat this often [s] is asked for it: it can be switched off.
 HEARTBEAT_PERIOD = 0.15
+# Without one for this long [s], though asked again and again, its errors cannot be seen.
+HEARTBEAT_LOST = 0.5
+NO_HEARTBEAT = Fault(
+    "no_heartbeat", "The axis sends no heartbeat, not even on request: its errors cannot be seen."
+)
+# What only a host sends.
+_COMMANDS = (odrive.SET_STATE, odrive.SET_MODE, odrive.SET_TORQUE)
 
 
 @dataclass(frozen=True)
@@ -33,29 +39,31 @@ class OdriveCanOptions(CanMotorOptions):
     )
 
 
-class OdriveCanRobot(CanMotorRobot):
-    """See the module's docstring; docs/drivers.md has wiring and hazards."""
+class OdriveAxis(CanMotor):
+    """The axis, as the torque loop sees it; docs/drivers.md has wiring and hazards."""
 
-    Options = OdriveCanOptions
     PROTOCOL = "by CANSimple"
     CHECK = "node_id"
 
-    def __init__(self, side: Side, options: OdriveCanOptions, seed: int) -> None:  # noqa: ARG002
-        super().__init__(side, options, f"ODrive {options.node_id}", options.motor_torque)
+    def __init__(self, options: OdriveCanOptions) -> None:
+        super().__init__(options, f"ODrive {options.node_id}", options.motor_torque)
         self._heartbeat = odrive.Heartbeat(0, odrive.IDLE)
         self._beat_at = 0.0  # when it came [s, steady]
-        self._angle = math.nan  # of the motor [rad]
+        self._angle = self._velocity = math.nan  # of the motor [rad], [rad/s]
 
-    def _open(self) -> None:
+    def open(self) -> None:
+        """Connect, and see that the axis answers; its errors are cleared."""
         self._open_bus()
         self._reach(odrive.IDLE)
 
-    def _enable(self) -> None:
+    def enable(self) -> None:
+        """Enter closed-loop torque control at zero torque."""
         self._command(odrive.SET_MODE, odrive.TORQUE_MODE)
         self._reach(odrive.CLOSED_LOOP)
         self._require_zero_torque("is it calibrated?")
 
-    def _exchange(self, torque: float, patience: float) -> Reading | None:
+    def exchange(self, torque: float, patience: float) -> Reading | None:
+        """Send a torque; return torque, position and velocity, which it is asked for."""
         ratio, peak = self._options.ratio, self._options.motor_torque
         self._command(odrive.SET_TORQUE, odrive.pack_torque(torque / ratio, peak))
         if time.monotonic() - self._beat_at > HEARTBEAT_PERIOD:
@@ -68,9 +76,17 @@ class OdriveCanRobot(CanMotorRobot):
         faults = odrive.faults_of(self._heartbeat.error)
         if not faults and self._heartbeat.state != odrive.CLOSED_LOOP:
             faults = (odrive.DISARMED,)
-        return Reading(measured * ratio, self._angle / ratio, faults)
+        if time.monotonic() - self._beat_at > HEARTBEAT_LOST:
+            faults = (*faults, NO_HEARTBEAT)
+        return Reading(
+            measured * ratio,
+            self._angle / ratio,
+            self._velocity / ratio,
+            faults=(*faults, *self._masters),
+        )
 
-    def _disable(self) -> None:
+    def disable(self) -> None:
+        """Ask for zero and leave closed-loop control."""
         self._command(odrive.SET_TORQUE, odrive.pack_torque(0.0, 0.0))
         self._command(odrive.SET_STATE, odrive.STATE.pack(odrive.IDLE))
 
@@ -94,12 +110,12 @@ class OdriveCanRobot(CanMotorRobot):
             if time.monotonic() > give_up:
                 faults = " ".join(fault.meaning for fault in odrive.faults_of(heartbeat.error))
                 raise DeviceError(
-                    f"{self._name} stays in state {heartbeat.state} instead of {state}. {faults} "
+                    f"{self.name} stays in state {heartbeat.state} instead of {state}. {faults} "
                     "Remove the cause, see that it is calibrated, and switch it off and on"
                 )
 
     def _command(self, command: int, data: bytes = b"", *, remote: bool = False) -> None:
-        send(self._bus, odrive.frame_id(self._options.node_id, command), data, remote=remote)
+        self._send(odrive.frame_id(self._options.node_id, command), data, remote=remote)
 
     def _beat(self, message: Any) -> odrive.Heartbeat | None:
         """Note what a frame says; return the heartbeat if it is one."""
@@ -107,11 +123,13 @@ class OdriveCanRobot(CanMotorRobot):
         data = bytes(message.data)
         if node != self._options.node_id:
             self._others.add(node)
+        elif command in _COMMANDS:
+            self._note_command(message)
         elif command == odrive.HEARTBEAT and (heartbeat := odrive.unpack_heartbeat(data)):
             self._heartbeat, self._beat_at = heartbeat, time.monotonic()
             return heartbeat
         elif command == odrive.ENCODER and (estimates := odrive.unpack_pair(data)):
-            self._angle = 2 * math.pi * estimates[0]
+            self._angle, self._velocity = (2 * math.pi * value for value in estimates)
         return None
 
     def _torque(self, message: Any) -> float | None:
@@ -121,3 +139,10 @@ class OdriveCanRobot(CanMotorRobot):
             return None
         torques = odrive.unpack_pair(bytes(message.data))
         return None if torques is None else torques[1]
+
+
+class OdriveCanRobot(HostTimedRobot):
+    """See the module's docstring; docs/drivers.md has wiring and hazards."""
+
+    Options = OdriveCanOptions
+    Device = OdriveAxis

@@ -10,7 +10,7 @@ from argparse import Namespace
 
 import pytest
 
-from gait_entrainment_nodes.commands import stop as stop_command
+from gait_entrainment_nodes.commands import stop_ros as stop_command
 from gait_entrainment_nodes.messaging import domain as module
 from gait_entrainment_nodes.messaging.domain import DomainError, claimed_domain
 

@@ -11,8 +11,8 @@ from gait_entrainment.conventions import Side
 from gait_entrainment.messages import nanoseconds_of
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.robot import TorqueProfile
-from gait_entrainment.walker import Stretch, WalkerRun
 from gait_entrainment_msgs.msg import Progress
+from gait_entrainment_nodes.nodes.walker_run import Stretch, WalkerRun
 from gait_entrainment_nodes.nodes.walker_sim_run import LockStepRun, RealTimeRun, Starved
 
 SECOND = 10**9

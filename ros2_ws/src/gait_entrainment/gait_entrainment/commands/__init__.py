@@ -27,6 +27,7 @@ from gait_entrainment.errors import EntrainmentError
 ENTRY_POINTS = "gait_entrainment.commands"
 COMMANDS = {
     "simulate": "the experiment in one process, without ROS",
+    "stop": "torque to zero, latched, for every ankle robot that this machine drives",
 }
 _DESCRIPTION = "Rehearse, run and analyze entrainment experiments."
 

@@ -23,13 +23,13 @@ def add_protocol_options(parser: argparse.ArgumentParser) -> None:
         "protocol", nargs="?", metavar="PROTOCOL.yaml", help="default: the paper's example"
     )
     group = parser.add_argument_group("fields of the protocol")
-    for field, told in FIELDS.items():
-        unit = f" [{told.unit}]" if told.unit not in ("", "1") else ""
-        kind = str if issubclass(told.kind, Enum) else told.kind
+    for field, setting in FIELDS.items():
+        unit = f" [{setting.unit}]" if setting.unit not in ("", "1") else ""
+        kind = str if issubclass(setting.kind, Enum) else setting.kind
         group.add_argument(
             _option(field),
             dest=field,
-            help=told.meaning + unit + _default_text(field),
+            help=setting.meaning + unit + _default_text(field),
             metavar=kind.__name__.upper(),
         )
 

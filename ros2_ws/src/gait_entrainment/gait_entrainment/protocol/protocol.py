@@ -143,7 +143,7 @@ class Protocol:
 SECTIONS: dict[str, type[Any]] = {"pulses": PulsePlan, "walker": WalkerParameters}
 # All fields of a protocol, by the names that files and messages use: "pulses.width".
 FIELDS: dict[str, Setting] = settings_of(Protocol) | {
-    f"{section}.{name}": told
+    f"{section}.{name}": rule
     for section, content in SECTIONS.items()
-    for name, told in settings_of(content).items()
+    for name, rule in settings_of(content).items()
 }

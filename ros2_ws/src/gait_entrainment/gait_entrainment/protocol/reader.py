@@ -134,10 +134,10 @@ def _walk(node: yaml.Node, name: str, prefix: str) -> Iterator[tuple[str, _Entry
 def _build(entries: Mapping[str, _Entry]) -> Protocol:
     sections: dict[str, dict[str, Any]] = {"": {}, **{section: {} for section in SECTIONS}}
     for key, (value, where) in entries.items():
-        told, (section, _, name) = FIELDS[key], key.rpartition(".")
+        rule, (section, _, name) = FIELDS[key], key.rpartition(".")
         try:
             # YAML 1.1 reads 1e-3, which has no dot, as a text.
-            read = told.parse(key, value) if isinstance(value, str) else told.check(key, value)
+            read = rule.parse(key, value) if isinstance(value, str) else rule.check(key, value)
             sections[section][name] = read
         except SettingError as error:
             raise ProtocolError(f"{where}: {error}") from None

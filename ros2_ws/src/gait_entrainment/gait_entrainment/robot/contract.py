@@ -3,6 +3,7 @@
 
 """What a driver of an ankle robot must offer: the contract, for implementers and for the kit."""
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,6 +24,7 @@ class Capabilities:
     measures_torque: bool  # what read() reports is measured; else it is computed
     simulated: bool  # lives in simulated time: promises ahead, touches no clock and no person
     state_rate: float  # states per second [Hz]; 0 if there is one per change of torque
+    torque_bandwidth: float = math.inf  # -3 dB: how fast its torque follows the command [Hz]
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,7 @@ class AnkleRobot(ABC):
 
     **Threads**: the guard calls everything but ``stop`` from one thread. Calls return within
     10 ms (configure, activate, deactivate and close within 2 s), so that nobody waits. A driver
-    that streams torque does so in a thread of its own: host_loop.py of gait_entrainment_drivers
+    that streams torque does so in a thread of its own: host_timed.py of gait_entrainment_drivers
     has one.
 
     **Safety**: a driver is never called directly. The guard (guard.py) stands before it: it checks

@@ -30,6 +30,11 @@ class Fault:
 
 
 STOPPED = Fault("stopped", "The stop was called.")
+OPERATOR_SILENT = Fault(
+    "operator_silent",
+    "Whoever started the run fell silent for longer than the limit: its terminal is closed, or its"
+    " process is frozen.",
+)
 EXPERIMENT_SILENT = Fault(
     "experiment_silent", "The experiment sent no horizon for longer than the limit."
 )

@@ -13,10 +13,8 @@ The exact walker (docs/model.md).
     sampling        posture, torques, forces at any instant
     promise         the torque promised by the ankle robot
     walker          all of it in time
-    run             one run of it, with the account that a node must report
 """
 
-from gait_entrainment.walker.run import Stretch, WalkerRun
 from gait_entrainment.walker.sampling import Samples
 from gait_entrainment.walker.segment import Stance
 from gait_entrainment.walker.walker import Ending, EndingKind, Transition, Walker

@@ -47,7 +47,7 @@ BOUNDED_PULSE = 0.25
 BOUND_POINTS = 1025
 BOUND_MARGIN = 1e-3  # of the weight, and of the squared rate g / L
 
-# Constants are made in extended precision where the machine has it: an error in the last bit of a
+# Constants are made in extended precision if the machine has it: an error in the last bit of a
 # constant would add up over the steps, one of the arithmetic averages out.
 Extended: Any = np.longdouble
 PI: Any = Extended("3.14159265358979323846264338327950288")

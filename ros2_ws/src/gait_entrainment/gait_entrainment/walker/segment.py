@@ -87,7 +87,7 @@ NARROWEST_PANEL: Final = 1e-12
 SMOOTH_PANEL: Final = 1e-3
 SMOOTH_CHANGE: Final = 0.1
 
-# Longest a segment may take [s]: where a stall is approached along a tangent, it takes forever.
+# Longest that a segment may take [s]: along a tangent a stall is approached forever.
 LONGEST: Final = 1e6
 
 # Of the work space in which quadratures put the integrand at the nodes.

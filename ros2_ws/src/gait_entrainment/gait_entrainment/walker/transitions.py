@@ -37,7 +37,7 @@ from gait_entrainment.walker.single_stance import pendulum_time, turning_point
 
 NANO: Final = 1e9
 
-# Points of the search for a stall or lift-off. It is made only where the bounds do not rule both
+# Points of the search for a stall or lift-off. It is made only if the bounds do not rule both
 # out; rate and force bend a few times at most over a double stance, and minima are refined.
 SEARCH_POINTS: Final = 128
 
@@ -68,7 +68,7 @@ def enter_double_stance(model: Model, segment: Segment, perturbation: float, wor
 
 @compiled
 def leave_double_stance(model: Model, segment: Segment, work: Floats) -> None:
-    """Toe-off: the ankle torque ends, also where a pulse is still on."""
+    """Toe-off: the ankle torque ends, even if a pulse is still on."""
     segment.apex = gained_apex(model, segment, segment.end)
     segment.stance = Stance.SINGLE
     segment.position = model.toe_off_position

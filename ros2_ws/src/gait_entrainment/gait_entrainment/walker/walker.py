@@ -18,6 +18,7 @@ import numpy as np
 
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment.robot import TorqueProfile
 from gait_entrainment.walker.model import Floats, Stamps, make_model, start_apex
 from gait_entrainment.walker.promise import PromisedTorque
 from gait_entrainment.walker.sampling import SAMPLE, Samples, fill_samples, samples_from
@@ -135,6 +136,12 @@ class Walker:
         """
         promise = self._promises[side]
         return promise.extend(times_ns, torques, int(valid_until_ns), self.time_reached)
+
+    def promise(self, profile: TorqueProfile) -> int:
+        """Take what an ankle robot promises; as `extend_torque`."""
+        return self.extend_torque(
+            profile.side, profile.times, profile.torques, profile.valid_until
+        )
 
     def cut_torque(self, at_ns: int) -> None:
         """Stop: void both ankles' promises from `at_ns` on, but not before `time_reached`."""

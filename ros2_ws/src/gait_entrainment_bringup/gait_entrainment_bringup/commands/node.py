@@ -10,14 +10,8 @@ import tempfile
 from pathlib import Path
 
 from gait_entrainment.protocol import write_protocol
-from gait_entrainment_bringup.node_list import NODES, bag_folder, parameter_arguments
-from gait_entrainment_bringup.run_options import (
-    add_run_options,
-    check_driver,
-    check_output,
-    checked_protocol,
-    chosen_parameters,
-)
+from gait_entrainment_bringup.node_list import NODES, parameter_arguments
+from gait_entrainment_bringup.run_options import add_run_options, checked_run, chosen_parameters
 from gait_entrainment_nodes.messaging.domain import wanted_domain
 from gait_entrainment_nodes.messaging.environment import PACKAGE, set_environment
 
@@ -44,12 +38,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the node to its end and return its exit code."""
     domain = wanted_domain() or 0
-    protocol = checked_protocol(options)
-    bag = options.out or bag_folder(protocol)
-    if options.node == "perturbator":
-        check_driver(protocol.driver, options)
-    if options.node == "bag_recorder":
-        check_output(bag)
+    drives, records = options.node == "perturbator", options.node == "bag_recorder"
+    protocol, bag = checked_run(options, drives=drives, records=records)
     set_environment(domain)
     given = chosen_parameters(protocol, bag, options)
     given["experiment"]["protocol"] = write_protocol(protocol)

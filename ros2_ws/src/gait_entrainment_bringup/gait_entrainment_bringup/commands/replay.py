@@ -5,7 +5,6 @@
 
 import argparse
 import json
-import signal
 from pathlib import Path
 
 from gait_entrainment.errors import UsageError
@@ -14,11 +13,10 @@ from gait_entrainment.settings import Setting
 from gait_entrainment_bags import BagReader
 from gait_entrainment_bags.recorded_run import RecordedRun, read_run
 from gait_entrainment_bringup.node_list import MOVED, parameter_arguments, replay_parameters
-from gait_entrainment_bringup.node_process import prepare
 from gait_entrainment_bringup.run_options import check_output, is_utf8
+from gait_entrainment_bringup.signals import stop_on_signals
 from gait_entrainment_bringup.supervisor import supervised
 from gait_entrainment_nodes.messaging.domain import claimed_domain
-from gait_entrainment_nodes.messaging.environment import set_environment
 
 DESCRIPTION = "Play a bag to the gait analyzer, and compare with what was recorded live."
 EXAMPLES = """examples:
@@ -53,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
         options.rate = _RATE.parse("--rate", options.rate)
     if options.out is not None:
         check_output(options.out)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    stop_on_signals()
     recorded = read_run(options.bag, torques=False)
     with claimed_domain() as domain:
         results = replay(options, domain)
@@ -62,22 +60,21 @@ def run(options: argparse.Namespace) -> int:
 
 def replay(options: argparse.Namespace, domain: int) -> dict[str, list[bytes]]:
     """Start the nodes, play the bag, stop the nodes; return the results by topic."""
-    environment = set_environment(domain)
-    prepare()
-    # Not before: it loads ROS, while what the nodes need is loaded, too.
-    from gait_entrainment_bringup.replay_client import ReplayClient
-
     namespace, given = replay_parameters(options.bag, out=options.out)
     given["bag_player"] |= {"rate": options.rate or 0.0, "start_paused": True}
     remaps = [f"__ns:={namespace}", *(f"{name}:={name[1:]}" for name in MOVED)]
     moved = [word for remap in remaps for word in ("-r", remap)] if namespace else []
-    with supervised(environment, STOP_ORDER) as supervisor:
+    with supervised(domain, STOP_ORDER) as supervisor:
+        # Not before: it loads ROS, while what the nodes need is loaded, too.
+        from gait_entrainment_bringup.replay_client import ReplayClient
+
         arguments = [*parameter_arguments(given, supervisor.folder), *moved]
         for node in STOP_ORDER:
             if node in given:
                 supervisor.start(node, arguments)
         recorded = options.out is not None
-        with ReplayClient(supervisor, namespace, recorded=recorded) as client:
+        client = ReplayClient(supervisor, namespace, recorded=recorded)
+        with client:
             client.play(quiet=options.json)
         if recorded:
             supervisor.wait_for_record()
@@ -88,9 +85,10 @@ def report(
     options: argparse.Namespace, recorded: RecordedRun, results: dict[str, list[bytes]]
 ) -> int:
     """Print what came of the replay, and how it compares with the record."""
-    differing, compared = differences(options.bag, results)
+    compared = differences(options.bag, results)
+    differing = [difference for difference in compared.values() if difference]
     names = ("strides", "pulse phases", "verdicts")
-    counts = dict(zip(names, (len(messages) for messages in results.values()), strict=True))
+    counts = dict(zip(names, map(len, results.values()), strict=True))
     outcome = outcome_of(recorded) | {
         "bag": str(options.bag),
         "replayed": counts,
@@ -109,34 +107,23 @@ def report(
     return 1 if differing else 0
 
 
-def differences(path: Path, results: dict[str, list[bytes]]) -> tuple[list[str], bool]:
-    """
-    Compare results with those in a bag, byte for byte.
-
-    Returns
-    -------
-    differing
-        A line for each topic that differs.
-    compared
-        Whether there was anything to compare with.
-
-    """
-    differing = []
-    compared = False
+def differences(path: Path, results: dict[str, list[bytes]]) -> dict[str, str]:
+    """Return how results differ from those in a bag, "" for not at all, by recorded topic."""
+    differing = {}
     with BagReader(path) as bag:
-        for topic, messages in results.items():
-            name = next((name for name in bag.topics if name.endswith(f"/{topic}")), None)
-            if name is None:
+        for topic, again in results.items():
+            names = [name for name in bag.topics if name.endswith(f"/{topic}")]
+            if not names:
                 continue
-            compared = True
-            found = sorted(bag.messages([name]), key=lambda message: message.place)
-            for number, (live, again) in enumerate(zip(found, messages, strict=False), start=1):
-                if live.data != again:
-                    differing.append(f"{topic}: message {number} is another")
+            found = sorted(bag.messages(names[:1]), key=lambda message: message.place)
+            live = [message.data for message in found]
+            differing[topic] = ""
+            for number, (one, other) in enumerate(zip(live, again, strict=False), start=1):
+                if one != other:
+                    differing[topic] = f"{topic}: message {number} is another"
                     break
             else:
-                if len(found) != len(messages):
-                    differing.append(
-                        f"{topic}: {len(found)} messages recorded, {len(messages)} replayed"
-                    )
-    return differing, compared
+                if len(live) != len(again):
+                    counts = f"{len(live)} messages recorded, {len(again)} replayed"
+                    differing[topic] = f"{topic}: {counts}"
+    return differing

@@ -7,27 +7,24 @@ import argparse
 import importlib
 import os
 import shutil
-import signal
 import threading
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
 from gait_entrainment.errors import UsageError
 from gait_entrainment.protocol import Protocol, write_protocol
+from gait_entrainment.robot import find_driver
 from gait_entrainment_bags import BagError, BagReader, UnreadableBagError, recover
-from gait_entrainment_bringup.node_list import NODES, STOP_ORDER, bag_folder, parameter_arguments
-from gait_entrainment_bringup.node_process import prepare
-from gait_entrainment_bringup.run_options import (
-    add_run_options,
-    check_driver,
-    check_output,
-    checked_protocol,
-    chosen_parameters,
+from gait_entrainment_bringup.node_list import (
+    NODES,
+    PERSON_SILENCE,
+    STOP_ORDER,
+    parameter_arguments,
 )
+from gait_entrainment_bringup.run_options import add_run_options, checked_run, chosen_parameters
+from gait_entrainment_bringup.signals import stop_on_signals
 from gait_entrainment_bringup.supervisor import supervised
 from gait_entrainment_nodes.messaging.domain import claimed_domain
-from gait_entrainment_nodes.messaging.environment import set_environment
 
 DESCRIPTION = "Start the nodes, conduct a protocol, record a bag, print the outcome."
 EXAMPLES = """examples:
@@ -61,14 +58,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run one experiment and print its outcome."""
-    protocol = checked_protocol(options)
-    check_driver(protocol.driver, options)
+    # Stopping from outside takes the same path as Ctrl-C: torque first, then the rest.
+    stop_on_signals()
+    protocol, bag = checked_run(options)
     if options.elsewhere and "ROS_DOMAIN_ID" not in os.environ:
         raise UsageError("--elsewhere: set ROS_DOMAIN_ID, to the same number on every host")
-    bag = options.out or bag_folder(protocol)
-    check_output(bag)
-    # Stopping from outside takes the same path as Ctrl-C: torque first, then the rest.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     with claimed_domain() as domain:
         run_experiment(protocol, bag, domain, options)
     return 0
@@ -78,35 +72,32 @@ def run_experiment(
     protocol: Protocol, bag: Path, domain: int, options: argparse.Namespace
 ) -> None:
     """Start the nodes, conduct the protocol, stop the nodes, report."""
-    environment = set_environment(domain)
-    prepare()
-    # Not before: it loads ROS, while what the nodes need is loaded, too.
-    from gait_entrainment_bringup.run_client import conduct
+    figures = not options.no_figures
+    with supervised(domain, STOP_ORDER, partial(kept, bag)) as supervisor:
+        # Not before: it loads ROS, while what the nodes need is loaded, too.
+        from gait_entrainment_bringup.run_client import conduct
 
-    with supervised(environment, STOP_ORDER, partial(kept, bag)) as supervisor:
         given = chosen_parameters(protocol, bag, options)
         arguments = parameter_arguments(given, supervisor.folder)
         for node in NODES:
             if node not in options.elsewhere:
                 supervisor.start(node, arguments)
-        later = [REPORT] if options.no_figures else [REPORT, *DRAWING]
-        conduct(supervisor, protocol, partial(load, later), quiet=options.json)
+        real = not find_driver(protocol.driver).simulated
+        silence = {"silence": PERSON_SILENCE} if real else {}
+        load = partial(load_report, figures)
+        conduct(supervisor, protocol, load, quiet=options.json, **silence)
         supervisor.wait_for_record()
         # No torque is left and the record is closed: in which order the rest ends does not matter.
         supervisor.request_stop(NODES)
         (bag / "protocol.yaml").write_text(write_protocol(protocol))
-        report = importlib.import_module(REPORT).report
-        report(bag, figures=not options.no_figures, as_json=options.json)
+        importlib.import_module(REPORT).report(bag, figures=figures, as_json=options.json)
 
 
-def load(modules: Sequence[str]) -> None:
-    """Load modules in a thread, for later."""
-
-    def load_each() -> None:
-        for module in modules:
-            importlib.import_module(module)
-
-    threading.Thread(target=load_each, daemon=True).start()
+def load_report(figures: bool) -> None:
+    """Load in a thread what the end of a run needs."""
+    modules = (REPORT, *DRAWING) if figures else (REPORT,)
+    loaded = map(importlib.import_module, modules)
+    threading.Thread(target=list, args=[loaded], daemon=True).start()
 
 
 def kept(bag: Path) -> str:

@@ -5,5 +5,5 @@
 
 COMMANDS = {
     "ready": "whether nodes answer, here or on other hosts",
-    "stop": "torque to zero, latched, in every run on this machine",
+    "stop-ros": "the stop service of every perturbator of a ROS domain, on other hosts too",
 }

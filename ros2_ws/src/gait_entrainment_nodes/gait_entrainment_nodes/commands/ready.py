@@ -8,7 +8,7 @@ import sys
 from contextlib import suppress
 
 from gait_entrainment_msgs.srv import Ready
-from gait_entrainment_nodes.messaging.client import Client
+from gait_entrainment_nodes.messaging.client import Client, all_answered
 from gait_entrainment_nodes.messaging.domain import wanted_domain
 from gait_entrainment_nodes.messaging.environment import set_environment
 
@@ -21,28 +21,19 @@ DESCRIPTION = (
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     parser.add_argument("nodes", nargs="+", metavar="NODE", help="such as walker_sim")
-    parser.add_argument(
-        "--timeout", type=float, default=5.0, help="how long to wait [s] (default 5)"
-    )
+    parser.add_argument("--timeout", type=float, default=5.0, help="how long to wait [s] (5)")
 
 
 def run(options: argparse.Namespace) -> int:
     """Ask every node until all are ready; 1 if they are not in time."""
     set_environment(wanted_domain() or 0)
     with Client("entrain_ready") as client:
-        questions = {
-            name: client.ask(Ready, f"{name}/ready", accept=lambda answer: answer.ready)
-            for name in options.nodes
-        }
-
-        def all_ready() -> bool:
-            answers = [question.answer() for question in questions.values()]  # each is asked
-            return all(answers)
-
+        asked = [client.ask(Ready, f"{n}/ready", accept=lambda a: a.ready) for n in options.nodes]
         with suppress(KeyboardInterrupt):  # what is known by then is told
-            client.wait(all_ready, options.timeout)
-    waiting = {name: q.latest for name, q in questions.items() if not q.accepted}
-    for name, answer in waiting.items():
-        reason = f"waits for {answer.waiting_for}" if answer else "does not answer"
-        print(f"entrain ready: {name} {reason}", file=sys.stderr)
-    return 1 if waiting else 0
+            client.wait(lambda: all_answered(asked), options.timeout)
+    for node, question in zip(options.nodes, asked, strict=True):
+        if not question.accepted:
+            latest = question.latest
+            reason = f"waits for {latest.waiting_for}" if latest else "does not answer"
+            print(f"entrain ready: {node} {reason}", file=sys.stderr)
+    return 0 if all(question.accepted for question in asked) else 1

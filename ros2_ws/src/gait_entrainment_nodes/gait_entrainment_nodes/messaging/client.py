@@ -4,15 +4,15 @@
 """
 A place in the ROS graph for processes that are not nodes: commands, launch files, tests.
 
-A node can answer only those it has discovered; what it sends to anyone else is lost. So a question
-is asked again and again (``Client.call``, ``Client.ask``), and what must not be asked twice waits
+A node can answer only those it has discovered; what it sends to anyone else is lost. So questions
+are asked again and again (``Client.call``, ``Client.ask``), and what must not be asked twice waits
 until the node is known to answer (``Client.wait_to_be_known``). Discovery announces the endpoints
 of a process in the order in which they were made: whoever answers the latest one knows them all.
 """
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import rclpy
@@ -36,38 +36,26 @@ ROUND = 0.02
 
 
 class Question:
-    """
-    A request that is repeated until its answer is acceptable.
-
-    Attributes
-    ----------
-    accepted
-        The first acceptable answer, None before it.
-    latest
-        The latest answer, acceptable or not; None before the first one.
-    answered_at
-        When it came, on the steady clock [s].
-
-    """
+    """A request to a service, repeated each period [s] until its answer is acceptable."""
 
     def __init__(
         self, service: Any, request: Any, accept: Callable[[Any], object], period: float
     ) -> None:
-        self.accepted: Any = None
-        self.latest: Any = None
-        self.answered_at = -math.inf
+        self.latest: Any = None  # answer, acceptable or not
+        self.answered_at = -math.inf  # when that came, on the steady clock [s]
+        self.accepted: Any = None  # the first acceptable answer
         self._service, self._request, self._accept, self._period = service, request, accept, period
         self._asked_at = -math.inf
         self._pending: list[Any] = []
 
     def answer(self) -> Any:
         """Return the first acceptable answer, None before it; ask if it is time to."""
+        now = time.monotonic()
         for call in [call for call in self._pending if call.done()]:
             self._pending.remove(call)
-            self.latest, self.answered_at = call.result(), time.monotonic()
+            self.latest, self.answered_at = call.result(), now
             if self.accepted is None and self._accept(self.latest):
                 self.accepted = self.latest
-        now = time.monotonic()
         due = self.accepted is None and now - self._asked_at >= self._period
         if due and self._service.service_is_ready():
             self._asked_at = now
@@ -75,22 +63,18 @@ class Question:
         return self.accepted
 
 
+def all_answered(questions: Iterable[Question]) -> bool:
+    """Ask each of several questions if it is due; return whether all are answered."""
+    answers = [question.answer() for question in questions]
+    return all(answers)
+
+
 class Client:
     """
-    A node with a context and an executor of its own.
+    A node with a context and an executor of its own, in a ROS domain or that of the environment.
 
-    Parameters
-    ----------
-    name
-        Of the node.
-    namespace
-        That relative names belong to, from the root on.
-    domain
-        The ROS domain; None for that of the environment.
-    each_round
-        Called over and over while anything is waited for; ends the waiting by an exception, for
-        instance when a process that should answer has ended.
-
+    ``each_round`` is called over and over while anything is waited for. An exception in it ends
+    the waiting, for instance when a process that should answer has ended.
     """
 
     def __init__(
@@ -130,7 +114,7 @@ class Client:
         rclpy.try_shutdown(context=self._context)
 
     def subscribe(
-        self, topic: Topic, callback: Callable[[Any], object], *, raw: bool = False
+        self, topic: Topic, callback: Callable[[Any], None], *, raw: bool = False
     ) -> None:
         """Hear a topic; ``raw`` gives the callback serialized messages."""
         self.node.create_subscription(topic.type, topic.name, callback, topic.qos, raw=raw)
@@ -153,7 +137,7 @@ class Client:
         return self._services[name]
 
     def action(self, action_type: Any, name: str) -> Any:
-        """Return the client of an action; it is made once."""
+        """Return the client of an action, made once."""
         if name not in self._actions:
             self._actions[name] = ActionClient(self.node, action_type, name)
         return self._actions[name]
@@ -167,13 +151,9 @@ class Client:
         accept: Callable[[Any], object] = lambda _: True,
         period: float = ASKING_PERIOD,
     ) -> Question:
-        """
-        Return a question to a service, to be waited for by its ``answer``.
-
-        It is asked each ``period`` [s] until ``accept`` is true of an answer; infinite: only once.
-        """
-        request = request or service_type.Request()
-        return Question(self.service(service_type, name), request, accept, period)
+        """Return a question to a service; wait for its ``answer``. Infinite period: ask once."""
+        service = self.service(service_type, name)
+        return Question(service, request or service_type.Request(), accept, period)
 
     def call(
         self,
@@ -181,31 +161,18 @@ class Client:
         name: str,
         request: Any = None,
         *,
-        accept: Callable[[Any], object] = lambda _: True,
-        period: float = ASKING_PERIOD,
         patience: float = PATIENCE,
+        **asking: Any,
     ) -> Any:
-        """
-        Ask a service, see ``ask``, and wait for the first acceptable answer.
-
-        Raises
-        ------
-        SilenceError
-            There was none within ``patience`` [s].
-
-        """
-        question = self.ask(service_type, name, request, accept=accept, period=period)
+        """Ask as ``ask`` does and return the answer; SilenceError after ``patience`` [s]."""
+        question = self.ask(service_type, name, request, **asking)
         return self._expect(question.answer, name, patience)
 
     def wait_to_be_known(self, node: str, patience: float = PATIENCE) -> None:
         """
         Wait until a node of this project knows everything that this client has made so far.
 
-        Raises
-        ------
-        SilenceError
-            It does not answer within ``patience`` [s].
-
+        SilenceError if it does not answer within ``patience`` [s].
         """
         name = f"{node}/ready"
         self._services.pop(name, None)  # to be made anew, behind everything else
@@ -220,15 +187,7 @@ class Client:
         on_feedback: Callable[[Any], object] | None = None,
         patience: float = PATIENCE,
     ) -> Any:
-        """
-        Send a goal to an action server; return its handle, accepted or not.
-
-        Raises
-        ------
-        SilenceError
-            There was no answer within ``patience`` [s].
-
-        """
+        """Return the handle of a goal, accepted or not; SilenceError after ``patience`` [s]."""
         action = self.action(action_type, name)
         self._expect(action.server_is_ready, name, patience)
         answer = action.send_goal_async(goal, feedback_callback=on_feedback)
@@ -241,7 +200,6 @@ class Client:
         return answer.result() if self.wait(answer.done, patience) else None
 
     def _expect(self, condition: Callable[[], Any], name: str, patience: float) -> Any:
-        value = self.wait(condition, patience)
-        if not value:
+        if not (value := self.wait(condition, patience)):
             raise SilenceError(name, patience)
         return value

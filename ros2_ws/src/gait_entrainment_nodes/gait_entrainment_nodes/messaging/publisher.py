@@ -33,8 +33,8 @@ class CountedPublisher:
     Its node has an attribute ``stopping``, which ends the waiting.
     """
 
-    def __init__(self, node: Any, topic: Topic) -> None:
-        self._node = node
+    def __init__(self, node: Any, topic: Topic, *, counted: bool = True) -> None:
+        self._node, self.counted = node, counted
         self._publisher = node.create_publisher(topic.type, topic.name, topic.qos)
         self.count = 0
 
@@ -57,15 +57,10 @@ class CountedPublisher:
         """
         Publish a message, or its serialized bytes; wait while the history is full.
 
-        Raises
-        ------
-        StopRequestedError
-            if the node is to stop meanwhile.
-
+        Raises StopRequestedError if the node is to stop meanwhile.
         """
         data = message if isinstance(message, bytes) else serialize(message)
-        if not self._published(data):
-            self._repeat(lambda: self._published(data, after=RETRY_PERIOD))
+        self._repeat(lambda: self._published(data))
         self.count += 1
 
     def wait_until_received(self, timeout: float) -> bool:
@@ -76,20 +71,15 @@ class CountedPublisher:
         """
         Wait as ``wait_until_received`` does, and report a reader that does not keep up.
 
-        Raises
-        ------
-        StopRequestedError
-            if the node is to stop meanwhile.
-
+        Raises StopRequestedError if the node is to stop meanwhile.
         """
         return self._repeat(lambda: self.wait_until_received(PATIENCE), patience)
 
-    def _published(self, data: bytes, after: float = 0.0) -> bool:
-        if after:
-            time.sleep(after)
+    def _published(self, data: bytes) -> bool:
         try:
             self._publisher.publish(data)
         except RuntimeError:  # rclpy's RCLError: the history is full
+            time.sleep(RETRY_PERIOD)
             return False
         return True
 

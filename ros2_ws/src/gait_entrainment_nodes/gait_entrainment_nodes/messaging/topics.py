@@ -17,7 +17,7 @@ from geometry_msgs.msg import WrenchStamped
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import JointState
-from std_msgs.msg import String
+from std_msgs.msg import Bool, Empty, String
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
@@ -56,6 +56,19 @@ LOOKING_ON = QoSProfile(
 )
 
 
+# A button that was pressed before somebody joined counts too.
+LATCHED_STATE = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST,
+    depth=1,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+# Only the latest sign of life counts, and nobody waits for anybody.
+HEARTBEAT = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST, depth=1, reliability=ReliabilityPolicy.BEST_EFFORT
+)
+
+
 class Topic(NamedTuple):
     """One topic: relative name, message type, quality of service of both ends."""
 
@@ -76,6 +89,9 @@ TORQUE_PROFILE = Topic(topic_names.TORQUE_PROFILE, msg.TorqueProfile)
 PULSES = Topic(topic_names.PULSES, msg.TorquePulse)
 ROBOT_STATE = Topic(topic_names.ROBOT_STATE, msg.AnkleRobotState)
 TROUBLE = Topic(topic_names.TROUBLE, msg.Trouble)
+EMERGENCY_STOP = Topic(topic_names.EMERGENCY_STOP, Bool, LATCHED_STATE)
+
+OPERATOR_HEARTBEAT = Topic(topic_names.OPERATOR_HEARTBEAT, Empty, HEARTBEAT)
 
 HORIZON = Topic(topic_names.HORIZON, msg.Horizon)
 EXPERIMENT_STATE = Topic(topic_names.EXPERIMENT_STATE, msg.ExperimentState, LATEST_STATE)

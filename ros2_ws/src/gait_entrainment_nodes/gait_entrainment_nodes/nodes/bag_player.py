@@ -38,8 +38,8 @@ from gait_entrainment_nodes.messaging.player_services import srv
 from gait_entrainment_nodes.messaging.raw_messages import message_class
 from gait_entrainment_nodes.nodes.lateness import Lateness
 from gait_entrainment_nodes.nodes.loop import run_node
-from gait_entrainment_nodes.nodes.parameters import declare_settings, declare_texts
-from gait_entrainment_nodes.nodes.participant import Participant, ReadSettings
+from gait_entrainment_nodes.nodes.parameters import texts
+from gait_entrainment_nodes.nodes.participant import Participant
 
 # How often matching is looked after before the first message [s].
 MATCHING_PERIOD = 0.02
@@ -55,7 +55,7 @@ _ANY_LENGTH = (0.0, 1e9)
 
 @dataclass(frozen=True)
 class Settings:
-    """Parameters of the node, beside its lists of topics."""
+    """Parameters of the node."""
 
     bag: str = setting("", "bag to play: a folder or an .mcap file")
     rate: float = setting(
@@ -75,32 +75,33 @@ class Settings:
         30.0, "how long to wait for the expected subscriptions; 0: for ever", "s", _ANY_LENGTH
     )
     stay: bool = setting(False, "stay at the end, for ~/seek")
+    topics: tuple[str, ...] = texts("topics to play, * for any text; empty plays all")
+    exclude: tuple[str, ...] = texts("topics to leave out, * for any text")
+    remap: tuple[str, ...] = texts("other names for topics: /from:=/to")
+    expect: tuple[str, ...] = texts(
+        "topics that must have a subscription before the first message; one that must have two is "
+        "named twice"
+    )
 
 
 class BagPlayer(Participant):
     """ROS side of a playback. See the module's docstring."""
 
+    settings: Settings
     _begun = False  # all subscriptions that are waited for have been matched
 
     def __init__(self) -> None:
         super().__init__("bag_player")
-        declare_settings(self, Settings, fixed=settings_of(Settings).keys() - {"rate"})
-        chosen = declare_texts(self, "topics", "topics to play, * for any text; empty plays all")
-        excluded = declare_texts(self, "exclude", "topics to leave out, * for any text")
-        remaps = declare_texts(self, "remap", "other names for topics: /from:=/to")
-        self._expected = declare_texts(
-            self,
-            "expect",
-            "topics that must have a subscription before the first message; one that must have "
-            "two is named twice",
-        )
-        self.begin_participation()
+        fixed = settings_of(Settings).keys() - {"rate"}
+        self.begin_participation(settings=Settings, fixed=fixed)
         settings = self.settings
         if not settings.bag:
             raise ValueError("bag: is empty; give the folder of the bag to play")
         try:
             self._bag = BagReader(settings.bag)
-            self._types = self._playable(choose_topics(self._bag, chosen, excluded))
+            self._types = self._playable(
+                choose_topics(self._bag, settings.topics, settings.exclude)
+            )
             self._playback = Playback(
                 self._bag,
                 self._types,
@@ -113,7 +114,7 @@ class BagPlayer(Participant):
             )
         except BagError as error:
             raise ValueError(str(error)) from None
-        self._offer_topics(remaps)
+        self._offer_topics()
         self.note_state(DiagnosticStatus.OK, "plays")
         self._look_at = time.monotonic()  # when matching is looked after next
         self._give_up_at = time.monotonic() + (settings.expect_timeout or math.inf)
@@ -135,9 +136,9 @@ class BagPlayer(Participant):
         del name
         return ""
 
-    def take_parameters(self, read: ReadSettings) -> None:
-        """Play at another rate from now on."""
-        self.settings = read(Settings)
+    def take_parameters(self, changes: dict[str, Any]) -> None:
+        """Take a change of the rate, which counts from now on."""
+        super().take_parameters(changes)
         if self._begun:
             self._playback.set_rate(self._rate, time.monotonic_ns())
 
@@ -167,9 +168,9 @@ class BagPlayer(Participant):
                 del types[name]
         return types
 
-    def _offer_topics(self, remaps: tuple[str, ...]) -> None:
+    def _offer_topics(self) -> None:
         """Make the publishers; raises ValueError if a topic that is named is not played."""
-        names = dict(_split_remap(remap) for remap in remaps)
+        names = dict(_split_remap(remap) for remap in self.settings.remap)
         if unknown := sorted(names.keys() - self._bag.topics.keys()):
             raise ValueError(f"remap: no topic {unknown[0]} in the bag")
         offers = {name: _offer(self._bag.topics[name]) for name in self._types}
@@ -182,15 +183,15 @@ class BagPlayer(Participant):
         if self.settings.clock:
             self.offer(topics.CLOCK)
         self._by_name = {player.topic_name: player for player in self._players.values()}
-        if missing := sorted(set(self._expected) - self._by_name.keys()):
+        if missing := sorted(set(self.settings.expect) - self._by_name.keys()):
             raise ValueError(f"expect: {missing[0]} is not played")
 
     def not_ready(self) -> str:
         """Return what is waited for before the first message."""
         missing = [
             name
-            for name in sorted(set(self._expected))
-            if self._by_name[name].matched < self._expected.count(name)
+            for name in sorted(set(self.settings.expect))
+            if self._by_name[name].matched < self.settings.expect.count(name)
         ]
         return f"subscriptions of {', '.join(missing)}" if missing else super().not_ready()
 

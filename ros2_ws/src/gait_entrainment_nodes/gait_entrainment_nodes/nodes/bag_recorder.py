@@ -38,8 +38,8 @@ from gait_entrainment_msgs.msg import Progress, PublishedCounts
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.raw_messages import message_class
 from gait_entrainment_nodes.nodes.loop import run_node
-from gait_entrainment_nodes.nodes.parameters import declare_settings, declare_texts
-from gait_entrainment_nodes.nodes.participant import Participant, ReadSettings
+from gait_entrainment_nodes.nodes.parameters import texts
+from gait_entrainment_nodes.nodes.participant import Participant
 
 # How often new topics are looked for and data is brought to the file [s].
 CARE_PERIOD = 0.2
@@ -58,8 +58,14 @@ _BY_WALL_CLOCK = ("rcl_interfaces/msg/Log", "rcl_interfaces/msg/ParameterEvent")
 
 @dataclass(frozen=True)
 class Settings:
-    """Parameters of the node, beside its lists of topics and publishers."""
+    """Parameters of the node."""
 
+    topics: tuple[str, ...] = texts(
+        "topics to record, fully qualified; empty records all below the node's namespace"
+    )
+    publishers: tuple[str, ...] = texts(
+        "nodes whose final counts end the recording; empty records until stopped"
+    )
     output: str = setting("", "folder of the bag, which must not exist yet")
     custom_data: str = setting("{}", "what else belongs to the record: a JSON object of texts")
     max_bytes: int = setting(
@@ -74,14 +80,12 @@ class Settings:
 class BagRecorder(Participant):
     """ROS side of the bag writer. See the module's docstring."""
 
+    settings: Settings
+
     def __init__(self) -> None:
         super().__init__("bag_recorder")
-        declare_settings(self, Settings, fixed=settings_of(Settings))
-        chosen = "topics to record, fully qualified; empty records all below the node's namespace"
-        self._chosen = set(declare_texts(self, "topics", chosen))
-        expected = "nodes whose final counts end the recording; empty records until stopped"
-        self._expected = set(declare_texts(self, "publishers", expected))
-        self.begin_participation()
+        self.begin_participation(settings=Settings, fixed=settings_of(Settings))
+        self._chosen, self._expected = set(self.settings.topics), set(self.settings.publishers)
         self._bag = self._make_bag()
         # Ready means, for this topic too, that everyone will hear: the walker waits for it.
         self.offer(topics.RECORDER_PROGRESS, counted=False)
@@ -108,10 +112,6 @@ class BagRecorder(Participant):
         self._published: dict[str, dict[str, int]] = {}  # by node: final count by topic
         self._final_at: float | None = None  # when the end of the run was heard of, steady time
         self._care_at = time.monotonic()
-
-    def take_parameters(self, read: ReadSettings) -> None:
-        """Take the parameters, none of which may change."""
-        self.settings = read(Settings)
 
     def _make_bag(self) -> BagWriter:
         """Return the bag to write; raises ValueError if there cannot be one."""

@@ -17,7 +17,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticStatus
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
-from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
+from rclpy.action import ActionClient
 from rclpy.task import Future
 
 from gait_entrainment.experiment import Conductor, Part
@@ -39,13 +39,17 @@ from gait_entrainment_nodes.nodes.experiment_run import (
     Run,
 )
 from gait_entrainment_nodes.nodes.loop import run_node
-from gait_entrainment_nodes.nodes.parameters import declare_settings, declare_texts
-from gait_entrainment_nodes.nodes.participant import Participant, ReadSettings
+from gait_entrainment_nodes.nodes.one_goal import OneGoalServer
+from gait_entrainment_nodes.nodes.parameters import texts
+from gait_entrainment_nodes.nodes.participant import Participant
 from gait_entrainment_nodes.nodes.participants import Participants
 from gait_entrainment_nodes.nodes.waiting import Waiting
 
 # How long each step of ending a failed run may take [s]: who fails may not answer any more.
 FAREWELL = 0.5
+# How long a node may take to do what it is asked for before and after a run, such as to enable a
+# device [s]. In a run silence_timeout counts.
+ANSWER_TIMEOUT = 5.0
 
 _TRANSITIONS = {
     Transition.TRANSITION_CONFIGURE: "be configured",
@@ -56,8 +60,14 @@ _TRANSITIONS = {
 
 @dataclass(frozen=True)
 class Settings:
-    """Parameters of the node."""
+    """Parameters of the node; those of a run count for the next one, timeouts at once."""
 
+    participants: tuple[str, ...] = texts(
+        "names of the nodes that must be ready before a run starts",
+        WALKER,
+        PERTURBATOR,
+        "gait_analyzer",
+    )
     longest_lookahead: float = setting(
         10.0,
         "upper bound of the horizon's lead, which never exceeds a stride; short in real time, so "
@@ -81,21 +91,13 @@ class Settings:
 class Experiment(Participant):
     """ROS side of the conductor: brings participants together, carries what a run says."""
 
+    settings: Settings
     run: Run | None
 
     def __init__(self) -> None:
         super().__init__("experiment")
-        names = declare_texts(
-            self,
-            "participants",
-            "names of the nodes that must be ready before a run starts",
-            (WALKER, PERTURBATOR, "gait_analyzer"),
-        )
-        declare_settings(self, Settings, fixed=("protocol",))
-        self.begin_participation()
+        self.begin_participation(settings=Settings, fixed=("protocol",))
         self._runs = 0  # how many have begun
-        self._goal: Any = None  # of the client that asked for the run
-        self._result = RunProtocol.Result()  # of the run before
         self._waiting = Waiting()
 
         self.offer(topics.HORIZON)
@@ -109,15 +111,13 @@ class Experiment(Participant):
         self._change_state = self.create_client(ChangeState, f"{PERTURBATOR}/change_state")
         self._get_state = self.create_client(GetState, f"{PERTURBATOR}/get_state")
         self._deliver = ActionClient(self, DeliverPulseTrain, f"{PERTURBATOR}/deliver_pulse_train")
-        self._participants = Participants(self, names, self._waiting)
-        self._server = ActionServer(
+        self._participants = Participants(self, self.settings.participants, self._waiting)
+        self._server = OneGoalServer(
             self,
             RunProtocol,
             "~/run_protocol",
-            execute_callback=self._execute,
-            goal_callback=self._on_goal,
-            handle_accepted_callback=self.guarded(self._on_accepted),
-            cancel_callback=lambda _: CancelResponse.ACCEPT,
+            accept=lambda _: not self._waiting.busy,
+            begin=lambda goal: self._waiting.begin(self._conduct_goal(goal.protocol)),
         )
         if self.settings.protocol:
             self._waiting.begin(self._conduct_own())
@@ -126,35 +126,10 @@ class Experiment(Participant):
         """Return why a parameter cannot change now; timeouts always can."""
         return super().why_fixed(name) if name == "longest_lookahead" else ""
 
-    def take_parameters(self, read: ReadSettings) -> None:
-        """Take the next run's lookahead; timeouts count from now on."""
-        self.settings = read(Settings)
+    # The run
 
-    # Who asks for a run
-
-    def _on_goal(self, _: RunProtocol.Goal) -> GoalResponse:
-        return GoalResponse.REJECT if self._waiting.busy else GoalResponse.ACCEPT
-
-    def _on_accepted(self, goal: Any) -> None:
-        """Conduct the protocol of a goal, which is executed at its end: see `waiting`."""
-        self._goal = goal
-        self._waiting.begin(self._conduct_goal(goal))
-
-    async def _conduct_goal(self, goal: Any) -> None:
-        self._result = await self._conduct(goal.request.protocol)
-        self._goal = None
-        goal.execute()
-
-    def _execute(self, goal: Any) -> RunProtocol.Result:
-        """Say how the protocol of a goal ended."""
-        result = self._result
-        if result.outcome == result.FINISHED:
-            goal.succeed()
-        elif result.outcome == result.CANCELLED:
-            goal.canceled()
-        else:
-            goal.abort()
-        return result
+    async def _conduct_goal(self, protocol: str) -> None:
+        self._server.end(await self._conduct(protocol))
 
     async def _conduct_own(self) -> None:
         """Conduct the protocol of the parameter, and end the node with it."""
@@ -163,8 +138,6 @@ class Experiment(Participant):
             self.finished = True
         else:
             self.failure = self.failure or result.message
-
-    # The run
 
     async def _conduct(self, protocol: str) -> RunProtocol.Result:
         """Conduct a protocol, a file or its text; the result says how it ended."""
@@ -182,7 +155,7 @@ class Experiment(Participant):
         except (ExperimentError, ProtocolError) as failure:
             result.message, result.blamed = str(failure), getattr(failure, "blamed", "")
             await self._give_up(run, result.message)
-            if self._cancelled:
+            if self._server.cancelled:
                 result.outcome = result.CANCELLED
         except Exception as error:
             result.message, result.blamed = str(error), self.get_name()
@@ -200,7 +173,7 @@ class Experiment(Participant):
         await self._waiting.until(lambda: run.over)
         if run.failure is not None:
             raise run.failure
-        await self._close(run, self.settings.silence_timeout)
+        await self._close(run, ANSWER_TIMEOUT)
         # The answer came after any stop: to walk to the end without torque is no success.
         if run.stopped_at is not None:
             await self._wait_for_reason(run)
@@ -238,7 +211,7 @@ class Experiment(Participant):
         timeout = self.settings.ready_timeout
         give_up = time.monotonic() + timeout
         while True:
-            if self._cancelled:
+            if self._server.cancelled:
                 raise ExperimentError("cancelled by the client")
             try:
                 await self._participants.check()
@@ -280,10 +253,10 @@ class Experiment(Participant):
     async def _answer(
         self, client: Any, request: Any, node: str, timeout: float | None = None
     ) -> Any:
-        """Return a node's answer; wait for it a time [s], by default the silence timeout."""
+        """Return a node's answer; wait for it a time [s], by default as long as it may take."""
         call = client.call_async(request)
         silence = ExperimentError(f"{node} does not answer", node)
-        timeout = self.settings.silence_timeout if timeout is None else timeout
+        timeout = ANSWER_TIMEOUT if timeout is None else timeout
         await self._waiting.until(call.done, timeout, silence)
         return call.result()
 
@@ -296,8 +269,8 @@ class Experiment(Participant):
     def publish(self, topic: topics.Topic, message: Any) -> None:
         """Publish a message; the state of the run is the action's feedback too."""
         super().publish(topic, message)
-        if topic is topics.EXPERIMENT_STATE and self._goal is not None:
-            self._goal.publish_feedback(RunProtocol.Feedback(state=message))
+        if topic is topics.EXPERIMENT_STATE:
+            self._server.publish_feedback(RunProtocol.Feedback(state=message))
 
     def _on_trouble(self, trouble: msg.Trouble) -> None:
         # Before the first horizon of a run the perturbator does not know its number.
@@ -346,13 +319,9 @@ class Experiment(Participant):
             return
         if held_up:
             run.forgive()
-        if self._cancelled and run.conductor is not None:
+        if self._server.cancelled and run.conductor is not None:
             run.fail(ExperimentError("cancelled by the client"))
         run.check(self.settings.silence_timeout)
-
-    @property
-    def _cancelled(self) -> bool:
-        return self._goal is not None and bool(self._goal.is_cancel_requested)
 
     def on_stop(self) -> None:
         """Say so if the node is ended before its own protocol is."""

@@ -17,7 +17,6 @@ from typing import Any
 from gait_entrainment.errors import EntrainmentError
 from gait_entrainment.experiment import Conductor, Part
 from gait_entrainment.messages import event_of, nanoseconds_of
-from gait_entrainment.protocol import ProtocolError
 from gait_entrainment.robot import PulseTrain
 from gait_entrainment_msgs import msg
 from gait_entrainment_nodes.messaging import topics
@@ -40,19 +39,8 @@ class Run:
     """
     One run, from when its participants are brought together to the walker's last word.
 
-    Parameters
-    ----------
-    number
-        Of the run.
-    publish
-        Publishes a message on a topic.
-    request
-        Asks the perturbator for pulses; ``take_answer`` is told what it answers.
-    recorded
-        Whether the walker waits for a recorder.
-    clock
-        Steady time [s].
-
+    ``request`` asks the perturbator for pulses; ``take_answer`` is then told its answer. If the
+    run is ``recorded``, the walker waits for the recorder. ``clock`` is steady time [s].
     """
 
     def __init__(
@@ -143,7 +131,7 @@ class Run:
         self._events += 1
         try:
             train = self.conductor.add_event(event_of(event))
-        except ProtocolError as error:
+        except EntrainmentError as error:
             self.fail(ExperimentError(str(error)))
             return
         if train is not None:
@@ -221,7 +209,11 @@ class Run:
     def _promise(self, conductor: Conductor, known_until: int) -> None:
         """Promise how far no new pulse will be requested."""
         self.known_until = known_until
-        horizon = conductor.horizon(known_until)
+        try:
+            horizon = conductor.horizon(known_until)
+        except EntrainmentError as error:
+            self.fail(ExperimentError(str(error)))
+            return
         # In real time progress goes on while the last stretch is walked.
         if horizon.until != self.promised_until:
             self._send_horizon(horizon.until, horizon.last)

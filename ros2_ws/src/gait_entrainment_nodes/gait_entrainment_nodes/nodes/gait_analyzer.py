@@ -30,8 +30,7 @@ from gait_entrainment_msgs import msg
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.nodes.gait_analyzer_run import RESULTS, Run
 from gait_entrainment_nodes.nodes.loop import run_node
-from gait_entrainment_nodes.nodes.parameters import declare_settings
-from gait_entrainment_nodes.nodes.participant import Participant, ReadSettings
+from gait_entrainment_nodes.nodes.participant import Participant
 
 
 @dataclass(frozen=True)
@@ -49,13 +48,14 @@ class Settings:
 class GaitAnalyzerNode(Participant):
     """ROS side of the analyzer."""
 
+    settings: Settings
+    verdict: VerdictSettings
     run: Run | None
 
     def __init__(self) -> None:
         super().__init__("gait_analyzer")
-        declare_settings(self, Settings, fixed=("onset",))
-        declare_settings(self, VerdictSettings, "verdict.")
-        self.begin_participation()
+        verdict = (VerdictSettings, "verdict.")
+        self.begin_participation(settings=Settings, verdict=verdict, fixed=("onset",))
         for topic in RESULTS.values():
             self.offer(topic)
         self._latest_run = 0  # number of the latest run
@@ -66,10 +66,6 @@ class GaitAnalyzerNode(Participant):
             self.subscribe_to_run(topics.PULSES, self._on_pulse)
             self.subscribe_to_run(topics.ROBOT_STATE, self._on_state)
         self.create_service(Trigger, "~/finish", self._on_finish)
-
-    def take_parameters(self, read: ReadSettings) -> None:
-        """Take what the next run is analyzed with."""
-        self.settings, self.verdict = read(Settings), read(VerdictSettings, "verdict.")
 
     def run_of(self, message: Any) -> Run | None:
         """Return the run of a message if it is analyzed; a newer run begins anew."""

@@ -33,19 +33,8 @@ class Run:
     """
     One run; all instants are [ns since 1970].
 
-    What is added may complete results; they are returned in the order of publishing.
-
-    Parameters
-    ----------
-    number
-        Of the run.
-    side
-        The perturbed leg.
-    settings
-        Of the verdict.
-    measured
-        Whether a pulse begins where the robot's measured torque rises, not where it was promised.
-
+    What is added may complete results, which are returned in the order of publishing. Onsets are
+    those that were promised, or ``measured`` where the robot's torque rises.
     """
 
     def __init__(

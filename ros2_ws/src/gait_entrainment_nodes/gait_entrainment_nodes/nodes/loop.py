@@ -20,6 +20,8 @@ from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
+from gait_entrainment.errors import EntrainmentError, UsageError
+
 # The longest time [s] that the loop sleeps in the executor, so that a signal is soon obeyed.
 LONGEST_SLEEP = 0.1
 
@@ -53,7 +55,7 @@ def run_node(make_node: Callable[[], Any]) -> int:
             _join_ros()
             node = make_node()
             node.offer_ready()
-        except (ParameterException, ValueError, RuntimeError) as error:
+        except (EntrainmentError, ParameterException, ValueError, RuntimeError) as error:
             print(f"{name}: {' '.join(str(error).split())}", file=sys.stderr)
             return 2
         executor = EventsExecutor()
@@ -76,13 +78,13 @@ def run_node(make_node: Callable[[], Any]) -> int:
 
 
 def _join_ros() -> None:
-    """Initialize rclpy with the arguments of the process; ValueError if it cannot read them."""
+    """Initialize rclpy with the arguments of the process; UsageError if it cannot read them."""
     try:
         rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # one of several errors that rclpy does not export
-        raise ValueError(f"the ROS arguments cannot be read: {error}") from None
+        raise UsageError(f"the ROS arguments cannot be read: {error}") from None
     if extra := remove_ros_args(sys.argv)[1:]:
-        raise ValueError(
+        raise UsageError(
             f"unknown argument {extra[0]!r}; allowed: --ros-args -p PARAMETER:=VALUE ..."
         )
 

@@ -3,7 +3,8 @@
 
 """ROS parameters from the settings of a dataclass, and back."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
@@ -15,6 +16,24 @@ from gait_entrainment.settings import Setting, SettingError, settings_of
 from gait_entrainment_nodes.nodes.rclpy_internals import given_parameters
 
 
+@dataclass(frozen=True)
+class _Texts(Setting):
+    """Texts, of which empty ones are left out."""
+
+    kind: type = list
+    choices: tuple[str, ...] = ()
+
+    def check(self, name: str, value: Any) -> Any:
+        if not isinstance(value, list) or not all(isinstance(text, str) for text in value):
+            raise SettingError(f"{name}: {value!r}; allowed: a list of texts")
+        return tuple(text for text in value if text)
+
+
+def texts(meaning: str, *default: str) -> Any:
+    """Return a field of a settings dataclass that holds texts; its parameter cannot change."""
+    return field(default=default, metadata={"setting": _Texts(meaning)})
+
+
 def declare_settings(
     node: Node, dataclass_type: Any, prefix: str = "", fixed: Collection[str] = ()
 ) -> None:
@@ -24,13 +43,16 @@ def declare_settings(
     Raises SettingError if a value that the node was started with is not allowed.
     """
     for name, told in settings_of(dataclass_type).items():
-        default = getattr(dataclass_type, name)
-        if isinstance(default, Enum):
-            default = default.name.lower()
+        default, constraints = getattr(dataclass_type, name), ""
+        if isinstance(told, _Texts):
+            default = list(default) or [""]  # ROS cannot tell the type of an empty list
+        elif isinstance(default, Enum | str):
+            default = default if isinstance(default, str) else default.name.lower()
+            constraints = told.allowed
         descriptor = ParameterDescriptor(
             description=f"{told.meaning} [{told.unit}]" if told.unit else told.meaning,
-            additional_constraints=told.allowed if isinstance(default, str) else "",
-            read_only=name in fixed,
+            additional_constraints=constraints,
+            read_only=name in fixed or isinstance(told, _Texts),
         )
         if told.kind is int:
             whole = IntegerRange(from_value=int(told.least), to_value=int(told.most))
@@ -41,21 +63,11 @@ def declare_settings(
         _declare(node, prefix + name, default, descriptor, told)
 
 
-def declare_texts(
-    node: Node, name: str, meaning: str, default: Sequence[str] = ()
-) -> tuple[str, ...]:
-    """Declare a read-only parameter that holds texts and return its value; "" is left out."""
-    descriptor = ParameterDescriptor(description=meaning, read_only=True)
-    # ROS cannot tell the type of an empty list.
-    _declare(node, name, list(default) or [""], descriptor, None)
-    return tuple(text for text in node.get_parameter(name).value if text)
-
-
 def read_settings(value: Callable[[str], Any], dataclass_type: Any, prefix: str = "") -> Any:
     """
     Return an instance of a dataclass from the values of its parameters, by their names.
 
-    Raises ValueError if a value is not allowed, or they do not fit each other.
+    Raises EntrainmentError if a value is not allowed, or they do not fit each other.
     """
     values = {}
     for name, told in settings_of(dataclass_type).items():
@@ -74,16 +86,13 @@ def refuse_unknown_parameters(node: Node) -> None:
 
 
 def _declare(
-    node: Node, name: str, default: Any, descriptor: ParameterDescriptor, told: Setting | None
+    node: Node, name: str, default: Any, descriptor: ParameterDescriptor, told: Setting
 ) -> None:
     try:
         node.declare_parameter(name, default, descriptor)
     except (InvalidParameterValueException, InvalidParameterTypeException):
         given = given_parameters(node)[name]
-        if told is None:
-            allowed = "a list of texts"
-        else:
-            told.check(name, given)
-            # Whole numbers do for real ones everywhere but in ROS.
-            allowed = f"a number with a decimal point, such as {float(given)!r}"
-        raise SettingError(f"{name}: {given!r}; allowed: {allowed}") from None
+        told.check(name, given)
+        # Whole numbers do for real ones everywhere but in ROS.
+        number = f"a number with a decimal point, such as {float(given)!r}"
+        raise SettingError(f"{name}: {given!r}; allowed: {number}") from None

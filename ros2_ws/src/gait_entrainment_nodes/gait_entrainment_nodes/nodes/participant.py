@@ -6,7 +6,7 @@
 import functools
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -14,48 +14,55 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
 
+from gait_entrainment.errors import EntrainmentError
+from gait_entrainment.settings import SettingError
 from gait_entrainment_msgs.msg import PublishedCounts
 from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.publisher import CountedPublisher, StopRequestedError
 from gait_entrainment_nodes.messaging.stamps import header
 from gait_entrainment_nodes.messaging.topics import DIAGNOSTICS, PUBLISHED_COUNTS, Topic
-from gait_entrainment_nodes.nodes.parameters import read_settings, refuse_unknown_parameters
+from gait_entrainment_nodes.nodes.parameters import (
+    declare_settings,
+    read_settings,
+    refuse_unknown_parameters,
+)
 
 # How often a node publishes its state on /diagnostics [s]; rqt calls it stale after 5 s.
 STATE_PERIOD = 1.0
 # At the end of a node its last messages, a stop among them, have this long to arrive [s].
 LAST_WORDS = 0.5
 
-# Makes a settings dataclass, with its prefix if it has one, from the values of parameters.
-ReadSettings = Callable[..., Any]
-
 
 class Participant(Node):
     """
     A node that takes part in a run.
 
-    A node declares its parameters, calls ``begin_participation``, then makes its publishers,
-    subscriptions and services.
+    A node calls ``begin_participation``, then makes its publishers, subscriptions and services.
     """
 
     get_logger: Callable[[], RcutilsLogger]  # which rclpy does not type
-    hardware_id = "none"  # of the hardware that its diagnostics are about
     stopping = False  # set from outside: the node is to end
     failure: str | None = None  # why the node must end with exit code 1
     finished = False  # set to end the loop with exit code 0
     run: Any = None  # the run that goes on, with its ``number``; None between runs
 
-    def begin_participation(self) -> None:
+    def begin_participation(self, *, fixed: Collection[str] = (), **settings: Any) -> None:
         """
         Set up what every participant has.
 
-        Raises ValueError if a parameter is unknown, or the values do not fit each other.
+        ``settings`` are the node's parameters, of which some are ``fixed``: by the attribute that
+        holds their values a settings dataclass, or a pair of it and the prefix of its parameters.
+
+        Raises EntrainmentError if a value is not allowed, or the values do not fit each other.
         """
+        groups = {n: s if isinstance(s, tuple) else (s, "") for n, s in settings.items()}
+        for group, prefix in groups.values():
+            declare_settings(self, group, prefix, fixed)
         refuse_unknown_parameters(self)
-        self._read_parameters({})
+        self._settings = groups
+        self.take_parameters({})
         self.add_on_set_parameters_callback(self._on_set_parameters)
         self._offered: list[CountedPublisher] = []
-        self._counted: list[CountedPublisher] = []
         self._publisher_of: dict[str, CountedPublisher] = {}  # by name in the table of topics
         self.offer(DIAGNOSTICS)
         self._state_due = 0.0  # when to publish the state, steady time [s]
@@ -71,18 +78,14 @@ class Participant(Node):
         going_on = self.run is not None
         return f"run {self.run.number} goes on; change it between runs" if going_on else ""
 
-    def take_parameters(self, read: ReadSettings) -> None:
-        """
-        Take the values of all parameters, at the start and at each change.
+    def take_parameters(self, changes: dict[str, Any]) -> None:
+        """Take the values of all parameters, or none if they do not fit each other."""
 
-        Raises ValueError if they do not fit each other; then nothing has been taken.
-        """
-
-    def _read_parameters(self, changes: dict[str, Any]) -> None:
         def value(name: str) -> Any:
             return changes[name] if name in changes else self.get_parameter(name).value
 
-        self.take_parameters(functools.partial(read_settings, value))
+        read = {name: read_settings(value, *group) for name, group in self._settings.items()}
+        vars(self).update(read)
 
     def _on_set_parameters(self, changes: Sequence[Any]) -> SetParametersResult:
         """Take a change or refuse it with the reason; types and ranges have been checked."""
@@ -93,9 +96,9 @@ class Participant(Node):
                 if name == "use_sim_time":
                     reason = "which clock counts is decided when the node starts"
                 if reason:
-                    raise ValueError(f"{name}: {value!r} is refused: {reason}")
-            self._read_parameters(values)
-        except ValueError as error:
+                    raise SettingError(f"{name}: {value!r} is refused: {reason}")
+            self.take_parameters(values)
+        except EntrainmentError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
@@ -103,11 +106,9 @@ class Participant(Node):
 
     def offer(self, topic: Topic, *, counted: bool = True) -> CountedPublisher:
         """Create a publisher, for ``publish``; the recorder is told what a counted one sent."""
-        publisher = CountedPublisher(self, topic)
+        publisher = CountedPublisher(self, topic, counted=counted)
         self._publisher_of.setdefault(topic.name, publisher)
         self._offered.append(publisher)
-        if counted:
-            self._counted.append(publisher)
         return publisher
 
     def publish(self, topic: Topic, message: Any) -> None:
@@ -133,14 +134,12 @@ class Participant(Node):
 
     def publish_counts(self, run: int, stamp: int) -> None:
         """Tell the recorder, at the end of a run, how many messages were published."""
-        counts = PublishedCounts(
-            header=header(stamp),
-            run=run,
-            node=self.get_fully_qualified_name(),
-            topics=[publisher.topic_name for publisher in self._counted],
-            counts=[publisher.count for publisher in self._counted],
-        )
-        self.publish(PUBLISHED_COUNTS, counts)
+        counted = [publisher for publisher in self._offered if publisher.counted]
+        message = PublishedCounts(header=header(stamp), run=run)
+        message.node = self.get_fully_qualified_name()
+        message.topics = [publisher.topic_name for publisher in counted]
+        message.counts = [publisher.count for publisher in counted]
+        self.publish(PUBLISHED_COUNTS, message)
 
     # Readiness
 
@@ -152,6 +151,11 @@ class Participant(Node):
         sees this service knows all of the node's subscriptions.
         """
         self.create_service(Ready, "~/ready", self._on_ready)
+
+    @property
+    def matched(self) -> dict[str, int]:
+        """Number of matched subscriptions, by the name of each topic that the node offers."""
+        return {publisher.topic_name: publisher.matched for publisher in self._offered}
 
     def not_ready(self) -> str:
         """
@@ -166,11 +170,15 @@ class Participant(Node):
     def _on_ready(self, _: Ready.Request, response: Ready.Response) -> Ready.Response:
         response.waiting_for = self.not_ready()
         response.ready = not response.waiting_for
-        response.topics = [publisher.topic_name for publisher in self._offered]
-        response.matched = [publisher.matched for publisher in self._offered]
+        response.topics, response.matched = list(self.matched), list(self.matched.values())
         return response
 
     # Diagnostics
+
+    @property
+    def hardware_id(self) -> str:
+        """The hardware that the diagnostics are about."""
+        return "none"
 
     def diagnose(self, stamp: int, level: bytes, message: str, **values: object) -> None:
         """Publish what happened in a run; it is this node's state until the next is noted."""

@@ -3,13 +3,11 @@
 
 """The nodes that take part in an experiment: whether all of them run and hear each other."""
 
-from collections.abc import Sequence
-from typing import Any
-
-from rclpy.node import Node
+from collections.abc import Iterable, Sequence
 
 from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.nodes.experiment_run import RECORDER, ExperimentError
+from gait_entrainment_nodes.nodes.participant import Participant
 from gait_entrainment_nodes.nodes.waiting import Waiting
 
 # A participant that has not answered is asked again after this long [s].
@@ -32,7 +30,7 @@ class Participants:
 
     """
 
-    def __init__(self, node: Node, names: Sequence[str], waiting: Waiting) -> None:
+    def __init__(self, node: Participant, names: Sequence[str], waiting: Waiting) -> None:
         self.names = tuple(names)
         self._node, self._waiting = node, waiting
         self._clients = {name: node.create_client(Ready, f"{name}/ready") for name in names}
@@ -50,9 +48,6 @@ class Participants:
                     "another namespace or ROS_DOMAIN_ID",
                     name,
                 )
-        if RECORDER in self.names:
-            for topic in self.not_recorded():
-                raise ExperimentError(f"{RECORDER} has not subscribed to {topic}", RECORDER)
         for name, client in self._clients.items():
             # An answer may be lost, as long as the participant does not know who asked.
             answer = client.call_async(Ready.Request())
@@ -61,26 +56,20 @@ class Participants:
             state = answer.result()
             if not state.ready:
                 raise ExperimentError(f"{name} waits for {state.waiting_for}", name)
+            self._require_recorded(name, state.topics)
             # Discovery may have told this node of more subscriptions than that one.
             for topic, matched in zip(state.topics, state.matched, strict=True):
                 if matched < self._node.count_subscribers(topic):
                     raise ExperimentError(f"{name} waits for subscriptions of {topic}", name)
+        self._require_recorded(self._node.get_name(), self._node.matched)
 
-    def not_recorded(self) -> list[str]:
-        """Return the topics of participants that the recorder has not subscribed to."""
+    def _require_recorded(self, name: str, topics: Iterable[str]) -> None:
+        """Raise ExperimentError if there is a recorder and it does not hear a node's topics."""
+        if RECORDER not in self.names or name == RECORDER:
+            return
         here = self._node.get_namespace()
-        beneath = here.rstrip("/") + "/"
-        recorder = (here, RECORDER)
-        publishers = {(here, name) for name in (*self.names, self._node.get_name())} - {recorder}
-
-        def nodes(ends: Sequence[Any]) -> set[tuple[str, str]]:
-            return {(end.node_namespace, end.node_name) for end in ends}
-
-        return [
-            name
-            for name, _ in self._node.get_topic_names_and_types()
-            if name.startswith(beneath)
-            and "/_" not in name
-            and publishers & nodes(self._node.get_publishers_info_by_topic(name))
-            and recorder not in nodes(self._node.get_subscriptions_info_by_topic(name))
-        ]
+        for topic in topics:
+            readers = self._node.get_subscriptions_info_by_topic(topic)
+            heard = (RECORDER, here) in {(r.node_name, r.node_namespace) for r in readers}
+            if topic.startswith(here.rstrip("/") + "/") and not heard:
+                raise ExperimentError(f"{RECORDER} has not subscribed to {topic}", RECORDER)

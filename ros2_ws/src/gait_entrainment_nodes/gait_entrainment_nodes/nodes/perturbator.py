@@ -9,14 +9,13 @@ it will change (perturbator_run.py). It knows nothing of gait. Torque ends with 
 cancelling, with the latched stop service and with the process, whatever ends that.
 """
 
+import math
 import time
 from dataclasses import dataclass
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
-from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from gait_entrainment.conventions import Side
@@ -30,17 +29,19 @@ from gait_entrainment.robot import (
     PulseTrain,
     find_driver,
 )
-from gait_entrainment.robot.faults import NOT_STOPPED
+from gait_entrainment.robot.faults import NOT_STOPPED, OPERATOR_SILENT
+from gait_entrainment.robot.stop_channel import StopAnswer
 from gait_entrainment.settings import setting
 from gait_entrainment_msgs.action import DeliverPulseTrain
 from gait_entrainment_msgs.msg import Horizon, Trouble
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.stamps import header
 from gait_entrainment_nodes.nodes.loop import run_node
-from gait_entrainment_nodes.nodes.parameters import declare_settings
-from gait_entrainment_nodes.nodes.participant import Participant, ReadSettings
+from gait_entrainment_nodes.nodes.one_goal import OneGoalServer
+from gait_entrainment_nodes.nodes.participant import Participant
 from gait_entrainment_nodes.nodes.perturbator_run import Result, Run
 from gait_entrainment_nodes.nodes.rclpy_internals import TolerantLifecycleNode
+from gait_entrainment_nodes.nodes.stop_thread import StopThread
 
 # How often what a real robot has measured is promised [s].
 MEASURED_PERIOD = 0.01
@@ -56,41 +57,46 @@ class Settings:
     armed: bool = setting(
         False, "arm a real robot on activation; else a person does it by the service ~/arm"
     )
+    operator_timeout: float = setting(
+        0.0,
+        "longest silence of operator/heartbeat while torque may come; 0: nobody need watch",
+        "s",
+        (0.0, 60.0),
+    )
+
+    def __post_init__(self) -> None:
+        find_driver(self.driver)  # raises DeviceError if there is none
 
 
 class Perturbator(Participant, TolerantLifecycleNode):
     """ROS side of the ankle robot: lifecycle, action, services."""
 
+    settings: Settings  # the next robot is configured with them
+    limits: DeviceLimits
     run: Run | None
 
     def __init__(self) -> None:
         super().__init__("perturbator")
-        declare_settings(self, Settings)
-        declare_settings(self, DeviceLimits, "limits.")
+        self.begin_participation(settings=Settings, limits=(DeviceLimits, "limits."))
         self._robot: GuardedRobot | None = None  # from configuring to cleaning up
-        self._stop_latched = False  # the stop service was called while there was no robot
+        self._stop_latched = False  # somebody stopped while there was no robot
         self._reported: tuple[Fault, ...] = ()  # faults that have been published
-        self.begin_participation()
-
         for topic in (topics.TORQUE_PROFILE, topics.PULSES, topics.ROBOT_STATE, topics.TROUBLE):
             self.offer(topic)
         self._now = 0  # latest instant that is known to be over [ns since 1970]
         self._latest_run = 0  # number of the latest run
         self._look_at: float | None = None  # when to look after a real robot, steady time [s]
-        self._goal: Any = None
-        self._train_ended: Future | None = None  # its Result; None if no train is under way
+        self._operator_at = -math.inf  # when the operator was heard last, steady time [s]
+        self._stop_thread = StopThread(self.get_name(), self._stop_at_once)
 
         self.subscribe(topics.HORIZON, self._on_horizon)
+        self.subscribe(topics.OPERATOR_HEARTBEAT, self._on_heartbeat)
+        self.subscribe(topics.EMERGENCY_STOP, self._on_emergency_stop)
         self.create_service(Trigger, "~/stop", self.on_stop_service)
         self.create_service(Trigger, "~/arm", self._on_arm_service)
-        self._server = ActionServer(
-            self,
-            DeliverPulseTrain,
-            "~/deliver_pulse_train",
-            execute_callback=self._execute,
-            goal_callback=self.guarded(self._on_goal),
-            handle_accepted_callback=self.guarded(self._on_accepted),
-            cancel_callback=self.guarded(self.on_cancel),
+        name = "~/deliver_pulse_train"
+        self._server = OneGoalServer(
+            self, DeliverPulseTrain, name, accept=self._on_goal, cancel=self.on_cancel
         )
 
     def why_fixed(self, name: str) -> str:
@@ -98,14 +104,10 @@ class Perturbator(Participant, TolerantLifecycleNode):
         del name
         return "the robot is configured; clean it up first" if self._robot is not None else ""
 
-    def take_parameters(self, read: ReadSettings) -> None:
-        """Take what the next robot is configured with."""
-        settings, limits = read(Settings), read(DeviceLimits, "limits.")
-        try:
-            find_driver(settings.driver)
-        except DeviceError as error:
-            raise ValueError(str(error)) from None
-        self.settings, self.limits, self.hardware_id = settings, limits, settings.driver
+    @property
+    def hardware_id(self) -> str:
+        """The driver, by its name and options."""
+        return self.settings.driver
 
     # Lifecycle
 
@@ -180,6 +182,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
             self._end_torque("the perturbator was shut down")
         finally:
             self._release()
+            self._stop_thread.close()
 
     def _release(self) -> None:
         """Bring the torque to zero and let go of the robot."""
@@ -206,17 +209,38 @@ class Perturbator(Participant, TolerantLifecycleNode):
             self.diagnose(self._now, DiagnosticStatus.OK, "armed")
         return response
 
+    def _stop_at_once(self) -> StopAnswer:
+        """Bring the torque to zero and keep it there; from any thread."""
+        robot = self._robot
+        if robot is None:
+            self._stop_latched = True
+            return StopAnswer(True, "no robot is configured; the next configuring is refused")
+        robot.stop()
+        if NOT_STOPPED in robot.faults:
+            return StopAnswer(False, NOT_STOPPED.meaning)
+        return StopAnswer(True, "the stop is latched")
+
     def on_stop_service(self, _: Trigger.Request, response: Trigger.Response) -> Any:
         """Bring the torque to zero and keep it there until cleanup and configure."""
-        if self._robot is not None:
-            self._robot.stop()
-            self._report_faults("the stop service was called")
-        else:
-            self._stop_latched = True
-        response.success, response.message = True, "torque is zero, latched"
-        if self._robot is not None and NOT_STOPPED in self._robot.faults:
-            response.success, response.message = False, NOT_STOPPED.meaning
+        answer = self._stop_at_once()
+        self._report_faults("the stop service was called")
+        response.success, response.message = answer.done, answer.message
         return response
+
+    def _on_emergency_stop(self, message: Any) -> None:
+        if message.data:
+            self._stop_at_once()
+            self._report_faults("the emergency stop was pressed")
+
+    def _on_heartbeat(self, _: Any) -> None:
+        self._operator_at = time.monotonic()
+
+    def _require_operator(self) -> None:
+        """End the torque if whoever started the run does not watch it any more."""
+        robot, timeout = self._robot, self.settings.operator_timeout
+        silence = time.monotonic() - self._operator_at
+        if robot is not None and timeout and robot.train is not None and silence > timeout:
+            robot.stop(OPERATOR_SILENT)
 
     def _end_torque(self, reason: str, outcome: int = Result.STOPPED) -> None:
         """Bring the torque to zero now, whatever was promised."""
@@ -254,20 +278,19 @@ class Perturbator(Participant, TolerantLifecycleNode):
 
     # The action
 
-    def _on_goal(self, goal: DeliverPulseTrain.Goal) -> GoalResponse:
-        """Accept a train that the robot can deliver, one at a time."""
+    def _on_goal(self, goal: DeliverPulseTrain.Goal) -> bool:
+        """Schedule a train, if the robot can deliver it, and say whether it can."""
         try:
             self._schedule(goal)
         except (LimitError, DeviceError) as error:
             self._report(DiagnosticStatus.WARN, f"pulse train rejected: {error}")
-            return GoalResponse.REJECT
-        self._train_ended = Future()
-        return GoalResponse.ACCEPT
+            return False
+        return True
 
     def _schedule(self, goal: DeliverPulseTrain.Goal) -> None:
         if self._robot is None:
             raise DeviceError("the perturbator is not active")
-        if self._train_ended is not None:
+        if self._server.busy:
             raise LimitError("a pulse train is under way; allowed: one at a time")
         if self.run is None or goal.run != self.run.number:
             raise LimitError(f"run: {goal.run} is not under way")
@@ -284,49 +307,18 @@ class Perturbator(Participant, TolerantLifecycleNode):
             )
         )
 
-    def _on_accepted(self, goal: Any) -> None:
-        """
-        Execute a goal only once its train has ended.
-
-        The executor resumes a coroutine that waits over and over: for as long as pulses come it
-        would fight the torque loop for the interpreter.
-        """
-        assert self._train_ended is not None
-        self._goal = goal
-        self._train_ended.add_done_callback(lambda _: goal.execute())
-
-    def _on_train_ended(self, result: Result) -> None:
-        assert self._train_ended is not None
-        self._train_ended.set_result(result)
-
-    def _execute(self, goal: Any) -> Result:
-        """Say how a train ended."""
-        assert self._train_ended is not None
-        result: Result = self._train_ended.result()
-        if result.outcome == Result.CANCELLED:
-            goal.canceled()
-        elif result.outcome == Result.DELIVERED:
-            goal.succeed()
-        else:
-            goal.abort()
-        self._goal = self._train_ended = None
-        return result
-
-    def on_cancel(self, _: Any) -> CancelResponse:
+    def on_cancel(self) -> None:
         """Bring the torque to zero now: the next horizon may be long in coming."""
         self._end_torque("cancelled by the client", Result.CANCELLED)
-        return CancelResponse.ACCEPT
 
     # Promises
 
     def publish(self, topic: topics.Topic, message: Any) -> None:
         """Publish a message; the client that asked for pulses hears of each."""
         super().publish(topic, message)
-        if topic is topics.PULSES and self._goal is not None:
-            onset = message.header.stamp
-            self._goal.publish_feedback(
-                DeliverPulseTrain.Feedback(number=message.number, onset=onset)
-            )
+        if topic is topics.PULSES:
+            number, onset = message.number, message.header.stamp
+            self._server.publish_feedback(DeliverPulseTrain.Feedback(number=number, onset=onset))
 
     def _on_horizon(self, message: Horizon) -> None:
         """Answer a horizon with the torque up to it, promised."""
@@ -338,7 +330,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
             self._end_torque("another run began")
         self._now = nanoseconds_of(message.header.stamp)
         if new:
-            self.run = Run(message.run, self._now, robot, self.publish, self._on_train_ended)
+            self.run = Run(message.run, self._now, robot, self.publish, self._server.end)
             self._latest_run = message.run
         assert self.run is not None
         until = nanoseconds_of(message.until)
@@ -360,6 +352,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
         if self._robot is None:
             return
         self._look_at = time.monotonic() + MEASURED_PERIOD
+        self._require_operator()
         try:
             if self.run is not None:
                 self.run.look_after()

@@ -26,24 +26,8 @@ class Run:
     """
     One run, from its first horizon to its closing one; all instants are [ns since 1970].
 
-    Parameters
-    ----------
-    number
-        Of the run.
-    start
-        Instant from which torque is promised.
-    robot
-        That delivers it; active.
-    publish
-        Publishes a message on a topic.
-    end_train
-        Takes the result of a train that was scheduled.
-
-    Raises
-    ------
-    DeviceError
-        if the robot cannot begin a run.
-
+    Torque is promised from ``start`` on. ``end_train`` takes the result of each train that was
+    scheduled. Raises DeviceError, as most methods do, if the driver fails.
     """
 
     def __init__(
@@ -65,7 +49,7 @@ class Run:
         self._under_way = False  # a train, whose result is still to be told
 
     def schedule(self, train: PulseTrain) -> None:
-        """Schedule pulses; raises LimitError or DeviceError if the robot does not take them."""
+        """Schedule pulses; raises LimitError or DeviceError if the robot refuses them."""
         self._robot.schedule(train)
         self._committed = self._under_way = True
 
@@ -75,12 +59,6 @@ class Run:
 
         A robot in simulated time answers at once and in full. A real one knows its torque only
         afterwards: what it has measured is promised by ``look_after``, piece by piece.
-
-        Raises
-        ------
-        DeviceError
-            if the driver fails.
-
         """
         self._now, self._horizon, self._last = now, until, last
         self._robot.heard()
@@ -95,7 +73,7 @@ class Run:
         self.closed = True
 
     def look_after(self) -> None:
-        """Promise what a real robot has measured since; raises DeviceError if the driver fails."""
+        """Promise what a real robot has measured since."""
         if self._robot.promised_until < self._horizon:
             self._deliver()
         else:  # the next horizon is late, and every state belongs to the record
@@ -117,7 +95,6 @@ class Run:
             self._publish_zero(self._now)
 
     def _deliver(self) -> None:
-        """Promise what is known of the torque up to the horizon."""
         robot = self._robot
         first, train = robot.delivered + 1, robot.train
         profile = robot.promise(self._horizon)

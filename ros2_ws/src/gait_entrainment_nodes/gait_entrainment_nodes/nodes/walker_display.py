@@ -34,8 +34,7 @@ from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.environment import PACKAGE, shared_file
 from gait_entrainment_nodes.nodes.footing import Footing
 from gait_entrainment_nodes.nodes.loop import run_node
-from gait_entrainment_nodes.nodes.parameters import declare_settings
-from gait_entrainment_nodes.nodes.participant import Participant, ReadSettings
+from gait_entrainment_nodes.nodes.participant import Participant
 
 WORLD = "world"  # of the ground reactions too; shared by all walkers, so without a prefix
 PREFIXES = ("l_", "r_")  # of joints and frames, by side
@@ -68,10 +67,11 @@ class Settings:
 class WalkerDisplay(Participant):
     """ROS side of the display."""
 
+    settings: Settings
+
     def __init__(self) -> None:
         super().__init__("walker_display")
-        declare_settings(self, Settings, fixed=settings_of(Settings))
-        self.begin_participation()
+        self.begin_participation(settings=Settings, fixed=settings_of(Settings))
         settings = self.settings
         self._period = round(NANOSECONDS_PER_SECOND / settings.rate)
         self._footing = Footing(settings.leg_length, settings.foot_length)
@@ -89,10 +89,6 @@ class WalkerDisplay(Participant):
             self.offer(topics.ROBOT_DESCRIPTION).publish(String(data=text))
         self._look_on(topics.JOINT_STATES, self._on_joint_state)
         self._look_on(topics.ANKLE_TORQUE, self._on_ankle_torque)
-
-    def take_parameters(self, read: ReadSettings) -> None:
-        """Take the parameters, none of which may change."""
-        self.settings = read(Settings)
 
     def _look_on(self, topic: topics.Topic, draw: Any) -> None:
         """Draw from a sampled topic, one message for each picture that is due."""

@@ -24,15 +24,14 @@ from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
 from gait_entrainment.messages import nanoseconds_of, profile_of, stop_of
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.settings import setting
-from gait_entrainment.walker import Stretch, WalkerRun
 from gait_entrainment_msgs import msg
 from gait_entrainment_msgs.srv import StartRun
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.raw_messages import MessageTemplate, mark
 from gait_entrainment_nodes.messaging.stamps import header, to_time
 from gait_entrainment_nodes.nodes.loop import run_node
-from gait_entrainment_nodes.nodes.parameters import declare_settings
-from gait_entrainment_nodes.nodes.participant import Participant, ReadSettings
+from gait_entrainment_nodes.nodes.participant import Participant
+from gait_entrainment_nodes.nodes.walker_run import Stretch, WalkerRun
 from gait_entrainment_nodes.nodes.walker_sim_run import LockStepRun, RealTimeRun, Run, Starved
 
 JOINTS = ["l_hip", "r_hip", "l_ankle", "r_ankle"]
@@ -61,14 +60,14 @@ class Settings:
 class WalkerSim(Participant):
     """ROS side of the walker: parameters, topics, services."""
 
+    settings: Settings
+    walker: WalkerParameters  # the next run begins with it
     run: Run | None
 
     def __init__(self) -> None:
         super().__init__("walker_sim")
-        declare_settings(self, WalkerParameters)
         fixed = ("real_time", "acknowledged", "ground_reaction")
-        declare_settings(self, Settings, fixed=fixed)
-        self.begin_participation()
+        self.begin_participation(settings=Settings, walker=WalkerParameters, fixed=fixed)
         self._walked: int | None = None  # number of the run to be reset before the next one
         self._events = self.offer(topics.GAIT_EVENTS)
         sampled = [topics.JOINT_STATES, topics.ANKLE_TORQUE]
@@ -81,16 +80,12 @@ class WalkerSim(Participant):
             self.offer(topics.CLOCK)
         self._templates = _templates()
         # A step ahead of time loads the compiled kernels, which a run must not wait for.
-        WalkerRun(self.parameters, Side.RIGHT, 100.0).advance(NANOSECONDS_PER_SECOND)
+        WalkerRun(self.walker, Side.RIGHT, 100.0).advance(NANOSECONDS_PER_SECOND)
         self.subscribe_to_run(topics.TORQUE_PROFILE, self._on_profile)
         if self.settings.acknowledged and not self.settings.real_time:
             self.subscribe_to_run(topics.RECORDER_PROGRESS, LockStepRun.acknowledge)
         self.create_service(StartRun, "~/start", self._on_start)
         self.create_service(Trigger, "~/reset", self._on_reset)
-
-    def take_parameters(self, read: ReadSettings) -> None:
-        """Take the walker and how it is sampled: the next run begins with them."""
-        self.parameters, self.settings = read(WalkerParameters), read(Settings)
 
     def _on_start(self, request: StartRun.Request, response: StartRun.Response) -> Any:
         used = self._walked if self.run is None else self.run.number
@@ -107,7 +102,7 @@ class WalkerSim(Participant):
 
     def _new_run(self, number: int) -> Run:
         settings = self.settings
-        walker = WalkerRun(self.parameters, self.settings.first_heel_strike, settings.sample_rate)
+        walker = WalkerRun(self.walker, self.settings.first_heel_strike, settings.sample_rate)
         if not settings.real_time:
             kept_to = settings.acknowledged
             return LockStepRun(number, walker, LOCK_STEP_START, acknowledged=kept_to)

@@ -17,10 +17,10 @@ from typing import Any
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment.robot import TorqueProfile
-from gait_entrainment.walker import Stretch, WalkerRun
 from gait_entrainment_msgs.msg import Progress, WalkerTiming
 from gait_entrainment_nodes.messaging.stamps import header
 from gait_entrainment_nodes.nodes.lateness import Lateness
+from gait_entrainment_nodes.nodes.walker_run import Stretch, WalkerRun
 
 # Grants that may be sent before the recorder has acknowledged the first of them: two let it
 # write one while the next is computed.

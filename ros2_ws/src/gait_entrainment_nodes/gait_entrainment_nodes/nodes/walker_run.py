@@ -10,9 +10,7 @@ import numpy as np
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side, nanoseconds
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.robot import TorqueProfile
-from gait_entrainment.walker.model import Stamps
-from gait_entrainment.walker.sampling import Samples
-from gait_entrainment.walker.walker import Ending, Transition, Walker
+from gait_entrainment.walker import Ending, Samples, Transition, Walker
 
 
 @dataclass(frozen=True)
@@ -20,7 +18,7 @@ class Stretch:
     """What happened in one stretch of a run: what was walked in one go."""
 
     transitions: list[Transition]  # gait events in it
-    sample_times: Stamps  # [ns since the start of the run], (n,)
+    sample_times: np.ndarray  # [ns since the start of the run], (n,)
     samples: Samples | None  # at those instants; None if there are none
 
 
@@ -73,9 +71,7 @@ class WalkerRun:
         self.late += late
         if profile.valid_until > self.reached:
             # What is over stays as it was walked, without torque; the rest keeps its instants.
-            self._walker.extend_torque(
-                profile.side, profile.times, profile.torques, profile.valid_until
-            )
+            self._walker.promise(profile)
         return late
 
     def stop(self, stamp: int) -> None:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""entrain stop: torque to zero, latched, on every perturbator that can be found."""
+"""entrain stop-ros: the stop service of every perturbator that ROS can find."""
 
 import argparse
 import json
@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 from std_srvs.srv import Trigger
 
-from gait_entrainment_nodes.messaging.client import Client, Question
+from gait_entrainment_nodes.messaging.client import Client, Question, all_answered
 from gait_entrainment_nodes.messaging.domain import DomainError, domains_in_use, wanted_domain
 
 # How long to look for perturbators [s]; in a domain that a run has claimed, until one is found and
@@ -26,7 +26,8 @@ STOP, TRAIN = "/stop", "/deliver_pulse_train/_action/send_goal"
 DESCRIPTION = (
     "Call the stop service of every perturbator: in ROS_DOMAIN_ID if it is set, else in "
     "every domain in which a run of this machine goes on. Latched until the perturbator is "
-    "cleaned up and configured again. No substitute for a switch in the hand: see docs/safety.md."
+    "cleaned up and configured again. For robots that another host drives; discovery takes one to "
+    "two seconds, so on this machine use entrain stop."
 )
 
 
@@ -37,15 +38,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Stop everything; 1 if nothing was found, or a stop was not confirmed."""
+    domains = {DEFAULT_DOMAIN: DISCOVERY, **dict.fromkeys(domains_in_use(), PATIENCE)}
     try:
-        wanted = wanted_domain()
+        if (wanted := wanted_domain()) is not None:
+            domains = {wanted: PATIENCE}
     except DomainError as error:
-        print(f"entrain stop: {error}; stopping every run", file=sys.stderr)
-        wanted = None
-    if wanted is not None:
-        domains = {wanted: PATIENCE}
-    else:
-        domains = {DEFAULT_DOMAIN: DISCOVERY, **dict.fromkeys(domains_in_use(), PATIENCE)}
+        print(f"entrain stop-ros: {error}; stopping every run", file=sys.stderr)
     answers: dict[str, str | None] = {}
     # Side by side: no run waits for another one to be stopped.
     with ThreadPoolExecutor(len(domains)) as threads:
@@ -58,9 +56,9 @@ def run(options: argparse.Namespace) -> int:
         for name, answer in answers.items():
             print(f"{name}: {answer or 'did not confirm the stop'}")
     if not answers:
-        print("entrain stop: no perturbator was found: is a run going on?", file=sys.stderr)
+        print("entrain stop-ros: no perturbator was found: is a run going on?", file=sys.stderr)
     elif silent:
-        print(f"entrain stop: no stop of {', '.join(silent)}: cut the power", file=sys.stderr)
+        print(f"entrain stop-ros: no stop of {', '.join(silent)}: cut the power", file=sys.stderr)
     return 0 if answers and not silent else 1
 
 
@@ -68,18 +66,17 @@ def stop_all(domain: int, patience: float) -> dict[str, str | None]:
     """Call every stop service in a domain; return the answers, None if no stop is confirmed."""
     calls: dict[str, Question] = {}
     look_until = time.monotonic() + DISCOVERY
-
     with Client(f"entrain_stop_{domain}", domain=domain) as client:
 
-        def all_answered() -> bool:
+        def all_stopped() -> bool:
             """Call each service as soon as it is seen; what comes later may take its time."""
             services = {name for name, _ in client.node.get_service_names_and_types()}
             stops = {s.removesuffix(TRAIN) + STOP for s in services if s.endswith(TRAIN)}
             for name in (stops & services) - calls.keys():
                 calls[name] = client.ask(Trigger, name)
-            answers = [call.answer() for call in calls.values()]
-            return bool(answers) and all(answers) and time.monotonic() > look_until
+            done = all_answered(calls.values()) and time.monotonic() > look_until
+            return bool(calls) and done
 
-        client.wait(all_answered, patience)
+        client.wait(all_stopped, patience)
     answers = {f"domain {domain} {name}": call.accepted for name, call in calls.items()}
     return {name: a.message if a and a.success else None for name, a in answers.items()}

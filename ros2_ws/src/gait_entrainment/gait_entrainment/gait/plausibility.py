@@ -1,0 +1,126 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Which gait events can be believed, and whether somebody walks at all.
+
+An event comes from a sensor, and a sensor counts twice, misses, or is knocked. Torque follows from
+what is believed here, so the rule is the same in the node, in a simulation and in an analysis.
+"""
+
+import math
+import statistics
+from collections import deque
+from dataclasses import dataclass, replace
+
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
+from gait_entrainment.gait.strides import GaitEvent
+from gait_entrainment.settings import check_settings, setting, settings_of
+
+# Strides whose median is the person's own: enough that two wrong ones do not move it.
+_OWN_STRIDES = 7
+# From so many strides on the median is known.
+_KNOWN_STRIDES = 3
+
+
+@dataclass(frozen=True)
+class GaitLimits:
+    """
+    What a stride can be.
+
+    The absolute bounds are those of slow walking after stroke and of running, with a margin
+    (Perry and Burnfield, Gait Analysis, 2010). From stride to stride a healthy adult varies by 1
+    to 3 %, patients by up to 10 % (Hausdorff, J. NeuroEng. Rehabil. 2, 19, 2005).
+    """
+
+    stride_least: float = setting(0.3, "shortest stride", "s", (1e-6, 1e6))
+    stride_most: float = setting(5.0, "longest stride", "s", (1e-6, 1e6))
+    stride_change: float = setting(
+        0.4, "largest departure of a stride from the person's own median", "1", (0.01, 1.0)
+    )
+    silence: float = setting(
+        1.5, "strides without a heel strike after which nobody walks", "1", (1.05, 10.0)
+    )
+    baseline_spread: float = setting(
+        0.15,
+        "largest standard deviation of the baseline's strides, as a share of their mean",
+        "1",
+        (0.001, 1.0),
+    )
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        check_settings(self)
+
+    def scaled(self, factor: float) -> "GaitLimits":
+        """Return the limits with their times multiplied, as far as a setting allows."""
+        told = settings_of(type(self))
+        times = {
+            name: min(max(getattr(self, name) * factor, told[name].least), told[name].most)
+            for name in ("stride_least", "stride_most")
+        }
+        return replace(self, **times)
+
+
+class GaitWatch:
+    """
+    Follows the heel strikes of one leg; says which strides are believed and when the gait stops.
+
+    Parameters
+    ----------
+    side
+        The leg that is watched.
+    limits
+        What a stride can be.
+
+    Attributes
+    ----------
+    disbelieved
+        Strides that were not believed, so far.
+
+    """
+
+    def __init__(self, side: Side, limits: GaitLimits) -> None:
+        self.side, self.limits = side, limits
+        self.disbelieved = 0
+        self._latest: int | None = None  # heel strike of the leg [ns]
+        self._own: deque[float] = deque(maxlen=_OWN_STRIDES)  # periods that were believed [s]
+
+    @property
+    def median(self) -> float:
+        """The person's own stride period [s]; NaN before it is known."""
+        return statistics.median(self._own) if len(self._own) >= _KNOWN_STRIDES else math.nan
+
+    def believes(self, event: GaitEvent) -> bool:
+        """Take an event in its turn; whether the stride that it closes can be."""
+        if event.side is not self.side or event.kind is not EventKind.HEEL_STRIKE:
+            return True
+        before, self._latest = self._latest, event.stamp
+        if before is None:
+            return True
+        period = (event.stamp - before) / NANOSECONDS_PER_SECOND
+        limits, median = self.limits, self.median
+        believed = limits.stride_least <= period <= limits.stride_most
+        if believed and not math.isnan(median):
+            believed = abs(period - median) <= limits.stride_change * median
+        if believed:
+            self._own.append(period)
+        else:
+            self.disbelieved += 1
+        return believed
+
+    def stopped(self, now: int) -> str:
+        """Return why nobody seems to walk at an instant [ns], or an empty text."""
+        if self._latest is None:
+            return ""
+        stride = self.median
+        if math.isnan(stride):
+            stride = self.limits.stride_most
+        silent = (now - self._latest) / NANOSECONDS_PER_SECOND
+        if silent <= self.limits.silence * stride:
+            return ""
+        leg = self.side.name.lower()
+        return (
+            f"the gait has stopped: no heel strike of the {leg} leg for {silent:.2f} s; allowed: "
+            f"{self.limits.silence:g} strides of {stride:.3g} s"
+        )

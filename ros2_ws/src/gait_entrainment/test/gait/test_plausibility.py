@@ -1,0 +1,116 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Only what can be a stride is believed; nobody who stands still gets torque."""
+
+import math
+
+import pytest
+
+from gait_entrainment.conventions import EventKind, Side
+from gait_entrainment.experiment import Conductor, GaitError
+from gait_entrainment.gait import GaitEvent, GaitLimits, GaitWatch
+from gait_entrainment.protocol import Protocol
+
+SECOND = 1_000_000_000
+STRIDE = 1_100_000_000
+
+
+def strike(stamp, step=0):
+    return GaitEvent(round(stamp), EventKind.HEEL_STRIKE, Side.RIGHT, step)
+
+
+def watch(*periods):
+    found = GaitWatch(Side.RIGHT, GaitLimits())
+    stamp, believed = 0, []
+    found.believes(strike(0))
+    for period in periods:
+        stamp += period * SECOND
+        believed.append(found.believes(strike(stamp)))
+    return found, believed, round(stamp)
+
+
+@pytest.mark.parametrize(
+    ("periods", "believed"),
+    [
+        ((1.1, 1.12, 1.08, 1.1), [True] * 4),
+        ((1.1, 0.2, 0.9, 1.1), [True, False, True, True]),  # counted twice
+        ((1.1, 1.1, 1.1, 2.2, 1.1), [True, True, True, False, True]),  # missed
+        ((1.1, 1.1, 1.1, 24.0, 1.1), [True, True, True, False, True]),  # stood still
+        ((1.1, 1.1, 1.1, 0.6), [True, True, True, False]),  # not this person's
+        ((0.2,), [False]),
+        ((6.0,), [False]),
+    ],
+)
+def test_strides_that_cannot_be_are_not_believed(periods, believed):
+    found, told, _ = watch(*periods)
+    assert told == believed
+    assert found.disbelieved == believed.count(False)
+
+
+def test_the_other_leg_and_toe_offs_are_nobody_s_business():
+    found, _, now = watch(1.1, 1.1, 1.1)
+    assert found.believes(GaitEvent(now + 1, EventKind.HEEL_STRIKE, Side.LEFT, 7))
+    assert found.believes(GaitEvent(now + 2, EventKind.TOE_OFF, Side.RIGHT, 8))
+
+
+def test_nobody_walks_after_one_and_a_half_strides_without_a_strike():
+    found, _, now = watch(1.1, 1.1, 1.1)
+    assert found.stopped(now + round(1.649 * SECOND)) == ""
+    assert "1.66 s; allowed: 1.5 strides of 1.1 s" in found.stopped(now + round(1.66 * SECOND))
+
+
+def test_before_a_stride_is_known_the_longest_counts():
+    found = GaitWatch(Side.RIGHT, GaitLimits())
+    assert found.stopped(10**15) == ""
+    found.believes(strike(0))
+    assert math.isnan(found.median)
+    assert found.stopped(7 * SECOND) == ""
+    assert found.stopped(8 * SECOND)
+
+
+def gait(conductor, strides, *, stray=(), short=0.25):
+    """Feed a regular gait in which some strides are short, each event with the next number."""
+    step, stamp, trains = 0, 0, []
+    for number in range(strides + 1):
+        stride = round(short * STRIDE) if number in stray else STRIDE
+        for when, kind, side in (
+            (0.0, EventKind.HEEL_STRIKE, Side.RIGHT),
+            (0.1, EventKind.TOE_OFF, Side.LEFT),
+            (0.5, EventKind.HEEL_STRIKE, Side.LEFT),
+            (0.6, EventKind.TOE_OFF, Side.RIGHT),
+        ):
+            at = stamp + round(when * stride)
+            off = kind is EventKind.TOE_OFF
+            train = conductor.add_event(GaitEvent(at, kind, side, step + off))
+            trains += [train] if train else []
+            step += off
+        stamp += stride
+    return trains, stamp
+
+
+def test_a_gait_that_stops_under_pulses_ends_the_run_and_one_that_goes_on_does_not():
+    conductor = Conductor(Protocol())
+    trains, stamp = gait(conductor, 17)
+    assert len(trains) == 1
+    conductor.horizon(stamp - STRIDE + round(1.4 * STRIDE))
+    with pytest.raises(GaitError, match="the gait has stopped"):
+        conductor.horizon(stamp - STRIDE + round(1.6 * STRIDE))
+
+
+def test_stray_strikes_do_not_enter_the_measured_period():
+    conductor = Conductor(Protocol())
+    gait(conductor, 17, stray=(5, 9))
+    assert conductor.measured_period == pytest.approx(STRIDE / SECOND)
+
+
+def test_a_baseline_of_strays_ends_the_run_before_the_first_pulse_with_the_figures():
+    conductor = Conductor(Protocol())
+    with pytest.raises(GaitError, match=r"baseline: .* of .* strides cannot be"):
+        gait(conductor, 17, stray=range(2, 15))
+
+
+def test_an_unsteady_baseline_ends_the_run_with_the_figures():
+    conductor = Conductor(Protocol(), limits=GaitLimits(stride_change=1.0, baseline_spread=0.05))
+    with pytest.raises(GaitError, match=r"strides of 0\.825 to 1\.1 s, which vary by"):
+        gait(conductor, 17, stray=range(1, 15, 3), short=0.75)

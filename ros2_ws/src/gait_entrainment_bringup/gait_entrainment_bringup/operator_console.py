@@ -1,0 +1,56 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The operator of a run: a sign of life for the robot, and a key that stops it."""
+
+import os
+import select
+import sys
+import termios
+import tty
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from gait_entrainment.robot.stop_channel import stop_all
+from gait_entrainment_nodes.messaging.client import Client
+from gait_entrainment_nodes.messaging.errors import NodeError
+from gait_entrainment_nodes.messaging.topics import OPERATOR_HEARTBEAT
+
+STOP_KEY = " "
+
+
+class Operator:
+    """Called in each round of a client: says that somebody watches, and looks at the keyboard."""
+
+    def __init__(self, client: Client) -> None:
+        self._heartbeat = client.node.create_publisher(
+            OPERATOR_HEARTBEAT.type, OPERATOR_HEARTBEAT.name, OPERATOR_HEARTBEAT.qos
+        )
+
+    def __call__(self) -> None:
+        """Publish the heartbeat; raise NodeError if the stop key was pressed."""
+        self._heartbeat.publish(OPERATOR_HEARTBEAT.type())
+        if _pressed() == STOP_KEY:
+            told = [f"{name}: {a.message if a else 'no answer'}" for name, a in stop_all().items()]
+            raise NodeError("stopped by the space bar: " + "; ".join(told), "")
+
+
+@contextmanager
+def keys_at_once() -> Iterator[None]:
+    """Have a terminal hand over each key as it is pressed, without showing it."""
+    if not sys.stdin.isatty():
+        yield
+        return
+    before = termios.tcgetattr(sys.stdin)
+    tty.setcbreak(sys.stdin)  # Ctrl-C and Ctrl-Z stay signals
+    try:
+        yield
+    finally:
+        termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
+
+
+def _pressed() -> str:
+    """Return a key that was pressed, or an empty text."""
+    if not sys.stdin.isatty() or not select.select([sys.stdin], [], [], 0)[0]:
+        return ""
+    return os.read(sys.stdin.fileno(), 1).decode(errors="replace")

@@ -1,0 +1,33 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Signals that stop a run: whatever a terminal, a shell or an operating system sends."""
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+# Ctrl-C, kill, a closed terminal, Ctrl-Z and Ctrl-\. A suspended run would go on pushing with
+# nobody to stop it, so Ctrl-Z stops it too.
+STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP, signal.SIGQUIT)
+
+
+def stop_on_signals() -> None:
+    """
+    Raise KeyboardInterrupt at any of them.
+
+    Also at SIGINT, which a shell has its background jobs ignore.
+    """
+    for number in STOPPING:
+        signal.signal(number, signal.default_int_handler)
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """Let none of them break in: for what is about to end."""
+    handlers = {number: signal.signal(number, signal.SIG_IGN) for number in STOPPING}
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)

@@ -1,0 +1,79 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a driver's author writes for a device to which the host streams torque."""
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from gait_entrainment.robot.contract import Capabilities
+from gait_entrainment.robot.faults import Fault
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A device's answer to one command."""
+
+    torque: float  # measured [N m], plantarflexion positive
+    angle: float = math.nan  # measured [rad], plantarflexion positive; NaN if not measured
+    velocity: float = math.nan  # measured [rad/s]; NaN if not measured
+    temperature: float = math.nan  # of the motor [deg C]; NaN if not measured
+    faults: tuple[Fault, ...] = ()  # what the device itself reports
+
+
+class TorqueDevice(ABC):
+    """
+    One device that takes a torque command and answers with a reading.
+
+    All methods are called from one thread of a process of its own (torque_loop.py), where nothing
+    else runs. The constructor is also called in the robot's process, for the capabilities: it
+    touches no hardware.
+
+    =========  =======================================================  ==========================
+    method     must                                                     may raise
+    =========  =======================================================  ==========================
+    open       connect, and see that the right device answers           DeviceError
+    enable     enable the device at zero torque                         DeviceError
+    exchange   send a torque, return the answer or None if none came    anything: the loop counts
+               in time; return within ``patience``                      it as silence, goes on
+                                                                        sending zero and reports
+                                                                        the text
+    disable    disable the device, whose torque is zero already         anything: ignored
+    shut       release everything; bears being called twice, and        anything: ignored
+               without ``open``
+    =========  =======================================================  ==========================
+
+    The loop sends the last zero: before ``disable`` it exchanges zero torque until the reading has
+    run down. A device must go to zero by itself when commands stop; no software on the host can
+    see to that.
+    """
+
+    Options: ClassVar[type[Any]]
+    name: str  # what it is called in messages, such as "motor 1"
+    capabilities: Capabilities
+
+    @abstractmethod
+    def __init__(self, options: Any) -> None:
+        """Keep the options; touch no hardware."""
+
+    @abstractmethod
+    def open(self) -> None:
+        """Connect, and see that the right device answers."""
+
+    @abstractmethod
+    def enable(self) -> None:
+        """Enable the device at zero torque."""
+
+    @abstractmethod
+    def exchange(self, torque: float, patience: float) -> Reading | None:
+        """Send a torque [N m]; return the answer, or None if none comes in time [s]."""
+
+    @abstractmethod
+    def disable(self) -> None:
+        """Disable the device, whose torque is zero."""
+
+    @abstractmethod
+    def shut(self) -> None:
+        """Release everything."""

@@ -1,0 +1,254 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Robots whose pulses are timed by the host: the contract's side of a torque loop.
+
+The loop is a process of its own (torque_loop.py). Here its samples become promises and states, and
+plans are handed to it.
+"""
+
+import math
+import select
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any, ClassVar
+
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
+from gait_entrainment.robot.contract import AnkleRobot, RobotState
+from gait_entrainment.robot.faults import DeviceError, Fault, LimitError
+from gait_entrainment.robot.profile import TorqueProfile
+from gait_entrainment.robot.pulse_train import PulseTrain
+from gait_entrainment.settings import setting
+from gait_entrainment_drivers.device import TorqueDevice
+from gait_entrainment_drivers.link import Link, Sample
+from gait_entrainment_drivers.monitor import MonitorSettings
+
+# The loop has this long to start, and to open, enable, disable or close its device [s].
+_START_TIMEOUT = 10.0
+_ANSWER_TIMEOUT = 2.0
+_LOOP_ENDED = Fault(
+    "torque_loop_ended",
+    "The process that streams torque has ended: the device's own watchdog must bring zero. If "
+    "torque is felt, cut the power.",
+)
+
+
+@dataclass(frozen=True)
+class LoopOptions(MonitorSettings):
+    """How the torque loop runs, and what it holds the readings against."""
+
+    rate: float = setting(500.0, "torque commands per second", "Hz", (50.0, 1000.0))
+    silence: float = setting(0.05, "longest silence of the device", "s", (0.005, 1.0))
+    lateness: float = setting(0.05, "by which the loop may wake up late", "s", (0.005, 1.0))
+    host_silence: float = setting(
+        0.2, "longest silence of the robot's process while torque may come", "s", (0.02, 5.0)
+    )
+    bandwidth: float = setting(
+        30.0,
+        "torque bandwidth (-3 dB) of the device: what its torque is held against",
+        "Hz",
+        (1.0, 500.0),
+    )
+
+
+class HostTimedRobot(AnkleRobot):
+    """
+    A device to which the host streams torque at a fixed rate, from a process of its own.
+
+    A driver names its device, a TorqueDevice; its options must have the fields of LoopOptions.
+    A state's stamp is the instant at which the command was sent; what it measured is up to one
+    round trip younger. After a fault the loop goes on and commands zero torque.
+    """
+
+    Device: ClassVar[type[TorqueDevice]]
+
+    def __init__(self, side: Side, options: Any, seed: int) -> None:  # noqa: ARG002
+        self._side, self._options = side, options
+        self.capabilities = self.Device(options).capabilities
+        self._process: subprocess.Popen[bytes] | None = None
+        self._link: Link | None = None
+        self._train: PulseTrain | None = None
+        self._faults: tuple[Fault, ...] = ()
+        self._states: list[RobotState] = []
+        self._samples: list[tuple[int, float]] = []  # stamp [ns], measured torque [N m]
+        self._held = 0.0  # torque of the last sample that was promised [N m]
+        self._promised = 0  # up to this instant [ns]; 0 until a run begins
+        self._offset = time.time_ns() - time.monotonic_ns()  # from steady time to stamps
+        self._done: dict[str, str] = {}  # answers of the loop: error texts
+        self.scheduling_refused = ""
+
+    # Lifecycle
+
+    def configure(self) -> None:
+        """Start the loop and let it connect."""
+        self._faults, self._train, self._done = (), None, {}
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with theirs:
+            self._process = subprocess.Popen(
+                [
+                    sys.executable,
+                    "-m",
+                    "gait_entrainment_drivers.torque_loop",
+                    str(theirs.fileno()),
+                ],
+                pass_fds=[theirs.fileno()],
+                stdin=subprocess.DEVNULL,
+                start_new_session=True,  # a terminal's Ctrl-C and Ctrl-Z are for the parent
+            )
+        self._link = Link(ours)
+        self._link.send(self.Device, self._options)
+        self._ask("open", _START_TIMEOUT)
+
+    def activate(self) -> None:
+        """Let the loop enable the device and stream zero torque."""
+        self._promised = 0
+        self._ask("enable")
+
+    def deactivate(self) -> None:
+        """Let the loop bring the torque to zero and disable the device."""
+        self._train = None
+        if self._process is not None and _LOOP_ENDED not in self._faults:
+            self._ask("disable")
+
+    def close(self) -> None:
+        """End the loop, which brings the torque to zero on its way out."""
+        process, link = self._process, self._link
+        self._process = self._link = None
+        if process is None or link is None:
+            return
+        link.send("close")
+        try:
+            process.wait(_ANSWER_TIMEOUT)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+        link.close()
+
+    # A run
+
+    def begin(self, start: int) -> None:
+        """Start the account of a run."""
+        self.cancel()
+        self._listen()
+        self._promised, self._states = start, []
+        # Stamps from before are of another offset, if the wall clock was set meanwhile.
+        self._held = self._samples[-1][1] if self._samples else 0.0
+        self._samples = []
+        self._offset = time.time_ns() - time.monotonic_ns()
+
+    def schedule(self, train: PulseTrain) -> None:
+        """
+        Hand over a train.
+
+        Raises
+        ------
+        LimitError
+            if its first onset is over already.
+
+        """
+        late = time.monotonic_ns() + self._offset - train.first_onset
+        if late > 0:
+            raise LimitError(f"first_onset: is over by {late / NANOSECONDS_PER_SECOND:.3g} s")
+        self._train = train
+        self._tell("train", replace(train, first_onset=train.first_onset - self._offset))
+
+    def cancel(self) -> None:
+        """Drop the train; the next command is zero."""
+        self._train = None
+        self._tell("cancel")
+
+    def stop(self) -> None:
+        """Drop the train for good: the loop's next command is zero."""
+        self._train = None
+        self._tell("stop")
+
+    def promise(self, until: int) -> TorqueProfile:
+        """Return the measured torque from the last promise up to the last measurement."""
+        self._listen()
+        begin = self._promised
+        known = [sample for sample in self._samples if sample[0] < until]
+        # The last sample holds until a later one is known: it is told with that.
+        end = until if len(known) < len(self._samples) else known[-1][0] if known else begin
+        end = max(end, begin)
+        self._samples = [sample for sample in self._samples if sample[0] >= end]
+        changes = [(begin, self._held)]
+        changes += [new for old, new in pairwise([*changes, *known]) if new[1] != old[1]]
+        onsets = self._train.onsets_within(begin, end) if self._train is not None else ()
+        profile = TorqueProfile.from_changes(self._side, begin, end, changes, onsets)
+        self._held, self._promised = profile.torques[-1], end
+        return profile
+
+    def read(self) -> Sequence[RobotState]:
+        """Return one state for each command that was answered, and each one without an answer."""
+        self._tell("alive")
+        self._listen()
+        states, self._states = self._states, []
+        return states
+
+    # The loop's messages
+
+    def _tell(self, *message: Any) -> None:
+        if self._link is not None:
+            self._link.send(*message)
+
+    def _ask(self, kind: str, timeout: float = _ANSWER_TIMEOUT) -> None:
+        """Let the loop do something; raise DeviceError if it cannot, or does not answer."""
+        link, give_up = self._link, time.monotonic() + timeout
+        if link is None:
+            raise DeviceError("the torque loop is not running; configure first")
+        self._done.pop(kind, None)
+        link.send(kind)
+        while kind not in self._done:
+            left = give_up - time.monotonic()
+            if left <= 0:
+                raise DeviceError(f"the torque loop does not answer ({kind}): cut the power")
+            select.select([link], [], [], left)
+            self._listen()
+            if _LOOP_ENDED in self._faults:
+                raise DeviceError(_LOOP_ENDED.meaning)
+        if error := self._done[kind]:
+            raise DeviceError(error)
+
+    def _listen(self) -> None:
+        """Take what the loop has told."""
+        if self._link is None:
+            return
+        try:
+            messages = self._link.received()
+        except EOFError:
+            if _LOOP_ENDED not in self._faults:
+                self._train, self._faults = None, (*self._faults, _LOOP_ENDED)
+                now = time.monotonic_ns() + self._offset
+                self._states.append(RobotState(now, 0.0, math.nan, math.nan, self._faults))
+            return
+        for kind, *content in messages:
+            if kind == "samples":
+                samples, self.late = content
+                for sample in samples:
+                    self._take(sample)
+            elif kind == "faults":
+                (self._faults,) = content
+                self._train = None
+            elif kind == "done":
+                name, self._done[name] = content[0], content[1]
+            elif kind == "scheduling":
+                (self.scheduling_refused,) = content
+
+    def _take(self, sample: Sample) -> None:
+        stamp, reading = sample.sent + self._offset, sample.reading
+        if not self._promised:  # nobody asks for samples until a run begins
+            self._samples, self._states = self._samples[-1:], self._states[-1:]
+        if reading is not None:
+            self._samples.append((stamp, reading.torque))
+            measured, angle = reading.torque, reading.angle
+        elif self._faults:
+            measured = angle = math.nan
+        else:
+            return
+        self._states.append(RobotState(stamp, sample.commanded, measured, angle, self._faults))

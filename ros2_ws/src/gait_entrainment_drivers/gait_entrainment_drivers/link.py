@@ -1,0 +1,100 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+The link between a robot's process and its torque loop: messages that nobody waits for.
+
+A packet is a pickled tuple, its first element the kind of message. The loop never blocks: what the
+other side does not take at once is kept and sent with the next packet, so that a robot's process
+that was held up has lost no sample.
+"""
+
+import pickle
+import select
+import socket
+from collections import deque
+from dataclasses import dataclass
+from typing import Any
+
+from gait_entrainment_drivers.device import Reading
+
+# Samples in one packet at most: it has to fit into a socket's buffer.
+_PACKET_SAMPLES = 200
+_LARGEST_PACKET = 1 << 17
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One command and its answer."""
+
+    sent: int  # steady time [ns]
+    commanded: float  # [N m]
+    reading: Reading | None
+
+
+class Link:
+    """One end of the link."""
+
+    def __init__(self, end: socket.socket) -> None:
+        self._socket = end
+        end.setblocking(False)
+        self._waiting: deque[bytes] = deque()  # packets that have not been sent yet
+
+    def fileno(self) -> int:
+        """Return the descriptor that becomes readable with a message."""
+        return self._socket.fileno()
+
+    def send(self, *message: Any) -> None:
+        """Send a message, or keep it until the other side takes it."""
+        self._waiting.append(pickle.dumps(message))
+        self._flush()
+
+    def send_samples(self, samples: list[Any], late: float) -> None:
+        """Send samples as far as the other side takes them, and empty the list by as many."""
+        self._flush()
+        while samples and not self._waiting:
+            self.send("samples", samples[:_PACKET_SAMPLES], late)
+            del samples[:_PACKET_SAMPLES]
+
+    def received(self) -> list[Any]:
+        """
+        Return the messages that have come since the last call.
+
+        Raises
+        ------
+        EOFError
+            if the other side has ended.
+
+        """
+        messages: list[Any] = []
+        while True:
+            try:
+                packet = self._socket.recv(_LARGEST_PACKET)
+            except BlockingIOError:
+                return messages
+            except ConnectionError:
+                packet = b""
+            if not packet:
+                if messages:
+                    return messages
+                raise EOFError
+            messages.append(pickle.loads(packet))
+
+    def first(self) -> Any:
+        """Wait for the first message, and leave those behind it."""
+        select.select([self._socket], [], [])
+        return pickle.loads(self._socket.recv(_LARGEST_PACKET))
+
+    def _flush(self) -> None:
+        try:
+            while self._waiting:
+                self._socket.send(self._waiting[0])
+                self._waiting.popleft()
+        except BlockingIOError:
+            pass
+        except ConnectionError:
+            self._waiting.clear()  # nobody is left to tell; `received` says so
+
+    def close(self) -> None:
+        """Close this end: the other one sees it."""
+        self._socket.close()

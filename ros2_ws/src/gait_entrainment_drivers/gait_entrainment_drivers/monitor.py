@@ -1,0 +1,106 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Whether a device does what it was asked for: torque that follows, readings that can be."""
+
+import math
+from dataclasses import dataclass
+
+from gait_entrainment.robot.faults import Fault
+from gait_entrainment.settings import check_settings, setting
+from gait_entrainment_drivers.device import Reading
+
+NOT_FOLLOWED = Fault(
+    "torque_not_followed",
+    "The measured torque does not follow the command: it pushes unasked, in the wrong direction, "
+    "too late, or the readings are not its own. If torque is felt, cut the power.",
+)
+NOT_FALLING = Fault(
+    "torque_not_falling",
+    "The measured torque does not fall although zero is asked for: cut the power.",
+)
+ANGLE_OUT_OF_RANGE = Fault(
+    "angle_out_of_range", "The measured joint angle is outside what an ankle can reach."
+)
+VELOCITY_OUT_OF_RANGE = Fault(
+    "velocity_out_of_range", "The measured joint velocity is beyond the limit."
+)
+TOO_HOT = Fault("too_hot", "The measured temperature is beyond the limit.")
+READING_NOT_FINITE = Fault(
+    "reading_not_finite", "The device reports a torque that is not a number."
+)
+
+
+@dataclass(frozen=True)
+class MonitorSettings:
+    """
+    What a reading may be, and how far measured torque may be from what was asked for.
+
+    The ankle's range is that of Brockett and Chapman (Orthop. Trauma 30, 232, 2016), 10 to 30
+    degrees of dorsiflexion and 40 to 55 of plantarflexion, and a margin.
+    """
+
+    torque_band: float = setting(
+        0.12, "distance of measured from expected torque, as a share of the peak", "1", (0.01, 1.0)
+    )
+    torque_time: float = setting(
+        0.03,
+        "how long torque may be outside the band, beside the device's own lag",
+        "s",
+        (0.005, 1.0),
+    )
+    angle_least: float = setting(-0.9, "smallest joint angle", "rad", (-7.0, 7.0))
+    angle_most: float = setting(1.3, "largest joint angle", "rad", (-7.0, 7.0))
+    velocity: float = setting(25.0, "largest joint velocity", "rad/s", (0.1, 200.0))
+    temperature: float = setting(80.0, "highest temperature of the motor", "deg C", (20.0, 200.0))
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        check_settings(self)
+
+
+class Monitor:
+    """
+    Holds every reading against what can be, and against the command.
+
+    A device of bandwidth f is expected between two torques: the command itself, and the command
+    behind a first-order lag of time constant 1 / (2 pi f). The first is that of a device that is
+    faster than stated. Measured torque outside of both by more than the band, for longer than
+    ``torque_time`` and two time constants, is a fault.
+    """
+
+    def __init__(self, settings: MonitorSettings, peak_torque: float, bandwidth: float) -> None:
+        self._settings = settings
+        self.band = settings.torque_band * peak_torque
+        self._lag = 1 / (2 * math.pi * bandwidth)
+        self._patience = settings.torque_time + 2 * self._lag
+        self._command = 0.0  # held since the last reading [N m]
+        self._expected = 0.0  # the command behind the lag [N m]
+        self._at = -math.inf  # instant of the last command [s]
+        self._outside_since = math.inf
+
+    def expect(self, torque: float, now: float) -> None:
+        """Note the torque [N m] that is asked for from an instant [s] on."""
+        decay = math.exp(-(now - self._at) / self._lag)
+        self._expected = self._command + (self._expected - self._command) * decay
+        self._before, self._command, self._at = self._command, torque, now
+
+    def judge(self, reading: Reading, now: float) -> tuple[Fault, ...]:
+        """Return what is wrong with the answer to the command noted last, at an instant [s]."""
+        limits = self._settings
+        if not math.isfinite(reading.torque):
+            return (READING_NOT_FINITE,)
+        found = []
+        if reading.angle < limits.angle_least or reading.angle > limits.angle_most:
+            found.append(ANGLE_OUT_OF_RANGE)
+        if abs(reading.velocity) > limits.velocity:
+            found.append(VELOCITY_OUT_OF_RANGE)
+        if reading.temperature > limits.temperature:
+            found.append(TOO_HOT)
+        # The answer may still be to the command before, or already to this one.
+        possible = (self._expected, self._before, self._command)
+        outside = max(min(possible) - reading.torque, reading.torque - max(possible)) > self.band
+        self._outside_since = min(self._outside_since, now) if outside else math.inf
+        if now - self._outside_since > self._patience:
+            found.append(NOT_FOLLOWED)
+        return tuple(found)

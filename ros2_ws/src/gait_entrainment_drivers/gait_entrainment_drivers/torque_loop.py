@@ -1,0 +1,276 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+The torque loop: a process of its own that streams torque to one device, and does nothing else.
+
+No ROS, no threads, garbage collection frozen; SCHED_FIFO and locked memory if the system permits
+(docs/safety.md says how to permit it, and what is lost without). Its parent, the robot's process,
+talks to it over a socket (link.py): plans come in, samples go out, and neither ever waits for the
+other. If the parent ends or falls silent, or anybody asks for a stop, torque goes to zero here.
+
+    python -m gait_entrainment_drivers.torque_loop DESCRIPTOR     started by host_timed.py
+"""
+
+import contextlib
+import ctypes
+import gc
+import math
+import os
+import select
+import signal
+import socket
+import sys
+import time
+from typing import Any
+
+from gait_entrainment.robot.faults import (
+    DEVICE_SILENT,
+    DRIVER_FAILED,
+    HOST_LOOP_LATE,
+    STOPPED,
+    DeviceError,
+    Fault,
+)
+from gait_entrainment.robot.pulse_train import PulseTrain
+from gait_entrainment.robot.stop_channel import StopAnswer, StopListener
+from gait_entrainment_drivers.device import Reading, TorqueDevice
+from gait_entrainment_drivers.link import Link, Sample
+from gait_entrainment_drivers.monitor import NOT_FALLING, Monitor
+
+HOST_SILENT = Fault(
+    "host_silent",
+    "The process that holds the robot fell silent for longer than the limit: it is frozen, or "
+    "this computer is overloaded.",
+)
+# Before the device is disabled it is asked for zero torque: this often, so that a lost frame does
+# not matter, and on until its torque has run down to this share of its peak, or for this long [s].
+_ZERO_TICKS = 5
+_RUN_DOWN_SHARE = 0.02
+_RUN_DOWN_TIME = 0.2
+# Measured torque below this share of the peak is what a sensor shows without any.
+_NEAR_ZERO_SHARE = 0.05
+# Torque that was ended has this long to fall [s].
+_FALL_TIME = 0.15
+# While nothing is streamed: how often the stop channel and the parent are looked after [s].
+_IDLE_PERIOD = 0.02
+# Below the kernel's own threads, above everything of a user.
+_PRIORITY = 50
+_MCL_CURRENT_AND_FUTURE = 3
+
+
+class TorqueLoop:
+    """Streams torque to a device; see the module's docstring."""
+
+    def __init__(self, link: Link, device: TorqueDevice, settings: Any) -> None:
+        self._link, self._device, self._settings = link, device, settings
+        self._stop_channel = StopListener(device.name.replace(" ", "_"))
+        self._period = 1 / settings.rate
+        capabilities = device.capabilities
+        self._gone = _RUN_DOWN_SHARE * capabilities.peak_torque
+        self._near_zero = _NEAR_ZERO_SHARE * capabilities.peak_torque
+        self._monitor = Monitor(settings, capabilities.peak_torque, capabilities.torque_bandwidth)
+        self._train: PulseTrain | None = None  # onsets in steady time
+        self._faults: tuple[Fault, ...] = ()
+        self._enabled = self._closing = False
+        self._samples: list[Sample] = []  # not handed over yet
+        self._askers: list[str | bytes] = []  # of a stop, not answered yet
+        self._ended_at = math.inf  # when torque was ended [s]
+        self._measured = math.nan  # torque measured last [N m]
+        self._heard_at = self._answered_at = self._due = time.monotonic()
+        self.late: list[float] = []
+
+    def serve(self) -> None:
+        """Serve until the parent says so, or is gone."""
+        try:
+            while not self._closing:
+                if self._enabled:
+                    self._tick()
+                else:
+                    ends: list[Link | StopListener] = [self._link, self._stop_channel]
+                    select.select(ends, [], [], _IDLE_PERIOD)
+                    self._listen()
+        finally:
+            self._disable()
+            with contextlib.suppress(Exception):
+                self._device.shut()
+            self._stop_channel.close()
+
+    # One command
+
+    def _tick(self) -> None:
+        time.sleep(max(self._due - time.monotonic(), 0.0))
+        late = time.monotonic() - self._due
+        if late > self._settings.lateness:
+            self._end_torque(HOST_LOOP_LATE)
+        self._listen()
+        if not self._enabled:
+            return
+        sent = time.monotonic_ns()
+        now = sent / 1e9
+        train = self._train
+        torque = train.torque_at(sent) if train is not None else 0.0
+        if train is not None and now - self._heard_at > self._settings.host_silence:
+            self._end_torque(HOST_SILENT)
+            torque = 0.0
+        self._monitor.expect(torque, now)
+        reading = self._exchange(torque)
+        if reading is not None:
+            self._answered_at, self._measured = now, reading.torque
+            for fault in (*reading.faults, *self._monitor.judge(reading, now)):
+                self._end_torque(fault)
+        elif now - self._answered_at > self._settings.silence:
+            self._end_torque(DEVICE_SILENT)
+        self._samples.append(Sample(sent, torque, reading))
+        self._answer_stops(now)
+        self._link.send_samples(self._samples, late)
+        # After a hiccup it goes on from now: commands that were missed are not made up for.
+        self._due = max(self._due + self._period, time.monotonic() - self._settings.lateness)
+
+    def _exchange(self, torque: float) -> Reading | None:
+        """Exchange a torque for a reading; whatever the driver raises, zero is sent on and on."""
+        try:
+            # Most of the period at most: an answer that comes later is read with the next one.
+            return self._device.exchange(torque, 0.8 * self._period)
+        except Exception as error:
+            text = f"{type(error).__name__}: {error}"
+            self._end_torque(Fault(DRIVER_FAILED.name, f"The driver cannot send: {text}."))
+            return None
+
+    def _end_torque(self, fault: Fault) -> None:
+        """Ask for zero torque from now on, for this reason, until the device is opened anew."""
+        self._train = None
+        if not self._faults:
+            self._ended_at = time.monotonic()
+        if fault.name not in {known.name for known in self._faults}:
+            self._faults = (*self._faults, fault)
+            self._link.send("faults", self._faults)
+
+    def _answer_stops(self, now: float) -> None:
+        """Answer those who asked for a stop once torque has fallen, or does not fall."""
+        ended = now - self._ended_at
+        fell = abs(self._measured) <= self._near_zero
+        current = now - self._answered_at < self._settings.silence
+        if ended > _FALL_TIME and not (fell and current):
+            self._end_torque(NOT_FALLING)
+        if not self._askers:
+            return
+        if fell and current and self._answered_at > self._ended_at:
+            answer = StopAnswer(
+                True, f"torque is zero, latched ({self._measured:+.2f} N m measured)"
+            )
+        elif ended > _FALL_TIME:
+            told = f"{self._measured:+.2f} N m measured" if current else "nothing measured"
+            answer = StopAnswer(False, f"zero is asked for, but {told}: cut the power")
+        else:
+            return
+        self._stop_channel.answer(self._askers, answer)
+        self._askers = []
+
+    # Listening
+
+    def _listen(self) -> None:
+        """Take stops and what the parent says."""
+        askers = self._stop_channel.requests()
+        if askers:
+            self._end_torque(STOPPED)
+            if self._enabled:
+                self._askers += askers
+            else:
+                answer = StopAnswer(True, "not enabled: no torque is possible; latched")
+                self._stop_channel.answer(askers, answer)
+        try:
+            messages = self._link.received()
+        except EOFError:
+            self._closing = True  # the parent has ended, however that came
+            return
+        for kind, *content in messages:
+            self._heard_at = time.monotonic()
+            self._obey(kind, *content)
+
+    def _obey(self, kind: str, *content: Any) -> None:
+        if kind == "train":
+            (train,) = content
+            self._train = None if self._faults else train
+        elif kind == "cancel":
+            self._train = None
+        elif kind == "stop":
+            self._end_torque(STOPPED)
+        elif kind in ("open", "enable", "disable", "close"):
+            error = ""
+            try:
+                getattr(self, f"_{kind}")()
+            except Exception as failure:
+                named = "" if isinstance(failure, DeviceError) else f"{type(failure).__name__}: "
+                error = f"{named}{failure}"
+            self._link.send("done", kind, error)
+
+    def _open(self) -> None:
+        self._faults, self._ended_at = (), math.inf
+        self._device.open()
+
+    def _enable(self) -> None:
+        try:
+            self._device.enable()
+        except BaseException:
+            # How far it got is not known, and nothing is streamed that would bring zero.
+            with contextlib.suppress(Exception):
+                self._device.disable()
+            raise
+        self._enabled = True
+        self._due = self._answered_at = self._heard_at = time.monotonic()
+
+    def _disable(self) -> None:
+        """Bring the torque to zero, then disable; each step even if the one before fails."""
+        if not self._enabled:
+            return
+        self._train, self._enabled = None, False
+        give_up = time.monotonic() + _RUN_DOWN_TIME
+        ticks, torque = 0, math.inf
+        while (ticks < _ZERO_TICKS or abs(torque) > self._gone) and time.monotonic() < give_up:
+            with contextlib.suppress(Exception):
+                reading = self._device.exchange(0.0, 0.8 * self._period)
+                torque = math.inf if reading is None else reading.torque
+            ticks += 1
+            time.sleep(self._period)
+        with contextlib.suppress(Exception):
+            self._device.disable()
+
+    def _close(self) -> None:
+        self._closing = True
+
+
+def prefer_this_process() -> str:
+    """Ask for real-time scheduling and locked memory; return what was not permitted, in words."""
+    gc.collect()
+    gc.freeze()
+    gc.disable()  # nothing in the loop makes reference cycles
+    refused = []
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
+    except OSError:
+        refused.append("SCHED_FIFO")
+    if ctypes.CDLL(None).mlockall(_MCL_CURRENT_AND_FUTURE) != 0:
+        refused.append("locked memory")
+    return " and ".join(refused)
+
+
+def main() -> int:
+    """Serve the parent at the other end of the socket whose descriptor is given."""
+    for number in (signal.SIGINT, signal.SIGHUP, signal.SIGTSTP, signal.SIGQUIT):
+        signal.signal(number, signal.SIG_IGN)  # the parent obeys them, and then says so here
+    link = Link(socket.socket(fileno=int(sys.argv[1])))
+    device_type, options = link.first()
+    loop = TorqueLoop(link, device_type(options), options)
+
+    def end(*_: object) -> None:
+        loop._closing = True
+
+    signal.signal(signal.SIGTERM, end)
+    link.send("scheduling", prefer_this_process())
+    loop.serve()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,120 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A device without hardware that misbehaves as it is told to, and traces its commands."""
+
+import math
+import time
+from collections import deque
+from dataclasses import dataclass
+from pathlib import Path
+
+from gait_entrainment.robot.contract import Capabilities
+from gait_entrainment.robot.faults import Fault
+from gait_entrainment.settings import setting
+from gait_entrainment_drivers.device import Reading, TorqueDevice
+from gait_entrainment_drivers.host_timed import HostTimedRobot, LoopOptions
+
+PEAK = 20.0
+OVERHEATED = Fault("overheated", "The motor is too hot.")
+
+
+@dataclass(frozen=True)
+class MisbehavingOptions(LoopOptions):
+    """What goes wrong, from when on, and where commands are noted."""
+
+    does: str = setting("nothing", "what goes wrong")
+    after: float = setting(0.0, "since the first torque that was asked for", "s", (0.0, 100.0))
+    trace: str = setting("", "file for time [ns] and commanded torque [N m]")
+
+
+class MisbehavingDevice(TorqueDevice):
+    """Follows its command by a lag of 30 Hz, until it does not."""
+
+    name = "bench device"
+
+    def __init__(self, options: MisbehavingOptions) -> None:
+        self._options = options
+        self.capabilities = Capabilities(
+            peak_torque=PEAK,
+            torque_rate=math.inf,
+            measures_torque=True,
+            simulated=False,
+            state_rate=options.rate,
+            torque_bandwidth=options.bandwidth,
+        )
+        self._torque = self._command = 0.0
+        self._at = self._first = math.inf
+        self._frozen: Reading | None = None
+        self._past: deque[tuple[float, float]] = deque()
+        self._trace = Path(options.trace) if options.trace else None
+
+    def open(self) -> None:
+        """Nothing to connect."""
+
+    def enable(self) -> None:
+        """Nothing to enable."""
+
+    def disable(self) -> None:
+        """Note it."""
+        self._note(math.nan)
+
+    def shut(self) -> None:
+        """Nothing to release."""
+
+    def exchange(self, torque: float, patience: float) -> Reading | None:
+        """Follow the command, or do what goes wrong."""
+        now = time.monotonic()
+        if torque and math.isinf(self._first):
+            self._first = now
+        does = self._options.does if now - self._first >= self._options.after else "nothing"
+        self._note(torque)
+        if does == "raise" and torque:
+            raise OSError("bus gone")
+        if does == "hold up the loop":
+            self._first = math.inf
+            time.sleep(0.2)
+        reading = Reading(self._follow(torque, now), 0.1, 0.0, 30.0)
+        if does == "answer no more":
+            time.sleep(patience)
+            return None
+        return {
+            "push 12 N m": Reading(12.0, 0.1),
+            "push the wrong way": Reading(-reading.torque, 0.1),
+            "answer 40 ms late": self._late(reading, now),
+            "repeat one reply": self._repeated(reading, does),
+            "stick at 2 rad": Reading(reading.torque, 2.0),
+            "spin": Reading(reading.torque, 0.1, 60.0),
+            "heat up": Reading(reading.torque, 0.1, 0.0, 120.0),
+            "report an error": Reading(reading.torque, 0.1, faults=(OVERHEATED,)),
+            "measure NaN": Reading(math.nan, 0.1),
+        }.get(does, reading)
+
+    def _follow(self, torque: float, now: float) -> float:
+        decay = math.exp(-2 * math.pi * 30.0 * max(now - self._at, 0.0))
+        self._torque = self._command + (self._torque - self._command) * decay
+        self._command, self._at = torque, now
+        return self._torque
+
+    def _late(self, reading: Reading, now: float) -> Reading:
+        self._past.append((now, reading.torque))
+        while len(self._past) > 1 and self._past[1][0] < now - 0.04:
+            self._past.popleft()
+        return Reading(self._past[0][1], 0.1)
+
+    def _repeated(self, reading: Reading, does: str) -> Reading:
+        if does != "repeat one reply" or self._frozen is None:
+            self._frozen = reading
+        return self._frozen
+
+    def _note(self, torque: float) -> None:
+        if self._trace is not None:
+            with self._trace.open("a") as file:
+                file.write(f"{time.time_ns()} {torque:.4f}\n")
+
+
+class MisbehavingRobot(HostTimedRobot):
+    """The robot of the tests."""
+
+    Options = MisbehavingOptions
+    Device = MisbehavingDevice

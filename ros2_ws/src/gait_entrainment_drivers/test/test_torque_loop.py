@@ -1,0 +1,209 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The torque loop: what is measured is reported once; whatever goes wrong ends in zero torque."""
+
+import math
+import os
+import signal
+import time
+
+import pytest
+from misbehaving_device import PEAK, MisbehavingOptions, MisbehavingRobot
+
+from gait_entrainment.conventions import Side
+from gait_entrainment.robot import DeviceError, PulseTrain
+from gait_entrainment.robot.guard import GuardedRobot
+from gait_entrainment.robot.stop_channel import listening, stop_all
+
+from .emulator_process import until
+
+SECOND = 1_000_000_000
+HEIGHT = 8.0
+# Limits that a loaded machine keeps; each limit has its own test.
+PATIENT = {"lateness": 0.5, "silence": 0.5, "host_silence": 3.0, "rate": 250.0}
+
+
+class Bench:
+    """A robot with its trace of commands."""
+
+    def __init__(self, tmp_path, **options):
+        self.trace = tmp_path / "trace"
+        self.trace.touch()
+        options = MisbehavingOptions(**{**PATIENT, **options}, trace=str(self.trace))
+        self.driver = MisbehavingRobot(Side.LEFT, options, 0)
+        self.robot = GuardedRobot(self.driver, Side.LEFT)
+        self.robot.configure()
+        self.robot.activate()
+        self.robot.arm()
+        self.robot.begin(time.time_ns())
+
+    def push(self, seconds=0.4, count=1):
+        onset = time.time_ns() + SECOND // 20
+        self.robot.schedule(PulseTrain(Side.LEFT, onset, 0.6, count, HEIGHT, seconds))
+
+    def commands(self):
+        rows = [
+            line.split()
+            for line in self.trace.read_text().splitlines(keepends=True)
+            if line.endswith("\n")
+        ]
+        return [(int(at), float(torque)) for at, torque in rows]
+
+    def look(self):
+        self.robot.heard()
+        return self.robot.read()
+
+    def until(self, condition):
+        until(lambda: (self.look(), condition())[1])
+
+    def faults(self):
+        return [fault.name for fault in self.robot.faults]
+
+    def pushed(self):
+        return any(torque == HEIGHT for _, torque in self.commands())
+
+
+@pytest.fixture
+def bench(tmp_path):
+    made = []
+
+    def make(**options):
+        made.append(Bench(tmp_path, **options))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.robot.close()
+
+
+@pytest.mark.parametrize(
+    ("does", "fault"),
+    [
+        ("push 12 N m", "torque_not_followed"),
+        ("push the wrong way", "torque_not_followed"),
+        ("answer 40 ms late", "torque_not_followed"),
+        ("repeat one reply", "torque_not_followed"),
+        ("stick at 2 rad", "angle_out_of_range"),
+        ("spin", "velocity_out_of_range"),
+        ("heat up", "too_hot"),
+        ("report an error", "overheated"),
+        ("measure NaN", "reading_not_finite"),
+        ("answer no more", "device_silent"),
+        ("raise", "driver_failed"),
+    ],
+)
+def test_what_a_device_does_wrong_is_a_fault_by_name_and_ends_the_torque(bench, does, fault):
+    device = bench(does=does, after=0.0)
+    device.push(count=3)
+    device.until(lambda: fault in device.faults())
+    asked = len(device.commands())
+    device.until(lambda: len(device.commands()) > asked + 20)
+    assert {torque for _, torque in device.commands()[asked:]} == {0.0}
+    with pytest.raises(DeviceError):
+        device.push()
+
+
+def test_the_error_of_a_driver_is_kept_and_zero_is_sent_on_and_on(bench):
+    device = bench(does="raise")
+    device.push()
+    device.until(lambda: device.robot.faults)
+    assert "OSError: bus gone" in device.robot.faults[0].meaning
+    asked = len(device.commands())
+    device.until(lambda: len(device.commands()) > asked + 250)  # for longer than a second
+
+
+def test_a_device_that_does_what_it_is_asked_raises_no_fault(bench):
+    device = bench(rate=500.0)
+    device.push(seconds=0.1, count=5)
+    device.until(
+        lambda: device.robot.delivered == 5 or device.robot.promise(time.time_ns()) is None
+    )
+    assert device.faults() == []
+
+
+def test_a_loop_that_is_held_up_is_a_fault(bench):
+    device = bench(does="hold up the loop", lateness=0.05)
+    device.push()
+    device.until(lambda: "host_loop_late" in device.faults())
+
+
+def test_a_parent_that_is_silent_ends_the_torque(bench):
+    device = bench(host_silence=0.1)
+    device.push(seconds=0.5, count=20)
+    device.until(device.pushed)
+    commands = len(device.commands())
+    until(lambda: len(device.commands()) > commands + 100)  # nobody reads meanwhile
+    device.until(lambda: "host_silent" in device.faults())
+    assert device.commands()[-1][1] == 0.0
+
+
+def test_a_loop_that_was_killed_is_told(bench):
+    device = bench()
+    device.push()
+    device.until(device.pushed)
+    os.kill(device.driver._process.pid, signal.SIGKILL)
+    device.until(lambda: "torque_loop_ended" in device.faults())
+    assert math.isnan(device.look()[-1].measured if device.look() else math.nan)
+
+
+def test_signals_of_a_terminal_do_not_end_the_loop(bench):
+    device = bench()
+    for number in (signal.SIGINT, signal.SIGHUP, signal.SIGTSTP, signal.SIGQUIT):
+        os.kill(device.driver._process.pid, number)
+    device.push()
+    device.until(device.pushed)
+    assert device.faults() == []
+
+
+def test_a_stop_needs_no_ros_and_answers_with_what_was_measured(bench):
+    device = bench()
+    device.push(seconds=0.5, count=20)
+    device.until(device.pushed)
+    answer = next(a for name, a in stop_all().items() if name.startswith("bench_device/"))
+    assert answer.done
+    assert "N m measured" in answer.message
+    device.until(lambda: "stopped" in device.faults())
+    assert device.commands()[-1][1] == 0.0
+
+
+def test_a_stop_of_a_motor_that_goes_on_pushing_says_to_cut_the_power(bench):
+    device = bench(does="push 12 N m", torque_band=1.0)
+    device.push(seconds=0.5, count=20)
+    device.until(device.pushed)
+    answer = next(a for name, a in stop_all().items() if name.startswith("bench_device/"))
+    assert not answer.done
+    assert "+12.00 N m measured: cut the power" in answer.message
+    device.until(lambda: "torque_not_falling" in device.faults())
+
+
+def test_a_frozen_loop_gives_no_answer(bench):
+    device = bench()
+    pid = device.driver._process.pid
+    os.kill(pid, signal.SIGSTOP)
+    try:
+        assert stop_all(0.2)[f"bench_device/{pid}"] is None
+    finally:
+        os.kill(pid, signal.SIGCONT)
+
+
+def test_a_closed_robot_listens_no_more(bench):
+    device = bench()
+    name = f"bench_device/{device.driver._process.pid}"
+    assert name in listening()
+    device.robot.close()
+    assert name not in listening()
+
+
+def test_the_last_thing_before_disabling_is_zero(bench):
+    device = bench()
+    device.push()
+    device.until(device.pushed)
+    device.robot.deactivate()
+    *commands, disabled = [torque for _, torque in device.commands()]
+    assert math.isnan(disabled)
+    assert commands[-5:] == [0.0] * 5
+
+
+def test_peak_of_the_bench_device_is_above_what_is_asked_for():
+    assert HEIGHT < PEAK
