@@ -30,6 +30,9 @@ class Pulses(NamedTuple):
     torque: float
 
 
+NO_PULSES = Pulses(np.empty(0, np.int64), 1, 0.0)
+
+
 class Walk(NamedTuple):
     """Events [s] of a walk: heel strikes from number 0 on, and the toe-off after each."""
 
@@ -42,7 +45,7 @@ class Walk(NamedTuple):
 def walk(
     model: Model,
     steps: int,
-    pulses: Pulses | None = None,
+    pulses: Pulses = NO_PULSES,
     initial_apex: float | None = None,
     stiffness: Floats | None = None,
 ) -> Walk:
@@ -70,10 +73,8 @@ def walk(
     return Walk(np.append(0.0, heel_strikes[:strikes]), toe_offs[:offs], ending)
 
 
-def _torque_changes(pulses: Pulses | None) -> tuple[Stamps, Floats]:
+def _torque_changes(pulses: Pulses) -> tuple[Stamps, Floats]:
     """Changes of both sides as `trajectory` wants them, the left one first and never perturbed."""
-    if pulses is None:
-        return np.array([EVER, EVER]), np.zeros(2)
     onsets = np.asarray(pulses.onsets, np.int64)
     if pulses.width <= 0 or np.any(np.diff(onsets) < pulses.width):
         raise ValueError(f"pulses of {pulses.width} ns must be wider than 0 and not overlap")

@@ -27,7 +27,7 @@ from gait_entrainment.geometry import torque_work
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.walker import EndingKind
 from gait_entrainment.walker.model import Floats, make_model
-from gait_entrainment_studies.walks import Pulses, walk
+from gait_entrainment_studies.walks import NO_PULSES, Pulses, walk
 
 Seed = int | tuple[int, ...]
 
@@ -52,11 +52,11 @@ class PulseTrains:
     torque: Floats
     width: float
 
-    def of(self, walker: int) -> Pulses | None:
-        """Return the pulses of one walker; None if it fell before they were planned."""
+    def of(self, walker: int) -> Pulses:
+        """Return the pulses of one walker; none if it fell before they were planned."""
         onsets = self.first_onset[walker] + np.arange(self.count) * self.period[walker]
         if not np.isfinite(onsets).all():
-            return None
+            return NO_PULSES
         stamps = np.rint(onsets * NANOSECONDS_PER_SECOND).astype(np.int64)
         return Pulses(stamps, nanoseconds(self.width), float(self.torque[walker]))
 
@@ -131,7 +131,7 @@ class Population:
         endings: list[EndingKind | None] = []
         for index, model in enumerate(self._models):
             one = model.copy()
-            pulses = None if trains is None else trains.of(index)
+            pulses = NO_PULSES if trains is None else trains.of(index)
             walked = walk(
                 one, steps, pulses, apex[index], one["ankle_stiffness"] * factors[:, index]
             )

@@ -169,15 +169,9 @@ def _trial(
     fraction, runs = math.nan, list[int]()
     if np.isfinite(lock):
         fraction, runs = locked_runs(lags, lock, _LOCKED_WITHIN * measured)
-    return Trial(
-        subject,
-        offset,
-        measured,
-        last.name.lower(),
-        fraction,
-        float(np.mean(runs)) if runs else math.nan,
-        float(np.median(lags[-20:])) if lags.size else math.nan,
-    )
+    mean_run = float(np.mean(runs)) if runs else math.nan
+    lag = float(np.median(lags[-20:])) if lags.size else math.nan
+    return Trial(subject, offset, measured, last.name.lower(), fraction, mean_run, lag)
 
 
 def _events(strikes: Floats, toe_offs: Floats) -> list[GaitEvent]:

@@ -67,8 +67,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Draw, conduct, judge, print."""
-    names = [item.name for item in fields(SubjectDistributions)]
-    distributions = SubjectDistributions(*(tuple(getattr(options, name)) for name in names))
+    drawn = (tuple(getattr(options, item.name)) for item in fields(SubjectDistributions))
+    distributions = SubjectDistributions(*drawn)
     texts = options.period_offset or _OFFSETS
     offsets = [_PERIOD_OFFSET.parse("period_offset", text) for text in texts]
     plan = question.chosen(options, StudyPlan, period_offsets=tuple(dict.fromkeys(offsets)))

@@ -121,8 +121,7 @@ def answer(
 ) -> int:
     """Print the answer, write its files if a folder is given and print their paths; return 0."""
     print(json.dumps(outcome) if options.json else text)
-    paths = [] if options.out is None else write(options.out)
-    if not options.json:
-        for path in paths:
+    for path in write(options.out) if options.out is not None else ():
+        if not options.json:
             print(f"{label}{path}")
     return 0

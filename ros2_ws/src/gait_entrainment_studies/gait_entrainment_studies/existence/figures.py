@@ -4,6 +4,7 @@
 """For which stiffness and leg angle a period-one gait exists, as a picture."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -27,10 +28,9 @@ def draw_existence(
     axes.plot(angles, most, color=ORANGE, ls="--", lw=1.8, label="just flies off: above it, lifts")
     here = np.degrees(walker.leg_angle)
     axes.plot([here], [walker.ankle_stiffness], "*", color="black", ms=11, label="this walker")
-    for index in range(1, len(ranges)):
-        before, after = ranges[index - 1], ranges[index]
+    for angle, (before, after) in zip(angles[1:], pairwise(ranges), strict=True):
         if before.falls_at is not after.falls_at or before.flies_off_at is not after.flies_off_at:
-            axes.axvline(angles[index], color=GREY, ls=":", lw=0.8)
+            axes.axvline(angle, color=GREY, ls=":", lw=0.8)
     axes.plot([], [], color=GREY, ls=":", lw=0.8, label="another instant decides")
     axes.set(xlabel="leg angle at heel strike [deg]", ylabel="ankle stiffness [N m/rad]", ylim=0)
     axes.set_title("Where a period-one gait exists", fontsize=11)

@@ -9,6 +9,7 @@ leg would have to pull. Both are closed forms but for a search over double stanc
 """
 
 import math
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from enum import Enum
 
@@ -86,8 +87,6 @@ def existence_map(parameters: WalkerParameters, points: int = 200) -> list[Stiff
     least = math.asin(parameters.foot_length / (2 * parameters.leg_length))
     ranges = []
     for leg_angle in np.linspace(least, math.pi / 4, points + 2)[1:-1]:
-        try:
+        with suppress(ParameterError):
             ranges.append(stiffness_range(parameters, float(leg_angle)))
-        except ParameterError:
-            continue
     return ranges

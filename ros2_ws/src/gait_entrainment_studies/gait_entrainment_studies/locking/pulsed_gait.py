@@ -248,9 +248,8 @@ class PulsedGait:
 
     def _pulse_torque(self, angle: Floats) -> Floats:
         """Torque that the pulse adds at an ankle angle: all of it, or what the spring leaves."""
-        torque: Floats = np.maximum(
-            self.torque, -self.parameters.ankle_stiffness * (self.toe_off - angle)
-        )
+        spring = self.parameters.ankle_stiffness * (self.toe_off - angle)
+        torque: Floats = np.maximum(self.torque, -spring)
         return torque
 
     def _pulse_gain(self, start: Floats, angle: Floats) -> Floats:

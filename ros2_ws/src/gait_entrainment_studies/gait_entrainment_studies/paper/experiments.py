@@ -16,7 +16,6 @@ from gait_entrainment_studies.locking.roots import Floats
 from gait_entrainment_studies.locking.walked import Outcome, PulsedWalk, walk_under_pulses
 
 PULSE_WIDTH = 0.1
-TORQUE_FRACTION = 0.1
 
 # This long before a collision [ns] the walker is certainly in single stance.
 _BEFORE_STRIKE = 10**6
@@ -26,8 +25,7 @@ _LONGEST_STEP = 4 * 10**9
 
 def paper_pulses(parameters: WalkerParameters, steps_per_pulse: int = 2) -> PulsedGait:
     """Return the gaits under the paper's pulses: 0.1 s, a tenth of the peak ankle torque."""
-    torque = TORQUE_FRACTION * parameters.peak_torque
-    return PulsedGait(parameters, torque, PULSE_WIDTH, steps_per_pulse)
+    return PulsedGait(parameters, 0.1 * parameters.peak_torque, PULSE_WIDTH, steps_per_pulse)
 
 
 def paper_walk(

@@ -18,7 +18,6 @@ from gait_entrainment_studies.sweep.row import StableInterval
 
 _PERIOD = r"pulse period $\tau_p - 2\tau_0$ [ms]"
 _TORQUE = "torque of the pulse / peak ankle torque"
-_COLOURS = {place.value: colour for place, colour in PLACE_COLOURS.items()}
 
 
 def draw_tongue(
@@ -27,7 +26,7 @@ def draw_tongue(
     """Draw the exact map and the walked one, with the exact borders over both."""
     figure, (left, right) = drawing.new_figure(1, 2, size=(9.6, 4.6), sharex=True, sharey=True)
     for place in dict.fromkeys(one.place for one in borders):
-        colour = _COLOURS[place]
+        colour = PLACE_COLOURS[place]
         for pair in _neighbours([one for one in borders if one.place == place]):
             low, high = [one.shortest * 1e3 for one in pair], [one.longest * 1e3 for one in pair]
             heights = [one.torque_fraction for one in pair]
@@ -35,7 +34,7 @@ def draw_tongue(
             for axes, line in ((left, BLACK), (right, "white")):
                 axes.plot(low, heights, color=line, lw=0.8)
                 axes.plot(high, heights, color=line, lw=0.8)
-        left.fill_between([], [], [], color=colour, alpha=0.35, label=f"stable: {place}")
+        left.fill_between([], [], [], color=colour, alpha=0.35, label=f"stable: {place.value}")
     offsets, fractions = plan.period_offsets.values * 1e3, plan.torque_fractions.values
     share = _cells(plan, table, "share_locked")
     _draw_map(plan, right, share, "share of the initial phases", vmin=0, vmax=1, cmap="cividis")

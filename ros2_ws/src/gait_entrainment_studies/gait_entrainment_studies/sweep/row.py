@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment_studies.locking.branches import pieces_of, stable_intervals
-from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
+from gait_entrainment_studies.locking.pulsed_gait import Place, PulsedGait
 from gait_entrainment_studies.locking.roots import Floats
 from gait_entrainment_studies.locking.walked import Outcome, walk_under_pulses
 from gait_entrainment_studies.sweep.plan import SweepPlan
@@ -68,10 +68,8 @@ def sweep_row(plan: SweepPlan, index: int) -> Row:
         else:
             walked = _walked(plan, torque, period)
         cells.append(Cell(torque, fraction, float(offset), locks, **walked))
-    return {
-        field.name: np.array([getattr(cell, field.name) for cell in cells])
-        for field in fields(Cell)
-    }
+    names = [field.name for field in fields(Cell)]
+    return {name: np.array([getattr(cell, name) for cell in cells]) for name in names}
 
 
 def _walked(plan: SweepPlan, torque: float, period: float) -> dict[str, float]:
@@ -95,7 +93,7 @@ class StableInterval:
     """Pulse periods with a stable lock at one torque, off the unperturbed stride period [s]."""
 
     torque_fraction: float
-    place: str
+    place: Place
     shortest: float
     shortest_border: str
     lag_at_shortest: float
@@ -116,5 +114,5 @@ def exact_borders(
                 (end.period - gait.unperturbed_period, end.border.value, end.lag)
                 for end in (piece.least_period, piece.greatest_period)
             )
-            found.append(StableInterval(fraction, piece.place.value, *shortest, *longest))
+            found.append(StableInterval(fraction, piece.place, *shortest, *longest))
     return found

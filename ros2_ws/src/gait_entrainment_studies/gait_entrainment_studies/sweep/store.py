@@ -60,10 +60,10 @@ class SweepStore:
 
     def _refuse_another(self, description: Path) -> None:
         try:
-            stored = _flat(json.loads(description.read_bytes()))
+            stored = dict(_flat(json.loads(description.read_bytes())))
         except ValueError:
             raise UsageError(f"{description} is damaged: choose another folder") from None
-        wanted = _flat(self._provenance)
+        wanted = dict(_flat(self._provenance))
         for name in [*wanted, *stored]:
             if stored.get(name) != wanted.get(name):
                 raise UsageError(
@@ -78,14 +78,13 @@ def read_sweep(path: Path) -> tuple[Any, dict[str, Any]]:
     return table, json.loads(table.schema.metadata[_METADATA])
 
 
-def _flat(nested: dict[str, Any], prefix: str = "") -> dict[str, Any]:
-    flat: dict[str, Any] = {}
+def _flat(nested: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the values by their dotted names."""
     for name, value in nested.items():
         if isinstance(value, dict):
-            flat |= _flat(value, f"{prefix}{name}.")
+            yield from _flat(value, f"{prefix}{name}.")
         else:
-            flat[prefix + name] = value
-    return flat
+            yield prefix + name, value
 
 
 def _readable(part: Path) -> bool:
