@@ -18,6 +18,8 @@ QUALITIES = {
     "drawing": topics.DRAWING,
     "latest description": topics.LATEST_DESCRIPTION,
     "looking on": topics.LOOKING_ON,
+    "latched state": topics.LATCHED_STATE,
+    "heartbeat": topics.HEARTBEAT,
 }
 
 

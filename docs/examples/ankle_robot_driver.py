@@ -18,7 +18,8 @@ from gait_entrainment.robot import (
     RobotState,
     TorqueProfile,
 )
-from gait_entrainment_drivers.conformance import run_checks
+from gait_entrainment_drivers.conformance.bench import DriverBench, run_check
+from gait_entrainment_drivers.conformance.checks import CHECKS
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,6 @@ class SquareRobot(AnkleRobot):
     capabilities = Capabilities(
         peak_torque=30.0,  # N m
         torque_rate=math.inf,
-        own_pulse_timer=True,
         measures_torque=True,
         simulated=True,
         state_rate=0.0,  # one state for each change of torque
@@ -82,5 +82,7 @@ class SquareRobot(AnkleRobot):
 
 
 if __name__ == "__main__":
-    for result in run_checks(Driver("square", SquareRobot, Options())):
+    bench = DriverBench(Driver("square", SquareRobot, Options()))
+    for check in CHECKS:
+        result = run_check(check, bench)
         print(f"{result.check:26} {result.broken or 'kept'}")

@@ -66,7 +66,7 @@ class Link:
             if the other side has ended.
 
         """
-        messages = []
+        messages: list[Any] = []
         while True:
             try:
                 packet = self._socket.recv(_LARGEST_PACKET)

@@ -33,7 +33,7 @@ from gait_entrainment.robot.faults import (
     Fault,
 )
 from gait_entrainment.robot.pulse_train import PulseTrain
-from gait_entrainment.robot.stop_channel import StopAnswer, StopListener
+from gait_entrainment.stop_channel import StopAnswer, StopListener
 from gait_entrainment_drivers.device import Reading, TorqueDevice
 from gait_entrainment_drivers.link import Link, Sample
 from gait_entrainment_drivers.monitor import NOT_FALLING, Monitor
@@ -87,7 +87,8 @@ class TorqueLoop:
                 if self._enabled:
                     self._tick()
                 else:
-                    select.select([self._link, self._stop_channel], [], [], _IDLE_PERIOD)
+                    ends: list[Link | StopListener] = [self._link, self._stop_channel]
+                    select.select(ends, [], [], _IDLE_PERIOD)
                     self._listen()
         finally:
             self._disable()

@@ -14,7 +14,7 @@ from misbehaving_device import PEAK, MisbehavingOptions, MisbehavingRobot
 from gait_entrainment.conventions import Side
 from gait_entrainment.robot import DeviceError, PulseTrain
 from gait_entrainment.robot.guard import GuardedRobot
-from gait_entrainment.robot.stop_channel import listening, stop_all
+from gait_entrainment.stop_channel import listening, stop_all
 
 from .emulator_process import until
 

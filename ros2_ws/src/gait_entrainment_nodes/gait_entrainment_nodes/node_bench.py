@@ -118,10 +118,11 @@ class _NodeRobot:
         simulated = self.capabilities.simulated
         horizon = until if simulated else until + LEAD
         run, patience = (self.run, PATIENCE) if self._active else (self.run + 1, SILENCE)
-        pieces, onsets = [], []
+        pieces: list[tuple[int, int, float]] = []
+        onsets: list[int] = []
         if self._promised_until < until:  # a horizon without length would end the run
-            stamps = {"header": header(self._promised_until), "until": to_time(horizon)}
-            self._horizons.publish(Horizon(run=run, **stamps))
+            begin, end = header(self._promised_until), to_time(horizon)
+            self._horizons.publish(Horizon(header=begin, run=run, until=end))
         while self._promised_until < until:
             if not self.client.wait(lambda: self._profiles, patience):
                 raise DeviceError(f"A horizon was not answered within {patience:g} s.")
@@ -220,13 +221,13 @@ class NodeBench(Bench):
 
     def __init__(self, robot: _NodeRobot, side: Side, tolerances: Tolerances) -> None:
         super().__init__(side, tolerances)
-        self.robot = robot
+        self.robot = self._node = robot
 
     def make(self, *, guarded: bool) -> _NodeRobot:  # noqa: ARG002
         """Return the node, unconfigured: it makes its robot anew when it is configured."""
         with suppress(DeviceError):
-            self.robot.close()
-        return self.robot
+            self._node.close()
+        return self._node
 
     def stop(self) -> None:
         """Call the stop service."""
@@ -234,8 +235,12 @@ class NodeBench(Bench):
 
     def wait_for(self, condition: Callable[[], object]) -> bool:
         """Whether something is so; waits for messages that may show it."""
-        client, read = self.robot.client, self.robot.read
-        return bool(client.wait(lambda: self.states.extend(read()) or condition(), PATIENCE))
+
+        def shown() -> object:
+            self.states.extend(self.robot.read())
+            return condition()
+
+        return bool(self.robot.client.wait(shown, PATIENCE))
 
     def require_delivered(self, train: PulseTrain) -> None:
         """See that every pulse is reported and announced once, and the goal ends as delivered."""

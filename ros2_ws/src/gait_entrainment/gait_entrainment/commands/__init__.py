@@ -20,7 +20,6 @@ import argparse
 import importlib
 import sys
 from collections.abc import Sequence
-from importlib.metadata import entry_points
 
 from gait_entrainment.errors import EntrainmentError
 
@@ -87,5 +86,8 @@ def add_command(parser: argparse.ArgumentParser, module_name: str) -> None:
 
 def _find_packages() -> dict[str, dict[str, str]]:
     """Return the commands with their purposes, by the package that they are in."""
+    # Loaded here: a command of the core does without, and entrain stop is in a hurry.
+    from importlib.metadata import entry_points
+
     points = sorted(entry_points(group=ENTRY_POINTS), key=lambda point: point.name)
     return {__name__: COMMANDS} | {point.value: point.load().COMMANDS for point in points}

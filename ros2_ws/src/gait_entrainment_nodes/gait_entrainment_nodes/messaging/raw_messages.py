@@ -60,16 +60,18 @@ def serialize(message: Any) -> bytes:
 
 
 def _clear_message(data: bytearray, place: int, message: Any) -> int:
-    for name, clear in _clear_fields(message.__class__):
+    kind: type = type(message)
+    for name, clear in _clear_fields(kind):
         place = clear(data, place, getattr(message, name))
     return place
 
 
 @cache
-def _clear_fields(message_type: Any) -> tuple[tuple[str, _Clear], ...]:
-    names = message_type.get_fields_and_field_types()
+def _clear_fields(message_type: type) -> tuple[tuple[str, _Clear], ...]:
+    described: Any = message_type
+    names = described.get_fields_and_field_types()
     return tuple(
-        (name, _clear_for(kind)) for name, kind in zip(names, message_type.SLOT_TYPES, strict=True)
+        (name, _clear_for(kind)) for name, kind in zip(names, described.SLOT_TYPES, strict=True)
     )
 
 

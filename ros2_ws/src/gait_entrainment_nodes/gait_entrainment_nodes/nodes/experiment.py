@@ -47,6 +47,9 @@ from gait_entrainment_nodes.nodes.waiting import Waiting
 
 # How long each step of ending a failed run may take [s]: who fails may not answer any more.
 FAREWELL = 0.5
+# How long a node may take to do what it is asked for before and after a run, such as to enable a
+# device [s]. In a run silence_timeout counts.
+ANSWER_TIMEOUT = 5.0
 
 _TRANSITIONS = {
     Transition.TRANSITION_CONFIGURE: "be configured",
@@ -170,7 +173,7 @@ class Experiment(Participant):
         await self._waiting.until(lambda: run.over)
         if run.failure is not None:
             raise run.failure
-        await self._close(run, self.settings.silence_timeout)
+        await self._close(run, ANSWER_TIMEOUT)
         # The answer came after any stop: to walk to the end without torque is no success.
         if run.stopped_at is not None:
             await self._wait_for_reason(run)
@@ -250,10 +253,10 @@ class Experiment(Participant):
     async def _answer(
         self, client: Any, request: Any, node: str, timeout: float | None = None
     ) -> Any:
-        """Return a node's answer; wait for it a time [s], by default the silence timeout."""
+        """Return a node's answer; wait for it a time [s], by default as long as it may take."""
         call = client.call_async(request)
         silence = ExperimentError(f"{node} does not answer", node)
-        timeout = self.settings.silence_timeout if timeout is None else timeout
+        timeout = ANSWER_TIMEOUT if timeout is None else timeout
         await self._waiting.until(call.done, timeout, silence)
         return call.result()
 

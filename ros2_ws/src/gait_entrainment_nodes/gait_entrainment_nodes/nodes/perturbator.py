@@ -30,8 +30,8 @@ from gait_entrainment.robot import (
     find_driver,
 )
 from gait_entrainment.robot.faults import NOT_STOPPED, OPERATOR_SILENT
-from gait_entrainment.robot.stop_channel import StopAnswer
 from gait_entrainment.settings import setting
+from gait_entrainment.stop_channel import StopAnswer
 from gait_entrainment_msgs.action import DeliverPulseTrain
 from gait_entrainment_msgs.msg import Horizon, Trouble
 from gait_entrainment_nodes.messaging import topics
