@@ -19,7 +19,7 @@ from gait_entrainment.simulation import simulate
 from gait_entrainment_bags import BagReader, BagWriter, TopicInfo, find_definition
 from gait_entrainment_msgs import msg
 from gait_entrainment_nodes.messaging.domain import claimed_domain
-from gait_entrainment_nodes.messaging.raw_messages import MessageTemplate, mark, serialize
+from gait_entrainment_nodes.messaging.raw_messages import MessageTemplate, serialize
 from gait_entrainment_nodes.messaging.stamps import header, to_time
 
 pytestmark = pytest.mark.benchmark
@@ -118,11 +118,10 @@ def one_hour(folder: Path) -> Path:
         "/joint_states": JointState,
         "/ankle_torque": msg.AnkleTorque,
     }
-    four = [mark(0), 0.0, 0.0, 0.0]
     states = MessageTemplate(
-        JointState(name=["l_hip", "r_hip", "l_ankle", "r_ankle"], position=four), {"position": 4}
+        JointState(name=["l_hip", "r_hip", "l_ankle", "r_ankle"]), {"position": 4}
     )
-    torques = MessageTemplate(msg.AnkleTorque(intrinsic=[mark(0), 0.0]), {"intrinsic": 2})
+    torques = MessageTemplate(msg.AnkleTorque(), {"intrinsic": 2})
     with BagWriter(
         folder, ros_distro="jazzy", custom_data={"protocol": write_protocol(protocol)}
     ) as writer:
@@ -152,8 +151,8 @@ def one_hour(folder: Path) -> Path:
             stamps = end + np.arange(1000) * 1_000_000
             angle = np.sin(stamps / 2e8)[:, None] * [1.0, -1.0, 0.5, 0.3]
             for name, messages in (
-                ("/joint_states", states.fill(stamps, position=angle)),
-                ("/ankle_torque", torques.fill(stamps, intrinsic=angle[:, :2])),
+                ("/joint_states", states.fill(stamps, angle)),
+                ("/ankle_torque", torques.fill(stamps, angle[:, :2])),
             ):
                 for message, stamp in zip(messages, stamps.tolist(), strict=True):
                     writer.write(name, message, stamp, end)

@@ -69,13 +69,14 @@ class Bench:
         return self.run.failure
 
     def walk_to_planning(self):
-        """Walk until the pulses have been requested."""
+        """Walk until the pulses have been requested; return the instant of the next strike."""
         instant = 10 * SECOND
         while not self.trains:
             self.promise()
             self.strike(instant)
             self.report(instant)
             instant += SECOND
+        return instant
 
 
 @pytest.fixture
@@ -108,12 +109,12 @@ def test_each_progress_is_answered_once_all_that_it_covers_is_here(bench):
 
 
 def test_nothing_is_promised_while_pulses_are_requested(bench):
-    bench.walk_to_planning()
+    instant = bench.walk_to_planning()
     (train,) = bench.trains
     assert train.count == 1
     count = len(bench.horizons)
     bench.promise()
-    bench.report(20 * SECOND)
+    bench.report(instant)
     assert len(bench.horizons) == count
     bench.run.take_answer(True)
     assert len(bench.horizons) == count + 1

@@ -4,9 +4,10 @@
 """One run of the analyzer: when it is complete, and what it says of doubtful events."""
 
 from gait_entrainment.conventions import EventKind, Side
-from gait_entrainment.gait import GaitEvent, PulsePhase, Stride, VerdictSettings
+from gait_entrainment.gait import PulsePhase, Stride, VerdictSettings
 from gait_entrainment.messages import nanoseconds_of
-from gait_entrainment.robot import RobotState, TorqueProfile
+from gait_entrainment_msgs.msg import AnkleRobotState, GaitEvent, Progress, TorqueProfile
+from gait_entrainment_nodes.messaging.stamps import header, to_time
 from gait_entrainment_nodes.nodes.gait_analyzer_run import RESULTS, Run
 
 SECOND = 10**9
@@ -20,13 +21,21 @@ def gait(strides):
     """Return the events of a gait whose steps take a second each, the right leg first."""
     for step in range(2 * strides + 1):
         side = Side.LEFT if step % 2 else Side.RIGHT
-        yield GaitEvent(step * SECOND, EventKind.HEEL_STRIKE, side, step)
-        toe_off = step * SECOND + SECOND // 4
-        yield GaitEvent(toe_off, EventKind.TOE_OFF, side.other, step + 1)
+        kind = EventKind.HEEL_STRIKE
+        yield GaitEvent(header=header(step * SECOND), kind=kind, side=side, step=step)
+        toe_off = header(step * SECOND + SECOND // 4)
+        kind = EventKind.TOE_OFF
+        yield GaitEvent(header=toe_off, kind=kind, side=side.other, step=step + 1)
 
 
 def promise(begin, until, *onsets):
-    return TorqueProfile(Side.RIGHT, (begin,), (0.0,), onsets, until)
+    times, torques = [to_time(begin)], [0.0]
+    values = {"times": times, "torques": torques, "onsets": [to_time(t) for t in onsets]}
+    return TorqueProfile(header=header(begin), valid_until=to_time(until), side=1, **values)
+
+
+def end(instant, events):
+    return Progress(header=header(instant), events=events, state=Progress.FINISHED)
 
 
 def test_run_is_complete_once_events_and_onsets_are_here_whichever_comes_last():
@@ -39,14 +48,14 @@ def test_run_is_complete_once_events_and_onsets_are_here_whichever_comes_last():
         if last != "promise":
             results += analyzed.add_profile(promise(0, 9 * SECOND, 3 * SECOND))
         if last != "end":
-            analyzed.end_at(9 * SECOND, len(events))
+            analyzed.add_progress(end(9 * SECOND, len(events)))
         assert not analyzed.complete
         if last == "event":
             results += analyzed.add_event(events[-1])
         elif last == "promise":
             results += analyzed.add_profile(promise(0, 9 * SECOND, 3 * SECOND))
         else:
-            analyzed.end_at(9 * SECOND, len(events))
+            analyzed.add_progress(end(9 * SECOND, len(events)))
         assert analyzed.complete
         results += analyzed.finish(9 * SECOND)
         strides = [result for result in results if isinstance(result, Stride)]
@@ -59,12 +68,12 @@ def test_measured_onsets_are_complete_with_the_state_at_the_closing_instant():
     analyzed = run(measured=True)
     for event in gait(2):
         analyzed.add_event(event)
-    analyzed.end_at(5 * SECOND, 10)
+    analyzed.add_progress(end(5 * SECOND, 10))
     analyzed.add_profile(promise(0, 5 * SECOND))
     assert not analyzed.complete
     analyzed.add_profile(promise(5 * SECOND, 5 * SECOND))  # without length: the run is closed
     assert not analyzed.complete
-    analyzed.add_state(RobotState(5 * SECOND, 0.0, 0.0, float("nan")))
+    analyzed.add_state(AnkleRobotState(header=header(5 * SECOND)))
     assert analyzed.complete
 
 
@@ -91,3 +100,12 @@ def test_message_of_a_result_carries_the_run():
     assert (message.run, message.side, message.number) == (2, Side.RIGHT, 1)
     assert nanoseconds_of(message.header.stamp) == 2 * SECOND
     assert nanoseconds_of(message.start) == 0
+
+
+def test_stop_voids_what_was_promised():
+    analyzed = run()
+    analyzed.add_profile(promise(0, 6 * SECOND, 3 * SECOND, 5 * SECOND))
+    analyzed.add_profile(TorqueProfile(header=header(4 * SECOND), stop=True))
+    results = [result for event in gait(4) for result in analyzed.add_event(event)]
+    results += analyzed.finish(9 * SECOND)
+    assert [r.onset for r in results if isinstance(r, PulsePhase)] == [3 * SECOND]

@@ -8,8 +8,8 @@ import struct
 from functools import cache
 
 import numpy as np
-import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import WrenchStamped
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
@@ -19,7 +19,7 @@ from sensor_msgs.msg import JointState
 
 from gait_entrainment_bags import find_definition
 from gait_entrainment_msgs.msg import AnkleRobotState, TorqueProfile
-from gait_entrainment_nodes.messaging.raw_messages import MessageTemplate, mark, serialize
+from gait_entrainment_nodes.messaging.raw_messages import MessageTemplate, serialize
 from gait_entrainment_nodes.messaging.stamps import header, to_time
 
 derandomized = settings(derandomize=True, deadline=None, max_examples=60)
@@ -115,15 +115,10 @@ def test_filled_template_is_what_ros_serializes(table):
     instants, position, effort = table
     names = ["l_hip", "r_hip", "l_ankle", "r_ankle"]
     template = MessageTemplate(
-        JointState(
-            name=names,
-            position=[mark(0), 0.0, 0.0, 0.0],
-            velocity=[2.5] * 4,
-            effort=[mark(1), 0.0, 0.0, 0.0],
-        ),
+        JointState(name=names, velocity=[2.5] * 4),
         {"position": 4, "effort": 4},
     )
-    messages = list(template.fill(instants, position=position, effort=effort))
+    messages = list(template.fill(instants, position, effort))
     assert len(messages) == len(instants)
     for k, data in enumerate(messages):
         expected = JointState(
@@ -138,16 +133,17 @@ def test_filled_template_is_what_ros_serializes(table):
 
 
 def test_numbers_that_are_not_numbers_pass_through():
-    template = MessageTemplate(JointState(position=[mark(0)]), {"position": 1})
-    (data,) = template.fill(np.array([7]), position=np.array([[math.nan]]))
+    template = MessageTemplate(JointState(), {"position": 1})
+    (data,) = template.fill(np.array([7]), np.array([[math.nan]]))
     assert math.isnan(deserialize_message(data, JointState).position[0])
 
 
-def test_mark_that_is_missing_or_doubled_is_refused():
-    with pytest.raises(ValueError, match="position is not marked exactly once"):
-        MessageTemplate(JointState(position=[1.0]), {"position": 1})
-    with pytest.raises(ValueError, match="position is not marked exactly once"):
-        MessageTemplate(JointState(position=[mark(0)], effort=[mark(0)]), {"position": 1})
+def test_nested_numbers_are_filled_where_they_adjoin():
+    template = MessageTemplate(WrenchStamped(), {"wrench.force.x": 3})
+    (data,) = template.fill(np.array([7]), np.array([[1.0, 2.0, 3.0]]))
+    wrench = deserialize_message(data, WrenchStamped).wrench
+    assert (wrench.force.x, wrench.force.y, wrench.force.z) == (1.0, 2.0, 3.0)
+    assert wrench.torque.x == 0.0
 
 
 def test_stamp_lies_where_the_recorder_looks_for_it():

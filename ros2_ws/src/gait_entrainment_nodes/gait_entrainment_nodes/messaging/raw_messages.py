@@ -15,7 +15,7 @@ on a whole stretch of samples becomes one array of bytes.
 
 import importlib
 from collections.abc import Callable, Iterator, Mapping
-from functools import cache
+from functools import cache, reduce
 from typing import Any
 
 import numpy as np
@@ -113,11 +113,6 @@ def _align(data: bytearray, place: int, size: int) -> int:
     return place + gap
 
 
-def mark(number: int) -> float:
-    """Return the double that marks field ``number`` (from 0) of a template."""
-    return float(np.array(_MARK + number, np.uint64).view(np.float64))
-
-
 class MessageTemplate:
     """
     The bytes of one message, ready to be filled with other numbers.
@@ -125,30 +120,35 @@ class MessageTemplate:
     Parameters
     ----------
     message
-        A ROS message with a header, whose changing doubles hold marks: ``mark(i)`` in the first
-        element of field i, the elements of one field being adjacent.
+        A ROS message with a header.
     fields
-        Name and number of elements of each field, in the order of the marks.
+        The names of the doubles that change, with dots for nested ones, and how many there are:
+        the length of an array, or how many doubles adjoin from that field on.
 
     """
 
     def __init__(self, message: Any, fields: Mapping[str, int]) -> None:
-        message.header.stamp.sec, message.header.stamp.nanosec = 0, 0
-        self._bytes = np.frombuffer(serialize(message), np.uint8)
-        content = self._bytes.tobytes()
-        names, formats, offsets = ["sec", "nanosec"], ["<i4", "<u4"], [4, 8]
         for number, (name, length) in enumerate(fields.items()):
-            pattern = (_MARK + number).to_bytes(8, "little")
-            if content.count(pattern) != 1:
-                raise ValueError(f"field {name} is not marked exactly once in the template")
-            names.append(name)
-            formats.append(f"({length},)<f8")
-            offsets.append(content.index(pattern))
+            mark = float(np.array(_MARK + number, np.uint64).view(np.float64))
+            *parents, last = name.split(".")
+            owner = reduce(getattr, parents, message)
+            one = isinstance(getattr(owner, last), float)
+            setattr(owner, last, mark if one else [mark, *[0.0] * (length - 1)])
+        message.header.stamp.sec, message.header.stamp.nanosec = 0, 0
+        content = serialize(message)
+        self._bytes = np.frombuffer(content, np.uint8)
+        places = [content.index((_MARK + i).to_bytes(8, "little")) for i in range(len(fields))]
+        self._fields = list(fields)
         self._layout = np.dtype(
-            {"names": names, "formats": formats, "offsets": offsets, "itemsize": len(content)}
+            {
+                "names": ["sec", "nanosec", *fields],
+                "formats": ["<i4", "<u4", *(f"({length},)<f8" for length in fields.values())],
+                "offsets": [4, 8, *places],
+                "itemsize": len(content),
+            }
         )
 
-    def fill(self, stamps: np.ndarray, **columns: np.ndarray) -> Iterator[bytes]:
+    def fill(self, stamps: np.ndarray, *columns: np.ndarray) -> Iterator[bytes]:
         """
         Yield one serialized message per sample.
 
@@ -157,13 +157,13 @@ class MessageTemplate:
         stamps
             Instants [ns since 1970], shape (n,), int64.
         columns
-            Values of each field, shape (n, length of the field).
+            Values of each field, shape (n, number of its doubles).
 
         """
         table = np.tile(self._bytes, (len(stamps), 1))
         rows = table.view(self._layout)[:, 0]
         rows["sec"], rows["nanosec"] = np.divmod(stamps, NANOSECONDS_PER_SECOND)
-        for name, values in columns.items():
+        for name, values in zip(self._fields, columns, strict=True):
             rows[name] = values
         content, size = table.tobytes(), table.shape[1]
         for begin in range(0, len(content), size):

@@ -12,6 +12,7 @@ ticks lie at fixed instants of the bag, the same at every rate.
 import math
 import struct
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,6 +31,7 @@ from gait_entrainment_bags import (
     Moment,
     Playback,
     TopicInfo,
+    UnreadableBagError,
     choose_topics,
     find_definition,
 )
@@ -119,17 +121,15 @@ class BagPlayer(Participant):
         self._look_at = time.monotonic()  # when matching is looked after next
         self._give_up_at = time.monotonic() + (settings.expect_timeout or math.inf)
         self._lateness = Lateness()  # of messages, from due to published
-        for name, kind, answer in (
-            ("pause", srv.Pause, self._on_pause),
-            ("resume", srv.Resume, self._on_resume),
-            ("toggle_paused", srv.TogglePaused, self._on_toggle_paused),
-            ("is_paused", srv.IsPaused, self._on_is_paused),
-            ("get_rate", srv.GetRate, self._on_get_rate),
-            ("set_rate", srv.SetRate, self._on_set_rate),
-            ("seek", srv.Seek, self._on_seek),
-            ("play_next", srv.PlayNext, self._on_play_next),
-        ):
-            self.create_service(kind, f"~/{name}", answer)
+        playback = self._playback
+        self._serve("pause", srv.Pause, lambda _, now: playback.pause(now))
+        self._serve("resume", srv.Resume, lambda _, now: playback.resume(now))
+        self._serve("toggle_paused", srv.TogglePaused, self._toggle_paused)
+        self._serve("is_paused", srv.IsPaused, lambda *_: {"paused": playback.paused})
+        self._serve("get_rate", srv.GetRate, lambda *_: {"rate": self._rate})
+        self._serve("set_rate", srv.SetRate, self._set_rate)
+        self._serve("seek", srv.Seek, lambda to, now: playback.seek(nanoseconds_of(to.time), now))
+        self._serve("play_next", srv.PlayNext, self._play_next)
 
     def why_fixed(self, name: str) -> str:
         """Return an empty text: the rate may change at any time."""
@@ -272,64 +272,54 @@ class BagPlayer(Participant):
 
     # Services
 
-    def _on_pause(self, _: Any, response: Any) -> Any:
-        self._playback.pause(time.monotonic_ns())
-        return response
+    def _serve(self, name: str, kind: Any, act: Callable[[Any, int], Any]) -> None:
+        """
+        Offer a service of a type.
 
-    def _on_resume(self, _: Any, response: Any) -> Any:
-        self._playback.resume(time.monotonic_ns())
-        return response
+        ``act`` takes a request and the steady time [ns], returns fields of the response or None,
+        and raises BagError to refuse.
+        """
 
-    def _on_toggle_paused(self, request: Any, response: Any) -> Any:
-        toggle = self._on_resume if self._playback.paused else self._on_pause
-        return toggle(request, response)
+        def serve(request: Any, response: Any) -> Any:
+            try:
+                values = act(request, time.monotonic_ns()) or {}
+            except BagError as error:
+                # The reason has no place in the response.
+                self.get_logger().error(f"{name}: {error}")
+                return response
+            if hasattr(response, "success"):
+                response.success = True
+            for field, value in values.items():
+                setattr(response, field, value)
+            return response
 
-    def _on_is_paused(self, _: Any, response: Any) -> Any:
-        response.paused = self._playback.paused
-        return response
+        self.create_service(kind, f"~/{name}", serve)
 
-    def _on_get_rate(self, _: Any, response: Any) -> Any:
-        response.rate = self._rate
-        return response
+    def _toggle_paused(self, _: Any, now: int) -> None:
+        toggle = self._playback.resume if self._playback.paused else self._playback.pause
+        toggle(now)
 
-    def _on_set_rate(self, request: Any, response: Any) -> Any:
+    def _set_rate(self, request: Any, _: int) -> None:
         """Change the parameter, which plays at that rate from now on."""
-        if request.rate > 0:
-            rate = 0.0 if math.isinf(request.rate) else request.rate
-            (result,) = self.set_parameters([Parameter("rate", value=rate)])
-            response.success, reason = result.successful, result.reason
-        else:
-            reason = f"rate: {request.rate:g}; allowed: above 0"
-        return self._answer(response, reason)
+        if not request.rate > 0:
+            raise BagError(f"{request.rate:g}; allowed: above 0")
+        rate = 0.0 if math.isinf(request.rate) else request.rate
+        (result,) = self.set_parameters([Parameter("rate", value=rate)])
+        if not result.successful:
+            raise BagError(result.reason)
 
-    def _on_seek(self, request: Any, response: Any) -> Any:
-        reason = ""
-        try:
-            self._playback.seek(nanoseconds_of(request.time), time.monotonic_ns())
-            response.success = True
-        except BagError as error:
-            reason = str(error)
-        return self._answer(response, reason)
-
-    def _on_play_next(self, _: Any, response: Any) -> Any:
+    def _play_next(self, *_: Any) -> None:
         """Publish the next message, with the ticks before it."""
-        reason = "play_next: is not paused, or nothing is left to play"
         try:
             while self._begun and (moment := self._playback.take_next()):
                 self._send(moment)
                 if moment.message is not None:
-                    response.success, reason = True, ""
-                    break
-        except BagError as error:
+                    self._end_if_played()
+                    return
+        except UnreadableBagError as error:
             self.failure = str(error)
-        self._end_if_played()
-        return self._answer(response, reason)
-
-    def _answer(self, response: Any, reason: str) -> Any:
-        """Return a response; why it is a refusal has no place in it and goes to the log."""
-        if reason:
-            self.get_logger().error(reason)
-        return response
+            raise
+        raise BagError("is not paused, or nothing is left to play")
 
 
 def clock_message(instant: int) -> bytes:

@@ -7,17 +7,19 @@ from dataclasses import asdict
 from typing import Any
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.gait import (
-    Entrainment,
-    GaitAnalyzer,
-    GaitEvent,
-    PulsePhase,
-    Stride,
-    VerdictSettings,
-)
+from gait_entrainment.gait import Entrainment, GaitAnalyzer, PulsePhase, Stride, VerdictSettings
 from gait_entrainment.gait.analyzer import Result
-from gait_entrainment.messages import result_values
-from gait_entrainment.robot import MeasuredOnsets, RobotState, TorqueProfile
+from gait_entrainment.messages import (
+    event_of,
+    nanoseconds_of,
+    profile_of,
+    pulse_of,
+    result_values,
+    state_of,
+    stop_of,
+)
+from gait_entrainment.robot import MeasuredOnsets
+from gait_entrainment_msgs import msg
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.stamps import header, to_time
 
@@ -47,13 +49,13 @@ class Run:
         self._measured = MeasuredOnsets() if measured else None
         self._events = 0
         self._closed = False  # nothing will be promised any more
-        self._events_expected = 0
+        self._expected = 0  # events, once the end is known
         self._doubts: dict[str, int] = {}  # counts of suspicious events, as reported last
 
     @property
     def complete(self) -> bool:
         """Whether the walk has ended and everything about it is here."""
-        if self.end is None or self._events < self._events_expected:
+        if self.end is None or self._events < self._expected:
             return False
         if self.promised_until < self.end:
             return False
@@ -62,39 +64,41 @@ class Run:
             self._closed and self._measured.states_until >= self.promised_until
         )
 
-    def add_event(self, event: GaitEvent) -> list[Result]:
+    def add_event(self, event: msg.GaitEvent) -> list[Result]:
         """Take one gait event."""
         self._events += 1
-        return self._analyzer.add_event(event)
+        return self._analyzer.add_event(event_of(event))
 
-    def stop(self, instant: int) -> None:
-        """Take the instant from which on there is no torque."""
-        self._analyzer.stop(instant)
+    def add_profile(self, message: msg.TorqueProfile) -> list[Result]:
+        """Take the onsets that are promised, or a stop: the instant from which torque is zero."""
+        stop = stop_of(message)
+        if stop is not None:
+            self._analyzer.stop(stop)
+            if self._measured is not None:
+                self._measured.stop(stop)
+            return []
+        profile = profile_of(message)
+        known = list(profile.onsets), profile.valid_until
+        self.promised_until, self._closed = profile.valid_until, not profile.has_length
         if self._measured is not None:
-            self._measured.stop(instant)
-
-    def add_profile(self, profile: TorqueProfile) -> list[Result]:
-        """Take the onsets that are promised."""
-        self.promised_until = profile.valid_until
-        self._closed = not profile.has_length
-        if self._measured is None:
-            return self._analyzer.add_promise(list(profile.onsets), profile.valid_until)
-        known = self._measured.add_promise(list(profile.onsets), profile.valid_until)
+            known = self._measured.add_promise(*known)
         return self._analyzer.add_promise(*known)
 
-    def add_pulse(self, onset: int, torque: float, duration: float) -> list[Result]:
-        """Take height [N m] and width [s] of a pulse, by which its measured onset is known."""
+    def add_pulse(self, pulse: msg.TorquePulse) -> list[Result]:
+        """Take height and width of a pulse, by which its measured onset is known."""
         assert self._measured is not None
-        return self._analyzer.add_promise(*self._measured.add_pulse(onset, torque, duration))
+        return self._analyzer.add_promise(*self._measured.add_pulse(*pulse_of(pulse)))
 
-    def add_state(self, state: RobotState) -> list[Result]:
+    def add_state(self, state: msg.AnkleRobotState) -> list[Result]:
         """Take the torque that the robot measured."""
         assert self._measured is not None
-        return self._analyzer.add_promise(*self._measured.add_state(state))
+        return self._analyzer.add_promise(*self._measured.add_state(state_of(state)))
 
-    def end_at(self, instant: int, events: int) -> None:
-        """Note that the walk ended at an instant, with this many events."""
-        self.end, self._events_expected = instant, events
+    def add_progress(self, progress: msg.Progress) -> list[Result]:
+        """Learn of the end of the walk."""
+        if progress.state != msg.Progress.WALKING:
+            self.end, self._expected = nanoseconds_of(progress.header.stamp), progress.events
+        return []
 
     def finish(self, end: int) -> list[Result]:
         """Return what was waiting for more: the run is over at an instant."""

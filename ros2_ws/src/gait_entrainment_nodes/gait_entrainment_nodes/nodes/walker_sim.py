@@ -18,6 +18,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import WrenchStamped
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
@@ -27,7 +28,7 @@ from gait_entrainment.settings import setting
 from gait_entrainment_msgs import msg
 from gait_entrainment_msgs.srv import StartRun
 from gait_entrainment_nodes.messaging import topics
-from gait_entrainment_nodes.messaging.raw_messages import MessageTemplate, mark
+from gait_entrainment_nodes.messaging.raw_messages import MessageTemplate
 from gait_entrainment_nodes.messaging.stamps import header, to_time
 from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.participant import Participant
@@ -78,7 +79,12 @@ class WalkerSim(Participant):
         self.offer(topics.WALKER_TIMING)
         if not self.settings.real_time:
             self.offer(topics.CLOCK)
-        self._templates = _templates()
+        of_joints = dict.fromkeys(("position", "velocity", "effort"), len(JOINTS))
+        self._joints = MessageTemplate(JointState(name=JOINTS), of_joints)
+        of_ankles = dict.fromkeys(("intrinsic", "delivered", "effective_perturbation"), 2)
+        self._torques = MessageTemplate(msg.AnkleTorque(), of_ankles)
+        on_foot = WrenchStamped(header=Header(frame_id="world"))
+        self._force = MessageTemplate(on_foot, {"wrench.force.x": 3})
         # A step ahead of time loads the compiled kernels, which a run must not wait for.
         WalkerRun(self.walker, Side.RIGHT, 100.0).advance(NANOSECONDS_PER_SECOND)
         self.subscribe_to_run(topics.TORQUE_PROFILE, self._on_profile)
@@ -181,23 +187,14 @@ class WalkerSim(Participant):
         if samples is None:
             return
         stamps = stretch.sample_times + run.start
-        joints, torques, force = self._templates
         # From (x, z) to (x, y, z), by foot.
         forces = np.moveaxis(np.insert(samples.ground_reaction, 1, 0.0, axis=-1), 1, 0)
+        joints = (samples.position, samples.velocity, samples.effort)
+        torques = (samples.intrinsic_torque, samples.delivered_torque, samples.effective_torque)
         messages = (
-            joints.fill(
-                stamps,
-                position=samples.position,
-                velocity=samples.velocity,
-                effort=samples.effort,
-            ),
-            torques.fill(
-                stamps,
-                intrinsic=samples.intrinsic_torque,
-                delivered=samples.delivered_torque,
-                effective=samples.effective_torque,
-            ),
-            *(force.fill(stamps, force=of_foot) for of_foot in forces),
+            self._joints.fill(stamps, *joints),
+            self._torques.fill(stamps, *torques),
+            *(self._force.fill(stamps, of_foot) for of_foot in forces),
         )
         # The forces are left out if nobody wants them.
         for publisher, filled in zip(self._sampled, messages, strict=False):
@@ -220,24 +217,6 @@ class WalkerSim(Participant):
         names = [n for n in timing.get_fields_and_field_types() if n not in ("header", "run")]
         self.diagnose(stamp, level, what, **{n: getattr(timing, n) for n in names})
         self.publish_counts(run.number, stamp)
-
-
-def _templates() -> tuple[MessageTemplate, MessageTemplate, MessageTemplate]:
-    """Return templates of JointState, AnkleTorque and WrenchStamped."""
-    marked = [[mark(i), 0.0, 0.0, 0.0] for i in range(3)]
-    joints = JointState(name=JOINTS, position=marked[0], velocity=marked[1], effort=marked[2])
-    pairs = [[mark(i), 0.0] for i in range(3)]
-    torques = msg.AnkleTorque(
-        intrinsic=pairs[0], delivered=pairs[1], effective_perturbation=pairs[2]
-    )
-    force = WrenchStamped()
-    force.header.frame_id = "world"
-    force.wrench.force.x = mark(0)
-    return (
-        MessageTemplate(joints, {"position": 4, "velocity": 4, "effort": 4}),
-        MessageTemplate(torques, {"intrinsic": 2, "delivered": 2, "effective": 2}),
-        MessageTemplate(force, {"force": 3}),
-    )
 
 
 def main() -> int:
