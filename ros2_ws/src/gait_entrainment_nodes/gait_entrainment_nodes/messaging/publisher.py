@@ -5,7 +5,7 @@
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import rclpy
@@ -62,6 +62,19 @@ class CountedPublisher:
         data = message if isinstance(message, bytes) else serialize(message)
         self._repeat(lambda: self._published(data))
         self.count += 1
+
+    def publish_all(self, messages: Iterable[bytes]) -> None:
+        """Publish serialized messages as ``publish`` does, with half the work for each."""
+        handle = self._publisher.handle
+        with handle:
+            publish = handle.publish_raw
+            for message in messages:
+                try:
+                    publish(message)
+                except RuntimeError:  # the history is full
+                    self.publish(message)
+                else:
+                    self.count += 1
 
     def wait_until_received(self, timeout: float) -> bool:
         """Wait up to a time [s]; return whether every reader has received what was published."""

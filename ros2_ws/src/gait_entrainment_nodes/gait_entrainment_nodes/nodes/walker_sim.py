@@ -198,8 +198,7 @@ class WalkerSim(Participant):
         )
         # The forces are left out if nobody wants them.
         for publisher, filled in zip(self._sampled, messages, strict=False):
-            for message in filled:
-                publisher.publish(message)
+            publisher.publish_all(filled)
 
     def _send_progress(self, run: Run, progress: msg.Progress) -> None:
         """Publish progress, and at the end of a run how it went."""
