@@ -155,11 +155,6 @@ def alive(pid: int) -> bool:
         return False
 
 
-def parent_of(pid: int) -> int:
-    """Return the id of the process that started a process."""
-    return int(stat(pid)[1]) if pid else 0
-
-
 def cpu_seconds(pid: int) -> float:
     """Return the processor time that a process has used."""
     return (int(stat(pid)[11]) + int(stat(pid)[12])) / os.sysconf("SC_CLK_TCK")
@@ -210,11 +205,10 @@ class Started:
             for folder in Path("/proc").glob("[0-9]*"):
                 try:
                     words = (folder / "cmdline").read_bytes().split(b"\0")
-                    parent = parent_of(int(folder.name))
-                    # `entrain run` starts its nodes by way of a process that has loaded ROS.
-                    if self.process.pid not in (parent, parent_of(parent)):
-                        continue
+                    parent = int(stat(int(folder.name))[1])
                 except (FileNotFoundError, ProcessLookupError):
+                    continue
+                if parent != self.process.pid:
                     continue
                 for word in words[:2]:
                     name = word.decode().rpartition("/")[2]

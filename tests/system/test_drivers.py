@@ -344,13 +344,20 @@ def test_stop_from_the_command_line_ends_a_run(tmp_path):
         run.wait_for_stride(2)
         code, out, err = entrain(run.domain(), "stop")
         assert code == 0, out + err
-        assert "/perturbator/stop: torque is zero, latched" in out
+        assert re.search(r"perturbator/\d+: the stop is latched", out)
         assert run.wait() == 1
-        assert "the stop service was called" in run.text
+        assert "stopped: The stop was called." in run.text
 
 
 def test_stop_that_finds_nobody_says_so():
-    with claimed_domain() as domain:
-        code, out, err = entrain(domain, "stop")
+    code, out, err = entrain(None, "stop")
     assert (code, out) == (1, "")
-    assert "no perturbator was found" in err
+    assert "no robot is driven by this machine" in err
+
+
+def test_stop_needs_no_home_and_no_ros():
+    bare = {"PATH": os.environ["PATH"], "PYTHONPATH": os.environ["PYTHONPATH"]}
+    done = subprocess.run(["entrain", "stop"], capture_output=True, text=True, env=bare)
+    assert done.returncode == 1
+    assert "no robot is driven by this machine" in done.stderr
+    assert "Traceback" not in done.stderr

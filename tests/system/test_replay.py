@@ -21,7 +21,7 @@ from gait_entrainment.gait import VerdictSettings
 from gait_entrainment_bags import BagReader, BagWriter
 from gait_entrainment_bags.decoding import decoder_for
 from gait_entrainment_bags.recorded_run import read_run
-from gait_entrainment_bringup import replay_client
+from gait_entrainment_bringup import replay_client, supervisor
 from gait_entrainment_bringup.commands import replay as replay_command
 from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.domain import claimed_domain
@@ -157,6 +157,7 @@ def test_a_run_in_a_namespace_is_replayed_and_recorded_there(live: Path, tmp_pat
 
 def test_an_analyzer_that_hangs_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(replay_client, "PATIENCE", 3.0)
+    monkeypatch.setattr(supervisor, "METHOD", "spawn")  # other tests have left threads here
     call = replay_client.ReplayClient.call
 
     def call_and_stall(client: Any, kind: Any, name: str, *arguments: Any, **options: Any) -> Any:

@@ -36,7 +36,7 @@ LEAD_TIME = 0.3
 # lags behind the wall clock to show what it felt [s].
 MEASURED_DELAY = 0.1
 # How long any node, or the operator, may be silent while a real robot is worn [s].
-PERSON_SILENCE = 0.25
+PERSON_SILENCE = 0.75
 
 # Names at the root that are moved into a namespace: each experiment keeps its own time.
 MOVED = (

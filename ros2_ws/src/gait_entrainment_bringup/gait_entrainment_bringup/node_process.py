@@ -2,12 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-One node as a process, forked from a server that has loaded what all nodes need.
+One node as a process of its own, with a session, a log, an environment and a name of its own.
 
-To load ROS, numpy and the messages takes a node longer than anything else before a run. The server
-(multiprocessing's forkserver) does so once, with one thread and no ROS context, so that it can be
-forked safely; each node becomes a process with a session, a log, an environment and a name of its
-own.
+To load ROS, numpy and the messages takes a node longer than anything else before a run. A process
+that has no ROS context, and no thread but its first, may load them once and be forked; elsewhere
+nodes are spawned, each with an interpreter that loads what it needs.
 """
 
 import ctypes
@@ -17,45 +16,49 @@ import os
 import signal
 import sys
 from collections.abc import Mapping, Sequence
-from multiprocessing import forkserver
 from multiprocessing.process import BaseProcess
 from pathlib import Path
+from typing import Any
 
 from gait_entrainment_nodes.messaging.environment import PACKAGE
 
-# These load what the others need as well.
-_PRELOADED = [f"{PACKAGE}.nodes.{node}" for node in ("gait_analyzer", "bag_recorder")]
 _PR_SET_PDEATHSIG, _PR_SET_NAME = 1, 15
 # Where in /proc/self/stat the addresses of the command line are, counted behind the name.
 _ARGUMENTS = slice(45, 47)
 
 
-def prepare() -> None:
-    """Start the server, which loads what the nodes need; returns at once."""
-    forkserver.set_forkserver_preload(_PRELOADED)
-    forkserver.ensure_running()
+def load() -> None:
+    """Load what nodes need, before they are forked."""
+    for node in ("gait_analyzer", "bag_recorder"):  # they load what the others need as well
+        importlib.import_module(f"{PACKAGE}.nodes.{node}")
 
 
 def start_node(
-    module: str, arguments: Sequence[str], log: Path, environment: Mapping[str, str]
+    method: str, module: str, arguments: Sequence[str], log: Path, environment: Mapping[str, str]
 ) -> BaseProcess:
-    """Run ``main`` of a module with arguments; it gets SIGTERM if this process dies."""
-    prepare()
+    """
+    Run ``main`` of a module with arguments in a process by a ``method``, "fork" or "spawn".
+
+    It gets SIGTERM if this process dies.
+    """
     words = [module.rpartition(".")[2], *arguments]
-    process = multiprocessing.get_context("forkserver").Process(
-        target=_run, args=(module, words, log, dict(environment)), daemon=True
-    )
+    context: Any = multiprocessing.get_context(method)
+    more = (os.getpid(), module, words, log, dict(environment))
+    process: BaseProcess = context.Process(target=_run, args=more, daemon=True)
     process.start()
     return process
 
 
-def _run(module: str, words: Sequence[str], log: Path, environment: Mapping[str, str]) -> None:
+def _run(
+    parent: int, module: str, words: Sequence[str], log: Path, environment: Mapping[str, str]
+) -> None:
     """Become the node."""
-    # Ctrl-C reaches the process that supervises alone, which then stops the nodes in order.
+    # Ctrl-C reaches the parent alone, which then stops the nodes in order.
     os.setsid()
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     library = ctypes.CDLL(None)
     library.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
-    if os.getppid() == 1:  # the server died before the line above
+    if os.getppid() != parent:  # it died before the line above
         return
     with log.open("wb") as file:
         os.dup2(file.fileno(), sys.stdout.fileno())

@@ -17,7 +17,7 @@ from contextlib import contextmanager, suppress
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
-from gait_entrainment_bringup.node_process import prepare, start_node
+from gait_entrainment_bringup.node_process import load, start_node
 from gait_entrainment_bringup.signals import undisturbed
 from gait_entrainment_nodes.messaging.environment import PACKAGE, set_environment
 from gait_entrainment_nodes.messaging.errors import NodeError
@@ -27,20 +27,28 @@ PATIENCE = 1.5
 # How long the recorder may take to close the bag after the experiment or replay has ended [s].
 CLOSING_TIMEOUT = 15.0
 LOG_LINES = 8
+METHOD = "fork"  # of starting the nodes of a command
 
 
 class Supervisor:
-    """Runs one process per node, all in one environment; their logs go to a folder."""
+    """
+    Runs one process per node, all in one environment; their logs go to a folder.
 
-    def __init__(self, folder: Path, environment: Mapping[str, str]) -> None:
-        self.folder = folder
+    ``method`` is how processes are started, see ``node_process``.
+    """
+
+    def __init__(
+        self, folder: Path, environment: Mapping[str, str], method: str = "spawn"
+    ) -> None:
+        self.folder, self._method = folder, method
         self._environment = dict(environment)
         self._processes: dict[str, BaseProcess] = {}
 
     def start(self, node: str, arguments: Sequence[str]) -> None:
         """Start a node of the package."""
+        module = f"{PACKAGE}.nodes.{node}"
         self._processes[node] = start_node(
-            f"{PACKAGE}.nodes.{node}", arguments, self._log(node), self._environment
+            self._method, module, arguments, self._log(node), self._environment
         )
 
     def ended(self) -> dict[str, int]:
@@ -115,13 +123,14 @@ def supervised(
     """
     Give a supervisor of processes in a ROS domain, and stop these in order at the end.
 
+    They are forked: start them before anything that starts a thread, such as a ROS client.
     What fails or is interrupted meanwhile becomes a NodeError: the reason, what ``remains`` says
     once everything has stopped, and the end of the log of the node to blame.
     """
     environment = set_environment(domain)
-    prepare()
+    load()
     with tempfile.TemporaryDirectory(prefix="entrain_") as folder:
-        supervisor = Supervisor(Path(folder), environment)
+        supervisor = Supervisor(Path(folder), environment, METHOD)
         try:
             try:
                 yield supervisor

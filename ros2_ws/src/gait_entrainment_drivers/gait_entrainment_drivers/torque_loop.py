@@ -73,6 +73,7 @@ class TorqueLoop:
         self._train: PulseTrain | None = None  # onsets in steady time
         self._faults: tuple[Fault, ...] = ()
         self._enabled = self._closing = False
+        self._halted = False  # no torque until the device is opened anew
         self._samples: list[Sample] = []  # not handed over yet
         self._askers: list[str | bytes] = []  # of a stop, not answered yet
         self._ended_at = math.inf  # when torque was ended [s]
@@ -137,12 +138,12 @@ class TorqueLoop:
             self._end_torque(Fault(DRIVER_FAILED.name, f"The driver cannot send: {text}."))
             return None
 
-    def _end_torque(self, fault: Fault) -> None:
+    def _end_torque(self, fault: Fault | None = None) -> None:
         """Ask for zero torque from now on, for this reason, until the device is opened anew."""
         self._train = None
-        if not self._faults:
-            self._ended_at = time.monotonic()
-        if fault.name not in {known.name for known in self._faults}:
+        if not self._halted:
+            self._halted, self._ended_at = True, time.monotonic()
+        if fault is not None and fault.name not in {known.name for known in self._faults}:
             self._faults = (*self._faults, fault)
             self._link.send("faults", self._faults)
 
@@ -191,11 +192,11 @@ class TorqueLoop:
     def _obey(self, kind: str, *content: Any) -> None:
         if kind == "train":
             (train,) = content
-            self._train = None if self._faults else train
+            self._train = None if self._halted else train
         elif kind == "cancel":
             self._train = None
         elif kind == "stop":
-            self._end_torque(STOPPED)
+            self._end_torque()  # the parent knows why
         elif kind in ("open", "enable", "disable", "close"):
             error = ""
             try:
@@ -206,7 +207,7 @@ class TorqueLoop:
             self._link.send("done", kind, error)
 
     def _open(self) -> None:
-        self._faults, self._ended_at = (), math.inf
+        self._faults, self._halted, self._ended_at = (), False, math.inf
         self._device.open()
 
     def _enable(self) -> None:

@@ -65,13 +65,13 @@ def replay(options: argparse.Namespace, domain: int) -> dict[str, list[bytes]]:
     remaps = [f"__ns:={namespace}", *(f"{name}:={name[1:]}" for name in MOVED)]
     moved = [word for remap in remaps for word in ("-r", remap)] if namespace else []
     with supervised(domain, STOP_ORDER) as supervisor:
-        # Not before: it loads ROS, while what the nodes need is loaded, too.
-        from gait_entrainment_bringup.replay_client import ReplayClient
-
         arguments = [*parameter_arguments(given, supervisor.folder), *moved]
         for node in STOP_ORDER:
             if node in given:
                 supervisor.start(node, arguments)
+        # Not at the top: it loads ROS, and a mistake in the options is answered without.
+        from gait_entrainment_bringup.replay_client import ReplayClient
+
         recorded = options.out is not None
         client = ReplayClient(supervisor, namespace, recorded=recorded)
         with client:

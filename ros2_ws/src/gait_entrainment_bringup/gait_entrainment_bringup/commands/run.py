@@ -74,14 +74,14 @@ def run_experiment(
     """Start the nodes, conduct the protocol, stop the nodes, report."""
     figures = not options.no_figures
     with supervised(domain, STOP_ORDER, partial(kept, bag)) as supervisor:
-        # Not before: it loads ROS, while what the nodes need is loaded, too.
-        from gait_entrainment_bringup.run_client import conduct
-
         given = chosen_parameters(protocol, bag, options)
         arguments = parameter_arguments(given, supervisor.folder)
         for node in NODES:
             if node not in options.elsewhere:
                 supervisor.start(node, arguments)
+        # Not at the top: it loads ROS, and a mistake in the options is answered without.
+        from gait_entrainment_bringup.run_client import conduct
+
         real = not find_driver(protocol.driver).simulated
         silence = {"silence": PERSON_SILENCE} if real else {}
         load = partial(load_report, figures)
