@@ -29,7 +29,7 @@ from gait_entrainment_bringup.supervisor import Supervisor
 from gait_entrainment_msgs.action import RunProtocol
 from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.client import Client
-from gait_entrainment_nodes.messaging.domain import claimed_domain
+from gait_entrainment_nodes.messaging.domain import CLAIMS, claimed_domain
 from gait_entrainment_nodes.messaging.topics import STRIDES, Topic
 
 # Long enough for a machine whose two cores are shared; nothing waits for it to pass.
@@ -242,9 +242,13 @@ class EntrainRun(Started):
 
     def domain(self) -> int:
         """Return its domain."""
-        environment = Path(f"/proc/{next(iter(self.find_nodes().values()))}/environ").read_bytes()
-        values = dict(v.split(b"=", 1) for v in environment.split(b"\0") if b"=" in v)
-        return int(values[b"ROS_DOMAIN_ID"])
+        self.find_nodes()  # by then it has claimed one, by the name of a socket
+        held = {os.readlink(fd) for fd in Path(f"/proc/{self.process.pid}/fd").iterdir()}
+        for line in Path("/proc/net/unix").read_text().splitlines():
+            words = line.split()
+            if f"socket:[{words[6]}]" in held and words[-1].startswith(f"@{CLAIMS}/"):
+                return int(words[-1].rpartition("/")[2])
+        raise AssertionError("it has claimed no domain")
 
     def wait_for_stride(self, number: int) -> None:
         """Wait until the analyzer has seen a stride."""
