@@ -17,7 +17,6 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
-from operator import itemgetter
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -38,17 +37,12 @@ from gait_entrainment_bags import QosProfile as OfferedQos
 from gait_entrainment_msgs.msg import Progress, PublishedCounts
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.raw_messages import message_class
-from gait_entrainment_nodes.messaging.raw_reader import RawReader
 from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.parameters import texts
 from gait_entrainment_nodes.nodes.participant import Participant
 
 # How often new topics are looked for and data is brought to the file [s].
 CARE_PERIOD = 0.2
-# How often to take messages [s] while some come, and while none come.
-TAKE_PERIOD, IDLE_TAKE_PERIOD = 0.001, 0.005
-# How many of a topic to take at once, so that no topic waits for another.
-MOST_AT_ONCE = 500
 # How long to wait, after the end of a run, for messages and counts still on their way [s].
 CLOSING_TIMEOUT = 5.0
 # A message that comes behind one with a later stamp is logged with it, so that a player keeps the
@@ -117,8 +111,7 @@ class BagRecorder(Participant):
         self._progress: Progress | None = None  # not acknowledged yet
         self._published: dict[str, dict[str, int]] = {}  # by node: final count by topic
         self._final_at: float | None = None  # when the end of the run was heard of, steady time
-        self._care_at = self._take_at = time.monotonic()
-        self._readers: list[tuple[RawReader, Callable[[bytes, int], None]]] = []
+        self._care_at = time.monotonic()
 
     def _make_bag(self) -> BagWriter:
         """Return the bag to write; raises ValueError if there cannot be one."""
@@ -172,10 +165,10 @@ class BagRecorder(Participant):
         )
         reliable = all(o.reliability == ReliabilityPolicy.RELIABLE for o in offers)
         lasting = all(o.durability == DurabilityPolicy.TRANSIENT_LOCAL for o in offers)
-        reader = RawReader(
-            self,
+        self.create_subscription(
             message_type,
             name,
+            self._writer_for(name, definition),
             QoSProfile(
                 history=HistoryPolicy.KEEP_ALL,
                 reliability=(
@@ -185,20 +178,8 @@ class BagRecorder(Participant):
                     DurabilityPolicy.TRANSIENT_LOCAL if lasting else DurabilityPolicy.VOLATILE
                 ),
             ),
+            raw=True,
         )
-        self._readers.append((reader, self._writer_for(name, definition)))
-
-    def _take_messages(self) -> bool:
-        """Record what has come, in the order in which it came; return whether there was any."""
-        taken = [
-            (received, record, data)
-            for reader, record in self._readers
-            for received, data in reader.take(MOST_AT_ONCE)
-        ]
-        taken.sort(key=itemgetter(0))
-        for received, record, data in taken:
-            record(data, received)
-        return bool(taken)
 
     def _note_offers(self, name: str) -> None:
         """
@@ -220,19 +201,20 @@ class BagRecorder(Participant):
                 "the recording of this topic began as reliable"
             )
 
-    def _writer_for(self, name: str, definition: Definition) -> Callable[[bytes, int], None]:
-        """Return what writes a message of one topic, and when it was received [ns]."""
+    def _writer_for(self, name: str, definition: Definition) -> Callable[[bytes], None]:
+        """Return the callback that writes the messages of one topic."""
         stamped = definition.type not in _BY_WALL_CLOCK and _first_field(
             definition.schema_text
         ).startswith(_STAMPED)
-        write, unpack = self._bag.write, _STAMP.unpack_from
+        write, wall_clock, unpack = self._bag.write, time.time_ns, _STAMP.unpack_from
         latest = self._latest
         then = {
             self._progress_topic: self._on_progress,
             self._counts_topic: self._on_counts,
         }.get(name)
 
-        def record(data: bytes, received: int) -> None:
+        def record(data: bytes) -> None:
+            received = wall_clock()
             logged = 0
             if stamped:
                 sec, nanosec = unpack(data, 4)
@@ -324,16 +306,11 @@ class BagRecorder(Participant):
         }
 
     def next_deadline(self) -> float:
-        """Return when to take messages, or to look after topics and the file."""
-        return min(self._take_at, self._care_at)
+        """Return when to look after topics and the file."""
+        return self._care_at
 
     def on_deadline(self) -> None:
-        """Record what has come; now and then look after topics, the file and the end."""
-        some = self._take_messages()
-        now = time.monotonic()
-        self._take_at = now + (TAKE_PERIOD if some else IDLE_TAKE_PERIOD)
-        if now < self._care_at:
-            return
+        """Look after topics and the file, and end once everything is there."""
         closing = self._final_at is not None and bool(self._expected)
         self._care_at = time.monotonic() + (0.01 if closing else CARE_PERIOD)
         self._care()
@@ -366,9 +343,6 @@ class BagRecorder(Participant):
 
     def on_stop(self) -> None:
         """Close the bag, with what was lost written into it, and say how much was written."""
-        self._take_messages()
-        for reader, _ in self._readers:
-            reader.destroy()
         if self._early and not self._broken_off:
             # ROS time never began: the wall clock is the only one there is.
             self._record_early(max(self._latest.values(), default=self._early[0][2]), "", b"", 0)
