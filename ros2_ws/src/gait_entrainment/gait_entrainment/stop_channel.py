@@ -11,6 +11,8 @@ is in the way. Everyone who can reach the machine's network namespace may stop a
 is safe.
 """
 
+import errno
+import itertools
 import json
 import os
 import select
@@ -47,7 +49,15 @@ class StopListener:
     def __init__(self, name: str) -> None:
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
-        self._socket.bind(f"\0{PREFIX}{name}/{os.getpid()}")
+        # A process may hold several robots of one name.
+        for number in itertools.count(1):
+            more = f"-{number}" if number > 1 else ""
+            try:
+                self._socket.bind(f"\0{PREFIX}{name}/{os.getpid()}{more}")
+                break
+            except OSError as error:
+                if error.errno != errno.EADDRINUSE:
+                    raise
 
     def fileno(self) -> int:
         """Return the descriptor that becomes readable with a request."""

@@ -12,8 +12,13 @@ from hypothesis import strategies as st
 
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.experiment import Conductor, Part
-from gait_entrainment.gait import GaitEvent
+from gait_entrainment.gait import GaitEvent, GaitLimits
 from gait_entrainment.protocol import Protocol, ProtocolError, PulsePlan
+
+# These gaits are to be any that a mathematician can think of.
+ANY_GAIT = GaitLimits(
+    stride_least=1e-6, stride_most=1e6, stride_change=1.0, silence=10.0, baseline_spread=1.0
+)
 
 
 def walk(strides, toe_off=0.36):
@@ -60,7 +65,7 @@ def test_no_promise_covers_an_onset_that_is_not_planned(baseline, periods, phase
     protocol = Protocol(
         baseline=baseline, washout=2, pulses=PulsePlan(count=3, initial_phase=phase)
     )
-    conductor = Conductor(protocol, longest)
+    conductor = Conductor(protocol, longest, ANY_GAIT)
     events = walk(periods)
     conduct(conductor, events)
     measured = statistics.fmean(round(p * 1e9) / 1e9 for p in periods[: baseline - 1])
@@ -80,7 +85,7 @@ def test_no_promise_covers_an_onset_that_is_not_planned(baseline, periods, phase
 )
 def test_the_end_lies_behind_everything_promised_and_behind_the_last_stride(periods, longest):
     protocol = Protocol(baseline=2, washout=2, pulses=PulsePlan(count=3))
-    conductor = Conductor(protocol, longest)
+    conductor = Conductor(protocol, longest, ANY_GAIT)
     events = walk(periods)
     horizons, _ = conduct(conductor, events)
     strikes = [e.stamp for e in events if e.kind is EventKind.HEEL_STRIKE and e.side is Side.RIGHT]
