@@ -3,10 +3,12 @@
 
 """The CAN driver against the motor emulator in another process, hazards included."""
 
+import os
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import can
 import pytest
@@ -14,7 +16,7 @@ import pytest
 from gait_entrainment.conventions import Side
 from gait_entrainment.robot import DeviceError, LimitError, MeasuredOnsets, PulseTrain, find_driver
 from gait_entrainment_drivers.ak_mit import ENTER, EXIT, MOTORS, Command, pack_command
-from gait_entrainment_drivers.ak_mit_can import AkMitCanOptions, AkMitCanRobot
+from gait_entrainment_drivers.ak_mit_can import AkMitCanOptions, AkMotorOnCan
 from gait_entrainment_drivers.ak_motor_emulator import EmulatedAkMotor
 
 from .emulator_process import emulator, read_trace, until
@@ -176,19 +178,33 @@ def torque_of(trace):
     return [row for row in read_trace(trace) if row[1] > 7]
 
 
-def test_a_killed_host_leaves_the_motor_pushing_unless_its_own_watchdog_is_on(tmp_path):
-    """The hazard that no software on the host can remove."""
-    held, guarded = tmp_path / "held", tmp_path / "guarded"
-    for trace, timeout in ((held, "0"), (guarded, "0.05")):
-        with emulator("--timeout", timeout, trace=trace) as driver:
-            host = host_that("", driver)
-            until(lambda trace=trace: trace.exists() and torque_of(trace))
-            host.send_signal(signal.SIGKILL)
-            host.wait(10)
-            lines = len(read_trace(trace))
-            until(lambda trace=trace, lines=lines: len(read_trace(trace)) > lines + 400)
-    assert read_trace(held)[-1][2] == pytest.approx(8.0, abs=0.1)
-    assert read_trace(guarded)[-1][2] == pytest.approx(0.0, abs=0.1)
+def kill(host, *, with_its_loop):
+    """Kill a host; its torque loop is a process of its own."""
+    children = Path(f"/proc/{host.pid}/task/{host.pid}/children").read_text().split()
+    if with_its_loop:
+        for child in children:
+            os.kill(int(child), signal.SIGKILL)
+    host.kill()
+    host.wait(10)
+
+
+@pytest.mark.parametrize(
+    ("with_its_loop", "timeout", "torque"),
+    [
+        (True, "0", 8.0),  # the hazard that no software on the host can remove
+        (True, "0.05", 0.0),
+        (False, "0", 0.0),  # the loop sees that its host is gone
+    ],
+)
+def test_what_a_killed_host_leaves_behind(with_its_loop, timeout, torque, tmp_path):
+    trace = tmp_path / "trace"
+    with emulator("--timeout", timeout, trace=trace) as driver:
+        host = host_that("", driver)
+        until(lambda: trace.exists() and torque_of(trace))
+        kill(host, with_its_loop=with_its_loop)
+        lines = len(read_trace(trace))
+        until(lambda: len(read_trace(trace)) > lines + 400)
+    assert read_trace(trace)[-1][2] == pytest.approx(torque, abs=0.1)
 
 
 @pytest.mark.parametrize(
@@ -272,6 +288,6 @@ def test_a_bus_on_which_answers_never_end_does_not_hold_the_loop_up():
             return can.Message(arbitration_id=1, is_extended_id=False)
 
     begun = time.monotonic()
-    robot = AkMitCanRobot(Side.RIGHT, AkMitCanOptions(), 0)
-    robot._bus = Babbling()
-    assert robot._answer(lambda _: 5.0, begun + 0.02) == 5.0
+    motor = AkMotorOnCan(AkMitCanOptions())
+    motor._bus = Babbling()
+    assert motor._answer(lambda _: 5.0, begun + 0.02) == 5.0

@@ -8,7 +8,6 @@ import math
 import can
 import pytest
 
-from gait_entrainment.conventions import Side
 from gait_entrainment.robot import DeviceError
 from gait_entrainment_drivers import odrive_can
 from gait_entrainment_drivers.ak_mit import (
@@ -23,7 +22,7 @@ from gait_entrainment_drivers.ak_mit import (
     pack_reply,
     resolution,
 )
-from gait_entrainment_drivers.ak_mit_can import AkMitCanOptions, AkMitCanRobot
+from gait_entrainment_drivers.ak_mit_can import AkMitCanOptions, AkMotorOnCan
 from gait_entrainment_drivers.ak_motor_emulator import EmulatedAkMotor
 from gait_entrainment_drivers.odrive import (
     CLOSED_LOOP,
@@ -39,7 +38,7 @@ from gait_entrainment_drivers.odrive import (
     frame_id,
     pack_heartbeat,
 )
-from gait_entrainment_drivers.odrive_can import OdriveCanOptions, OdriveCanRobot
+from gait_entrainment_drivers.odrive_can import OdriveAxis, OdriveCanOptions
 from gait_entrainment_drivers.odrive_emulator import EmulatedOdrive
 
 AK = MOTORS["AK80-9"]
@@ -79,13 +78,13 @@ class Wire:
 
 
 def ak(ratio=1.0, motor=None):
-    robot = AkMitCanRobot(Side.RIGHT, AkMitCanOptions(ratio=ratio), 0)
+    robot = AkMotorOnCan(AkMitCanOptions(ratio=ratio))
     robot._bus = Wire(motor or EmulatedAkMotor(AK, 1, 100.0, 0.0, 8))
     return robot, robot._bus
 
 
 def odrive(ratio=1.0):
-    robot = OdriveCanRobot(Side.RIGHT, OdriveCanOptions(ratio=ratio), 0)
+    robot = OdriveAxis(OdriveCanOptions(ratio=ratio))
     robot._bus = Wire(EmulatedOdrive(0, 100.0, 0.0))
     return robot, robot._bus
 
@@ -94,30 +93,30 @@ def odrive(ratio=1.0):
 @pytest.mark.parametrize("ratio", RATIOS)
 def test_torque_goes_through_the_transmission_and_back(make, ratio):
     robot, wire = make(ratio)
-    robot._enable()
+    robot.enable()
     assert robot.capabilities.peak_torque == pytest.approx(18.0 * abs(ratio))
     step = resolution(AK)
     for torque in (4.0, -2.5):
-        robot._exchange(torque, 0.01)
+        robot.exchange(torque, 0.01)
         assert wire.motor.torque == pytest.approx(torque / ratio, abs=step)
-        reading = robot._exchange(torque, 0.01)
+        reading = robot.exchange(torque, 0.01)
         assert reading.torque == pytest.approx(torque, abs=2 * step * abs(ratio))
-    robot._exchange(0.0, 0.01)
+    robot.exchange(0.0, 0.01)
     if make is ak:  # zero has no code of its own
-        assert robot._exchange(0.0, 0.01).torque == 0.0
+        assert robot.exchange(0.0, 0.01).torque == 0.0
 
 
 @pytest.mark.parametrize("ratio", RATIOS)
 def test_angle_and_torque_are_the_ankles(ratio):
     robot, wire = ak(ratio)
     wire.motor = Telling([(0, pack_reply(Reply(1, 1.5, 0.0, 0.0), AK, 8))])
-    assert robot._exchange(0.0, 0.01).angle == pytest.approx(1.5 / ratio, abs=1e-3 / abs(ratio))
+    assert robot.exchange(0.0, 0.01).angle == pytest.approx(1.5 / ratio, abs=1e-3 / abs(ratio))
     robot, wire = odrive(ratio)
     estimates = PAIR.pack(0.25, 0.0)  # a quarter of a turn
     wire.motor = Telling(
         [(frame_id(0, ENCODER), estimates), (frame_id(0, TORQUES), PAIR.pack(7.0, 2.0))]
     )
-    reading = robot._exchange(7.0, 0.01)
+    reading = robot.exchange(7.0, 0.01)
     assert reading.angle == pytest.approx(math.pi / 2 / ratio)
     assert reading.torque == pytest.approx(2.0 * ratio)  # the estimate, not the target
 
@@ -125,10 +124,10 @@ def test_angle_and_torque_are_the_ankles(ratio):
 def test_an_odrive_whose_heartbeat_is_switched_off_is_asked_for_it(monkeypatch):
     monkeypatch.setattr(odrive_can, "HEARTBEAT_PERIOD", 0.0)
     robot, wire = odrive()  # this bus carries answers only
-    robot._enable()
-    assert robot._exchange(1.0, 0.01).faults == ()
+    robot.enable()
+    assert robot.exchange(1.0, 0.01).faults == ()
     wire.motor.obey(frame_id(0, STOP), b"", remote=False, now=wire.now)
-    assert [fault.name for fault in robot._exchange(1.0, 0.01).faults] == ["emergency_stop"]
+    assert [fault.name for fault in robot.exchange(1.0, 0.01).faults] == ["emergency_stop"]
 
 
 class Telling:
@@ -153,11 +152,11 @@ def test_a_command_that_the_motor_still_holds_is_never_delivered(make):
     if make is odrive:
         motor._mode = TORQUE_MODE
     motor.command = 10.0  # of a host that was killed
-    robot._enable()
+    robot.enable()
     assert motor.enabled
     assert wire.strongest < 0.01
-    robot._exchange(10.0, 0.01)
-    robot._shut()
+    robot.exchange(10.0, 0.01)
+    robot.shut()
     assert not motor.enabled
     assert abs(motor.command) < 0.01  # motors hold it across modes
 
@@ -165,8 +164,8 @@ def test_a_command_that_the_motor_still_holds_is_never_delivered(make):
 def test_ak_motors_get_zero_before_each_change_of_mode():
     robot, wire = ak()
     zero = pack_command(Command(), AK)
-    robot._enable()
-    robot._disable()
+    robot.enable()
+    robot.disable()
     for change in (ENTER, EXIT):
         assert wire.sent[wire.sent.index(change) - 1] == zero
 
@@ -187,13 +186,13 @@ def test_frames_that_are_no_data_frames_of_the_motor_are_no_answer(make):
         wire.waiting.append(
             can.Message(arbitration_id=identifier, data=data, is_extended_id=False)
         )
-    assert robot._exchange(0.0, 0.05) is None
+    assert robot.exchange(0.0, 0.05) is None
     assert not wire.waiting
 
 
 @pytest.mark.parametrize("make", [ak, odrive])
 @pytest.mark.parametrize("torque", [-2.0, 2.0])
-def test_a_motor_with_torque_at_zero_command_is_switched_off_and_named(make, torque, monkeypatch):
+def test_a_motor_with_torque_at_zero_command_is_refused_and_named(make, torque, monkeypatch):
     monkeypatch.setattr("gait_entrainment_drivers.can_motor.ANSWER_TIMEOUT", 0.05)
     robot, wire = make()
     if make is ak:
@@ -203,7 +202,8 @@ def test_a_motor_with_torque_at_zero_command_is_switched_off_and_named(make, tor
         frames = [(frame_id(0, HEARTBEAT), closed), (frame_id(0, TORQUES), PAIR.pack(0.0, torque))]
     wire.motor = Telling(frames)
     with pytest.raises(DeviceError, match=r"at zero command: is it (AK80-9|calibrated)\?"):
-        robot.activate()
+        robot.enable()
+    robot.shut()
     assert wire.sent[-1] == (EXIT if make is ak else STATE.pack(IDLE))
 
 
