@@ -20,6 +20,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
+from gait_entrainment_bringup.signals import STOPPING
 from gait_entrainment_nodes.messaging.environment import PACKAGE
 
 _PR_SET_PDEATHSIG, _PR_SET_NAME = 1, 15
@@ -55,7 +56,8 @@ def _run(
     """Become the node."""
     # Ctrl-C reaches the parent alone, which then stops the nodes in order.
     os.setsid()
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    for number in STOPPING:  # the parent's handlers are not for a node
+        signal.signal(number, signal.SIG_DFL)
     library = ctypes.CDLL(None)
     library.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
     if os.getppid() != parent:  # it died before the line above
