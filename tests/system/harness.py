@@ -283,6 +283,7 @@ class Session:
         options: Sequence[str],
         real_time: bool,
         participants: Sequence[str] = (),
+        strangers: bool = False,
     ) -> None:
         self.bag = folder / "bag"
         self.protocol = protocol_of(*options)
@@ -290,6 +291,9 @@ class Session:
         del given["bag_recorder"]["publishers"]  # it records until it is stopped
         if participants:
             given["experiment"]["participants"] = list(participants)
+        if strangers:
+            for name in ("planned.torque", "planned.duration", "planned.count"):
+                del given["perturbator"][name]
         self.supervisor = Supervisor(folder, {**os.environ, "ROS_DOMAIN_ID": str(domain)})
         self.arguments = parameter_arguments(given, folder)
         self.probe = Probe(domain)
@@ -324,10 +328,15 @@ def session(
     nodes: Sequence[str] = NODES,
     real_time: bool = True,
     participants: Sequence[str] = (),
+    strangers: bool = False,
 ) -> Iterator[Session]:
-    """Start nodes in a domain of their own; stop them in the end."""
+    """
+    Start nodes in a domain of their own; stop them in the end.
+
+    If ``strangers`` may ask for pulses, the perturbator knows no protocol that these must be of.
+    """
     with claimed_domain() as domain:
-        running = Session(folder, domain, options, real_time, participants)
+        running = Session(folder, domain, options, real_time, participants, strangers)
         try:
             running.start(*nodes)
             yield running

@@ -140,19 +140,29 @@ def test_motor_on_a_bus_delivers_the_experiment_in_real_time(tmp_path, motor):
     assert len(outcome["pulses"]) == 3
     assert outcome["pulse_timing"]["measured"]["pulses"] == 3
     assert outcome["pulse_timing"]["sent"]["median_ms"] > 0
-    assert max(torques_of(trace)) == pytest.approx(13.35, abs=0.2)
+    # A real robot's first pulses rise in steps of a sixth, unless the protocol says otherwise.
+    assert max(torques_of(trace)) == pytest.approx(3 / 6 * 13.35, abs=0.2)
+    with BagReader(bag) as reader:
+        pulses = [message.torque for _, message in reader.decoded(["/perturbation/pulses"])]
+        ((_, setup),) = reader.decoded(["/perturbator/setup"])
+    assert pulses == pytest.approx([13.35 / 6, 13.35 / 3, 13.35 / 2], abs=0.01)
+    assert setup.driver == driver
+    assert setup.armed_by.endswith("by the parameter armed")
+    limits = dict(zip(setup.limit_names, setup.limits, strict=True))
+    assert (limits["rate"], limits["rising"]) == (pytest.approx(1334.6, abs=0.1), 5.0)
     assert torques_of(trace)[-1] == pytest.approx(0.0, abs=0.1)
     with BagReader(bag) as reader:
         delivered = [m.delivered[1] for _, m in reader.decoded(["/ankle_torque"])]
         faults = [m.faults for _, m in reader.decoded(["/perturbator/state"]) if m.faults]
     # What the walker felt is what the motor measured.
-    assert max(delivered) == pytest.approx(13.35, abs=0.3)
+    assert max(delivered) == pytest.approx(13.35 / 2, abs=0.3)
     assert faults == []
 
 
 def test_killed_perturbator_leaves_zero_torque_by_the_motors_own_watchdog(tmp_path, motor):
     driver, trace = motor
-    options = (f"--driver={driver}", "--real-time", "--arm", "--torque=8", "--width=0.4", *SHORT)
+    pulses = ("--torque=8", "--width=0.4", "--limit-rising=1", *SHORT)
+    options = (f"--driver={driver}", "--real-time", "--arm", *pulses)
     with entrain_run(tmp_path / "bag", *options) as run:
         pid = run.find_nodes()["perturbator"]
         with probe(run.domain()) as listener:
@@ -239,7 +249,7 @@ def test_fault_of_the_device_in_the_washout_fails_the_run(tmp_path):
     ("driver", "options"), [("ideal", []), ("emulated:state_rate=100", ["--real-time"])]
 )
 def test_kit_from_outside_finds_every_promise_kept(tmp_path, driver, options):
-    with session(tmp_path, f"--driver={driver}", nodes=("perturbator",)) as nodes:
+    with session(tmp_path, f"--driver={driver}", nodes=("perturbator",), strangers=True) as nodes:
         domain = nodes.probe.node.context.get_domain_id()
         code, out, err = entrain(domain, "driver", "check", "--node", "perturbator", *options)
         assert (code, err) == (0, ""), out

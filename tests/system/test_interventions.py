@@ -11,11 +11,10 @@ from std_srvs.srv import Trigger
 
 from gait_entrainment_bags import BagReader
 from gait_entrainment_msgs.action import DeliverPulseTrain, RunProtocol
-from gait_entrainment_msgs.msg import Horizon, Progress
+from gait_entrainment_msgs.msg import Progress
 from gait_entrainment_msgs.srv import Ready, StartRun
 from gait_entrainment_nodes.messaging.topics import (
     ANKLE_TORQUE,
-    HORIZON,
     PULSES,
     TORQUE_PROFILE,
     WALKER_PROGRESS,
@@ -184,48 +183,3 @@ def test_walker_that_counts_events_which_nobody_receives_ends_the_run(tmp_path):
 
         probe.until(over, "the end of the run")
         assert "walker_sim: 1 of 1 gait events missing for 3 s" in ended.result().result.message
-
-
-def test_cancelling_the_train_alone_ends_the_torque_at_once(tmp_path):
-    with session(tmp_path, *BROAD, nodes=("perturbator",)) as nodes:
-        probe = nodes.probe
-        profiles = probe.listen(TORQUE_PROFILE)
-        horizons = probe.node.create_publisher(HORIZON.type, HORIZON.name, HORIZON.qos)
-        for number in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
-            request = ChangeState.Request(transition=Transition(id=number))
-            assert probe.call(ChangeState, "perturbator/change_state", request).success
-
-        def promise(known, until, run=7):
-            message = Horizon(run=run)
-            message.header.stamp.sec, message.until.sec = known, until
-            count = len(profiles)
-            horizons.publish(message)
-            probe.until(lambda: len(profiles) > count, "a profile")
-            return profiles[-1]
-
-        promise(0, 2)
-        train = DeliverPulseTrain.Goal(
-            run=7, side=1, period=1.0, count=100, torque=5.0, duration=0.5
-        )
-        train.first_onset.sec = 3
-        goal = probe.send_goal(DeliverPulseTrain, "perturbator/deliver_pulse_train", train)
-        assert goal.accepted
-        assert list(promise(1, 4).torques) == [0.0, 5.0, 0.0]
-        count = len(profiles)
-        future = goal.cancel_goal_async()
-        # No horizon comes any more: the stop does not wait for one.
-        probe.until(lambda: len(profiles) > count and profiles[-1].stop, "the stop")
-        probe.until(future.done, "an answer to the cancellation")
-        result = probe.result(goal).result
-        assert result.outcome == DeliverPulseTrain.Result.CANCELLED
-        assert result.delivered == 1
-        assert list(promise(4, 6).torques) == [0.0]
-        # Another train may follow.
-        train.first_onset.sec = 7
-        again = probe.send_goal(DeliverPulseTrain, "perturbator/deliver_pulse_train", train)
-        assert again.accepted
-        # A run that begins before it is over ends it.
-        assert promise(7, 9, run=8).stop
-        result = probe.result(again).result
-        assert result.outcome == DeliverPulseTrain.Result.STOPPED
-        assert result.message == "another run began"

@@ -14,13 +14,7 @@ from gait_entrainment.experiment import Conductor
 from gait_entrainment.gait import GaitEvent, VerdictSettings, analyze
 from gait_entrainment.outcome import Run
 from gait_entrainment.protocol import Protocol
-from gait_entrainment.robot import (
-    DeviceLimits,
-    LimitError,
-    MeasuredOnsets,
-    PulseTrain,
-    find_driver,
-)
+from gait_entrainment.robot import LimitError, MeasuredOnsets, PulseTrain, find_driver
 from gait_entrainment.walker import Ending, Walker
 
 
@@ -34,7 +28,6 @@ class Simulation(Run):
 
 def simulate(
     protocol: Protocol,
-    limits: DeviceLimits | None = None,
     settings: VerdictSettings | None = None,
     *,
     measured_onsets: bool = False,
@@ -45,7 +38,7 @@ def simulate(
     With ``measured_onsets`` the analysis takes the onset of each pulse from the torque that the
     robot measured, if that shows one, instead of from the command.
 
-    Raises LimitError if the driver is unknown or the pulses are outside the limits of the device,
+    Raises LimitError if the driver is unknown or the pulses are outside the protocol's limits,
     ProtocolError if the pulses would overlap at the measured period.
     """
     driver = find_driver(protocol.driver)
@@ -53,8 +46,8 @@ def simulate(
         raise LimitError(
             f"driver: {driver.name} runs in real time only; use entrain run --real-time"
         )
-    robot = driver.make(protocol.side, limits, protocol.seed)
-    robot.limits.check_pulse(protocol.pulse_torque, protocol.pulses.width)
+    robot = driver.make(protocol.side, protocol.limits, protocol.seed)
+    protocol.limits.check_pulse(protocol.pulse_torque, protocol.pulses.width)
     robot.configure()
     robot.activate()
     robot.begin(0)
@@ -68,8 +61,9 @@ def simulate(
         profile = robot.promise(horizon.until)
         onsets += profile.onsets
         measured.add_promise(profile.onsets, profile.valid_until)
-        for onset in profile.onsets:
-            measured.add_pulse(onset, protocol.pulse_torque, protocol.pulses.width)
+        for number, onset in enumerate(profile.onsets, robot.delivered - len(profile.onsets)):
+            assert robot.train is not None
+            measured.add_pulse(onset, robot.train.height(number), protocol.pulses.width)
         for state in robot.read():
             measured.add_state(state)
         walker.promise(profile)

@@ -22,6 +22,7 @@ CLOCK = "/clock"
 TORQUE_PROFILE = "perturbation/torque_profile"
 PULSES = "perturbation/pulses"
 ROBOT_STATE = "perturbator/state"
+ROBOT_SETUP = "perturbator/setup"
 TROUBLE = "perturbator/trouble"
 EMERGENCY_STOP = "perturbator/emergency_stop"
 

@@ -17,7 +17,7 @@ from launch.actions import (
 )
 from launch.event_handlers import OnProcessExit
 from launch.events.process import ProcessExited
-from launch.substitutions import EnvironmentVariable, LaunchConfiguration
+from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.utilities import make_namespace_absolute, prefix_namespace
@@ -25,7 +25,7 @@ from launch_ros.utilities import make_namespace_absolute, prefix_namespace
 from gait_entrainment.errors import EntrainmentError
 from gait_entrainment_bringup.node_list import DISPLAY, MOVED, Parameters, settings_file
 from gait_entrainment_nodes.messaging.client import Client
-from gait_entrainment_nodes.messaging.environment import PACKAGE, fastdds_profiles, shared_file
+from gait_entrainment_nodes.messaging.environment import PACKAGE, dds_variables, shared_file
 
 # Argument of a launch file: name, default (None if it must be given), what --show-args says.
 Argument = tuple[str, str | None, str]
@@ -48,17 +48,16 @@ def description(
     """
     Describe a launch that makes nodes once the arguments are known.
 
-    Fast DDS gets the profiles of this project unless the user has chosen others.
+    A launch without an argument ``real_time`` is one in real time.
     """
-    profiles = "FASTRTPS_DEFAULT_PROFILES_FILE"
-    ours = EnvironmentVariable(profiles, default_value=str(fastdds_profiles()))
-    return LaunchDescription(
-        [
-            *(DeclareLaunchArgument(n, default_value=d, description=t) for n, d, t in arguments),
-            SetEnvironmentVariable(profiles, ours),
-            OpaqueFunction(function=nodes),
-        ]
-    )
+
+    def make(context: LaunchContext) -> list[Action]:
+        real_time = context.launch_configurations.get("real_time", "true").lower() == "true"
+        chosen = dds_variables(real_time=real_time).items()
+        return [*(SetEnvironmentVariable(*pair) for pair in chosen), *nodes(context)]
+
+    declared = (DeclareLaunchArgument(n, default_value=d, description=t) for n, d, t in arguments)
+    return LaunchDescription([*declared, OpaqueFunction(function=make)])
 
 
 def value(context: LaunchContext, name: str) -> str:

@@ -16,7 +16,7 @@ from typing import Any
 
 import yaml
 
-from gait_entrainment.protocol import Protocol, read_protocol
+from gait_entrainment.protocol import Protocol, read_protocol, said_limits
 from gait_entrainment.robot import find_driver
 from gait_entrainment_bags import BagError, BagReader
 from gait_entrainment_bringup.provenance import provenance
@@ -35,6 +35,12 @@ LEAD_TIME = 0.3
 # A real robot's torque is known only once it has been measured and promised: by so much the walker
 # lags behind the wall clock to show what it felt [s].
 MEASURED_DELAY = 0.1
+# The flanks of a real robot's pulses, as a share of their width, and how many of its first pulses
+# are lower.
+FLANK_SHARE = 0.1
+RISING = 5
+# By how much the clocks of the hosts of a real robot may differ [s]: what a phase lag is worth.
+CLOCK_OFFSET = 0.005
 # How long any node, or the operator, may be silent while a real robot is worn [s].
 PERSON_SILENCE = 0.75
 
@@ -103,6 +109,10 @@ def parameters(
             "driver": protocol.driver,
             "seed": protocol.seed,
             "armed": armed,
+            "planned.torque": abs(protocol.pulse_torque),
+            "planned.duration": protocol.pulses.width,
+            "planned.count": protocol.pulses.count,
+            **{f"limits.{name}": value for name, value in said_limits(protocol).items()},
         },
         "gait_analyzer": {"side": side, "onset": onset},
         "experiment": {"participants": [node for node in NODES if node != "experiment"]},
@@ -123,6 +133,12 @@ def parameters(
             "limits.silence": PERSON_SILENCE + 0.05,
             "operator_timeout": PERSON_SILENCE,
         }
+        # No person gets square pulses of full height from the first one on, unless it is said.
+        if protocol.pulse_torque:
+            rate = abs(protocol.pulse_torque) / (FLANK_SHARE * protocol.pulses.width)
+            given["perturbator"].setdefault("limits.rate", min(rate, 1e6))
+        given["perturbator"].setdefault("limits.rising", RISING)
+        given["experiment"]["longest_clock_offset"] = CLOCK_OFFSET
         given["bag_recorder"]["required"] = True
     return {name: given[name] | {"use_sim_time": not real_time} for name in given}
 

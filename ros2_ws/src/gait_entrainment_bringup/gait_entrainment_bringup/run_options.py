@@ -12,7 +12,7 @@ from gait_entrainment.commands.outcome_options import add_onset_option
 from gait_entrainment.commands.protocol_options import add_protocol_options, chosen_protocol
 from gait_entrainment.errors import UsageError
 from gait_entrainment.protocol import Protocol
-from gait_entrainment.robot import DeviceLimits, LimitError, find_driver
+from gait_entrainment.robot import LimitError, find_driver
 from gait_entrainment.settings import Setting
 from gait_entrainment_bringup.node_list import LEAD_TIME, Parameters, bag_folder, parameters
 
@@ -64,7 +64,7 @@ def checked_run(
     Raises UsageError, LimitError or DeviceError.
     """
     protocol = chosen_protocol(options)
-    DeviceLimits().check_pulse(protocol.pulse_torque, protocol.pulses.width)
+    protocol.limits.check_pulse(protocol.pulse_torque, protocol.pulses.width)
     for name, told in _NUMBERS.items():
         if (text := getattr(options, name)) is not None:
             setattr(options, name, told.parse(_option(name), text))

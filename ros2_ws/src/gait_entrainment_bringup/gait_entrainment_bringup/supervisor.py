@@ -118,7 +118,11 @@ class Supervisor:
 
 @contextmanager
 def supervised(
-    domain: int, order: Sequence[str], remains: Callable[[], str] = lambda: ""
+    domain: int,
+    order: Sequence[str],
+    remains: Callable[[], str] = lambda: "",
+    *,
+    real_time: bool = False,
 ) -> Iterator[Supervisor]:
     """
     Give a supervisor of processes in a ROS domain, and stop these in order at the end.
@@ -127,7 +131,7 @@ def supervised(
     What fails or is interrupted meanwhile becomes a NodeError: the reason, what ``remains`` says
     once everything has stopped, and the end of the log of the node to blame.
     """
-    environment = set_environment(domain)
+    environment = set_environment(domain, real_time=real_time)
     load()
     with tempfile.TemporaryDirectory(prefix="entrain_") as folder:
         supervisor = Supervisor(Path(folder), environment, METHOD)

@@ -43,6 +43,7 @@ ELSEWHERE = {
     *(f"{name}.use_sim_time" for name in (*NODES, "bag_player")),
     *(f"{name}.start_type_description_service" for name in (*NODES, "bag_player", DISPLAY)),
     "experiment.longest_lookahead",
+    "experiment.longest_clock_offset",
     "perturbator.operator_timeout",
     "experiment.protocol",
     "bag_recorder.topics",

@@ -14,7 +14,8 @@ def _option(field: str) -> str:
     """Return the option that changes a field of the protocol."""
     if field == "pulses.count":
         return "--pulses"
-    return "--" + field.rpartition(".")[2].replace("_", "-")
+    section, _, name = field.rpartition(".")
+    return ("--limit-" if section == "limits" else "--") + name.replace("_", "-")
 
 
 def add_protocol_options(parser: argparse.ArgumentParser) -> None:
@@ -22,8 +23,10 @@ def add_protocol_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "protocol", nargs="?", metavar="PROTOCOL.yaml", help="default: the paper's example"
     )
-    group = parser.add_argument_group("fields of the protocol")
+    fields = parser.add_argument_group("fields of the protocol")
+    limits = parser.add_argument_group("limits of what the person may get")
     for field, setting in FIELDS.items():
+        group = limits if field.startswith("limits.") else fields
         unit = f" [{setting.unit}]" if setting.unit not in ("", "1") else ""
         kind = str if issubclass(setting.kind, Enum) else setting.kind
         group.add_argument(

@@ -4,4 +4,9 @@
 """What an experiment shall do: the protocol file, validated."""
 
 from gait_entrainment.protocol.protocol import FIELDS, Protocol, ProtocolError, PulsePlan
-from gait_entrainment.protocol.reader import DEFAULT_PROTOCOL, read_protocol, write_protocol
+from gait_entrainment.protocol.reader import (
+    DEFAULT_PROTOCOL,
+    read_protocol,
+    said_limits,
+    write_protocol,
+)

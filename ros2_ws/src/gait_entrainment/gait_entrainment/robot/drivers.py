@@ -17,7 +17,7 @@ from gait_entrainment.conventions import Side
 from gait_entrainment.robot.contract import AnkleRobot
 from gait_entrainment.robot.faults import DeviceError, LimitError
 from gait_entrainment.robot.guard import GuardedRobot
-from gait_entrainment.robot.limits import DeviceLimits
+from gait_entrainment.robot.limits import DeviceLimits, Dose
 from gait_entrainment.settings import SettingError, settings_of
 
 ENTRY_POINTS = "gait_entrainment.drivers"
@@ -36,9 +36,15 @@ class Driver:
     robot: type[AnkleRobot]
     options: Any
 
-    def make(self, side: Side, limits: DeviceLimits | None = None, seed: int = 0) -> GuardedRobot:
+    def make(
+        self,
+        side: Side,
+        limits: DeviceLimits | None = None,
+        seed: int = 0,
+        dose: Dose | None = None,
+    ) -> GuardedRobot:
         """Return the robot behind the safety envelope, in the state before ``configure``."""
-        return GuardedRobot(self.robot(side, self.options, seed), side, limits)
+        return GuardedRobot(self.robot(side, self.options, seed), side, limits, dose)
 
     @property
     def simulated(self) -> bool:

@@ -152,8 +152,9 @@ class EmulatedAnkleRobot(SimulatedRobot):
             return 0.0
         elapsed = instant - train.onset(number) - self._late[number]
         if elapsed < 0 and number > 0:  # the pulse before may come so late that it is still on
-            elapsed = instant - train.onset(number - 1) - self._late[number - 1]
-        return train.height_at(elapsed)
+            number -= 1
+            elapsed = instant - train.onset(number) - self._late[number]
+        return train.shape(number, elapsed)
 
 
 class _Draws:

@@ -35,6 +35,11 @@ OPERATOR_SILENT = Fault(
     "Whoever started the run fell silent for longer than the limit: its terminal is closed, or its"
     " process is frozen.",
 )
+DEADMAN_SILENT = Fault(
+    "deadman_silent",
+    "The emergency stop fell silent for longer than the limit: it was let go, or its node has"
+    " ended.",
+)
 EXPERIMENT_SILENT = Fault(
     "experiment_silent", "The experiment sent no horizon for longer than the limit."
 )

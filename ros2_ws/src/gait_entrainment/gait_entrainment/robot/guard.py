@@ -35,7 +35,7 @@ from gait_entrainment.robot.faults import (
     Fault,
     LimitError,
 )
-from gait_entrainment.robot.limits import DeviceLimits
+from gait_entrainment.robot.limits import DeviceLimits, Dose
 from gait_entrainment.robot.profile import ProfileError, TorqueProfile
 from gait_entrainment.robot.pulse_train import PulseTrain
 
@@ -48,15 +48,23 @@ _T = TypeVar("_T")
 class GuardedRobot:
     """An ankle robot behind the safety envelope; nobody else may keep the driver."""
 
-    def __init__(self, robot: AnkleRobot, side: Side, limits: DeviceLimits | None = None) -> None:
+    def __init__(
+        self,
+        robot: AnkleRobot,
+        side: Side,
+        limits: DeviceLimits | None = None,
+        dose: Dose | None = None,
+    ) -> None:
         self._robot = robot
         self.side = side
         self.limits = limits or DeviceLimits()
+        self.dose = dose or Dose()  # goes on from robot to robot, as the session does
         self.train: PulseTrain | None = None  # scheduled last
         self.delivered = 0  # pulses of it that have begun in what was promised
         self.promised_until = 0  # everything before this instant is promised [ns]
         self.faults: tuple[Fault, ...] = ()  # what latched the torque at zero, in order
-        self._configured = self._active = self._armed = self._begun = False
+        self._configured = self._active = self._begun = False
+        self._armed_until = -math.inf  # steady time [s]
         self._delivered_torque = _DeliveredTorque(self.limits)
         self._last_heard = math.inf  # steady time [s]
         self._watching = threading.Event()
@@ -74,7 +82,7 @@ class GuardedRobot:
     @property
     def armed(self) -> bool:
         """Whether torque is allowed; a device in simulated time needs no arming."""
-        return self._armed
+        return time.monotonic() < self._armed_until
 
     @property
     def busy(self) -> bool:
@@ -106,7 +114,7 @@ class GuardedRobot:
             raise DeviceError("the device is active already; deactivate it first")
         self._call(self._robot.activate)
         self._active = True
-        self._armed = self.capabilities.simulated
+        self._armed_until = math.inf if self.capabilities.simulated else -math.inf
         if not self.capabilities.simulated:
             # The interpreter's end kills the threads of a driver: zero torque comes before it.
             atexit.register(self.close)
@@ -114,10 +122,11 @@ class GuardedRobot:
             threading.Thread(target=self._watch, name="experiment watchdog", daemon=True).start()
 
     def arm(self) -> None:
-        """Allow torque: the step taken by a person who has seen that all is well."""
+        """Allow torque for a time: the step taken by a person who has seen that all is well."""
         self._refuse_latched()
         self._refuse_inactive()
-        self._armed = True
+        if not self.capabilities.simulated:
+            self._armed_until = time.monotonic() + self.limits.arming
 
     def begin(self, start: int) -> None:
         """
@@ -141,7 +150,7 @@ class GuardedRobot:
         self.train = None
         self._watching.clear()
         if self._active:
-            self._active = self._armed = False
+            self._active, self._armed_until = False, -math.inf
             self._quietly(self._robot.deactivate)
 
     def close(self) -> None:
@@ -176,9 +185,12 @@ class GuardedRobot:
         self._refuse_latched()
         self._refuse_inactive()
         self._refuse_before_begin()
-        if not self._armed:
-            raise DeviceError("the device is not armed; see that all is well, then arm it")
+        if not self.armed:
+            lapsed = math.isfinite(self._armed_until)
+            why = f"was armed more than {self.limits.arming:g} s ago" if lapsed else "is not armed"
+            raise DeviceError(f"the device {why}; see that all is well, then arm it")
         self.limits.check(train)
+        self.limits.check_dose(self.dose, train)
         peak = self.capabilities.peak_torque
         if abs(train.torque) > peak:
             raise LimitError(
@@ -192,7 +204,7 @@ class GuardedRobot:
         if train.first_onset < self.promised_until:
             late = (self.promised_until - train.first_onset) / NANOSECONDS_PER_SECOND
             raise LimitError(f"first_onset: lies {late:g} s inside what is already promised")
-        train = self.limits.ramped(train)
+        train = self.limits.softened(train)
         self._call(lambda: self._robot.schedule(train))
         self.train, self.delivered = train, 0
         self.heard()
@@ -240,6 +252,8 @@ class GuardedRobot:
             self.stop(DRIVER_FAILED)
             raise DeviceError(f"the driver broke its contract: {error}") from None
         self.delivered += len(profile.onsets)
+        self.dose.pulses += len(profile.onsets)
+        self.dose.impulse += sum(_impulse(*piece) for piece in profile.pieces)
         self.promised_until = profile.valid_until
         fault = self._delivered_torque.add(profile)
         if fault is not None:

@@ -61,5 +61,5 @@ def _pulse(train: PulseTrain, number: int) -> Iterator[tuple[int, float]]:
     onset, end = train.onset(number), train.end(number)
     for instant in range(onset, end, _STEP if train.ramp else max(end - onset, 1)):
         middle = (instant + min(instant + _STEP, end)) // 2
-        yield instant, train.height_at(middle - onset)
+        yield instant, train.shape(number, middle - onset)
     yield end, 0.0

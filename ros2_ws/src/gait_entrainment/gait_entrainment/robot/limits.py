@@ -1,7 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Limits that every pulse train is checked against before a robot sees it."""
+"""
+Limits that every pulse train is checked against before a robot sees it.
+
+A person may get torque of some height, width, slope and rate, and so much of it in a session.
+"""
 
 import math
 from dataclasses import dataclass, replace
@@ -9,6 +13,39 @@ from dataclasses import dataclass, replace
 from gait_entrainment.robot.faults import LimitError
 from gait_entrainment.robot.pulse_train import PulseTrain
 from gait_entrainment.settings import check_settings, setting
+
+_NO_LIMIT = 1_000_000
+
+
+@dataclass
+class Dose:
+    """What a person has received so far."""
+
+    pulses: int = 0
+    impulse: float = 0.0  # magnitude of the delivered angular impulse [N m s]
+
+
+@dataclass(frozen=True)
+class PlannedPulses:
+    """The pulses that the protocol under way may ask for; nobody else asks for more."""
+
+    torque: float = setting(200.0, "magnitude of the protocol's pulses", "N m", (0.0, 200.0))
+    duration: float = setting(10.0, "their duration", "s", (0.0, 10.0))
+    count: int = setting(_NO_LIMIT, "their number", within=(1, _NO_LIMIT))
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        check_settings(self)
+
+    def check(self, train: PulseTrain) -> None:
+        """Raise LimitError if a train goes beyond the protocol."""
+        for name in ("torque", "duration", "count"):
+            asked, planned = abs(getattr(train, name)), getattr(self, name)
+            if not asked <= planned:
+                raise LimitError(
+                    f"{name}: {asked:g} is not of the protocol's pulses; allowed: at most "
+                    f"{planned:g}"
+                )
 
 
 @dataclass(frozen=True)
@@ -30,6 +67,21 @@ class DeviceLimits:
         (0.0, 1e6),
     )
     impulse: float = setting(15.0, "largest angular impulse within a stride", "N m s", (0.0, 1e3))
+    rising: int = setting(
+        0, "first pulses of a train, which rise in equal steps to its height", within=(0, 1000)
+    )
+    pulses_per_minute: float = setting(
+        600.0, "most pulses in a minute, by the period of a train", "1/min", (1.0, 6000.0)
+    )
+    session_pulses: int = setting(
+        _NO_LIMIT, "most pulses from when the node was started", within=(0, _NO_LIMIT)
+    )
+    session_impulse: float = setting(
+        1e6, "largest sum of angular impulse from when the node was started", "N m s", (0.0, 1e6)
+    )
+    arming: float = setting(
+        1800.0, "time after arming in which a train is accepted", "s", (1.0, 86_400.0)
+    )
     stride: float = setting(
         1.0, "time that counts as a stride: no longer than the wearer's shortest", "s", (0.1, 10.0)
     )
@@ -86,11 +138,31 @@ class DeviceLimits:
                 f"duty: {train.duration / train.period:.3g} of the time with torque; "
                 f"allowed: at most {self.duty:g}"
             )
+        if train.count > 1 and train.period * self.pulses_per_minute < 60 * (1 - 1e-9):
+            raise LimitError(
+                f"period: {train.period:g} s; allowed: at least "
+                f"{60 / self.pulses_per_minute:g} s ({self.pulses_per_minute:g} pulses a minute)"
+            )
         self._check_impulse(train.impulse_within(self.stride))
 
-    def ramped(self, train: PulseTrain) -> PulseTrain:
-        """Return a checked train with flanks no steeper than the limit."""
-        return replace(train, ramp=abs(train.torque) / self.rate) if self.rate else train
+    def check_dose(self, dose: Dose, train: PulseTrain) -> None:
+        """Raise LimitError if a train is too much after what was received already."""
+        pulses = dose.pulses + train.count
+        if pulses > self.session_pulses:
+            raise LimitError(
+                f"session_pulses: {pulses} with this train; allowed: at most {self.session_pulses}"
+            )
+        impulse = dose.impulse + abs(train.torque) * train.duration * train.count
+        if impulse > self.session_impulse:
+            raise LimitError(
+                f"session_impulse: {impulse:.4g} N m s with this train; allowed: at most "
+                f"{self.session_impulse:g} N m s"
+            )
+
+    def softened(self, train: PulseTrain) -> PulseTrain:
+        """Return a checked train with flanks no steeper than the limit and a gentle beginning."""
+        ramp = abs(train.torque) / self.rate if self.rate else 0.0
+        return replace(train, ramp=ramp, rising=self.rising)
 
     def _check_impulse(self, impulse: float) -> None:
         if impulse > self.impulse:

@@ -20,6 +20,7 @@ class PulseTrain:
     torque: float  # height [N m], plantarflexion positive
     duration: float  # width [s], flanks included
     ramp: float = 0.0  # duration [s] of each flank, at most half the width; 0 is a square pulse
+    rising: int = 0  # so many first pulses are lower: they rise in equal steps to the height
 
     def onset(self, number: int) -> int:
         """
@@ -51,24 +52,28 @@ class PulseTrain:
     def torque_at(self, instant: int) -> float:
         """Return the torque [N m] asked for at an instant [ns]."""
         number = self.latest(instant)
-        return self.height_at(instant - self.onset(number)) if number >= 0 else 0.0
+        return self.shape(number, instant - self.onset(number)) if number >= 0 else 0.0
 
-    def height_at(self, elapsed: int) -> float:
-        """Return the torque [N m] at a time [ns] since the onset of a pulse."""
+    def height(self, number: int) -> float:
+        """Return the height [N m] of pulse ``number``, counted from 0."""
+        return self.torque * min((number + 1) / (self.rising + 1), 1.0)
+
+    def shape(self, number: int, elapsed: int) -> float:
+        """Return the torque [N m] of pulse ``number`` at a time [ns] since its onset."""
         width = nanoseconds(self.duration)
         if not 0 <= elapsed < width:
             return 0.0
         if self.ramp == 0:
-            return self.torque
+            return self.height(number)
         nearest_flank = min(elapsed, width - elapsed) / NANOSECONDS_PER_SECOND
-        return self.torque * min(nearest_flank / self.ramp, 1.0)
+        return self.height(number) * min(nearest_flank / self.ramp, 1.0)
 
     def impulse_within(self, window: float) -> float:
         """
         Return the largest angular impulse [N m s] that falls into any ``window`` [s].
 
-        No window holds more than the one that begins with a pulse. Ramps are left out of account,
-        so that the value is never too small.
+        No window holds more than the one that begins with a pulse. Ramps and lower first pulses
+        are left out of account, so that the value is never too small.
         """
         whole = min(math.floor(window / self.period), self.count)
         rest = min(window - whole * self.period, self.duration) if whole < self.count else 0.0

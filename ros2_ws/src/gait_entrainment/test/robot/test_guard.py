@@ -14,11 +14,14 @@ from gait_entrainment.conventions import Side
 from gait_entrainment.robot import (
     DeviceError,
     DeviceLimits,
+    Dose,
     Fault,
     GuardedRobot,
     LimitError,
+    PlannedPulses,
     PulseTrain,
     TorqueProfile,
+    find_driver,
 )
 from gait_entrainment.robot.faults import EXPERIMENT_SILENT
 
@@ -65,6 +68,10 @@ def ready(limits=None, simulated=True):
         ({"impulse": 1.5}, {"period": 0.5}, "impulse: 2.6 N m s"),
         ({"impulse": 1.5}, {"period": 0.5, "torque": -13.0}, "impulse: 2.6 N m s"),
         ({"duty": 0.05}, {}, "duty: 0.0526.*at most 0.05"),
+        ({"pulses_per_minute": 30.0}, {}, r"period: 1.9 s; allowed: at least 2 s \(30 pulses"),
+        ({}, {"period": 2e-9, "duration": 1e-9, "count": 2**32}, "duty: 0.5|period|impulse"),
+        ({"session_pulses": 3}, {}, "session_pulses: 4 with this train; allowed: at most 3"),
+        ({"session_impulse": 5.0}, {}, "session_impulse: 5.2 N m s.*at most 5"),
         ({}, {"first_onset": -1}, "already promised"),
         ({}, {"side": Side.RIGHT}, "other ankle"),
     ],
@@ -80,7 +87,15 @@ def test_a_train_outside_the_limits_never_reaches_the_driver(limits, changes, wo
 
 @pytest.mark.parametrize(
     "limits",
-    [{"torque": 13.0}, {"duration": 0.1}, {"impulse": 1.3001}, {"duty": 0.0527}, {"rate": 260.0}],
+    [
+        {"torque": 13.0},
+        {"duration": 0.1},
+        {"impulse": 1.3001},
+        {"duty": 0.0527},
+        {"rate": 260.0},
+        {"pulses_per_minute": 60 / 1.9},
+        {"session_pulses": 4, "session_impulse": 5.2001},
+    ],
 )
 def test_a_train_at_its_limits_is_accepted(limits):
     guard, _ = ready(DeviceLimits(**limits))
@@ -153,6 +168,54 @@ def test_a_device_outside_simulation_needs_arming():
     guard.configure()
     guard.activate()
     assert not guard.armed
+
+
+def test_arming_expires(monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr("gait_entrainment.robot.guard.time.monotonic", lambda: now[0])
+    guard, driver = ready(DeviceLimits(arming=60.0), simulated=False)
+    guard.arm()
+    now[0] += 59.0
+    assert guard.armed
+    now[0] += 2.0
+    with pytest.raises(DeviceError, match="armed more than 60 s ago; see that all is well"):
+        guard.schedule(train())
+    assert "schedule" not in driver.calls
+    guard.arm()
+    guard.schedule(train())
+    guard.close()
+
+
+def test_the_dose_goes_on_from_run_to_run_and_from_robot_to_robot():
+    dose = Dose()
+
+    def next_robot():
+        limits = DeviceLimits(session_pulses=10)
+        robot = find_driver("ideal").make(Side.LEFT, limits, dose=dose)
+        robot.configure()
+        robot.activate()
+        robot.begin(0)
+        return robot
+
+    for _ in range(2):
+        robot = next_robot()
+        robot.schedule(train())
+        robot.promise(20 * SECOND)
+        robot.close()
+    assert dose.pulses == 8
+    assert dose.impulse == pytest.approx(8 * 1.3)
+    with pytest.raises(LimitError, match="session_pulses: 12"):
+        next_robot().schedule(train())
+    next_robot().schedule(train(count=2))
+
+
+def test_only_the_pulses_of_the_protocol_are_asked_for():
+    planned = PlannedPulses(torque=13.0, duration=0.1, count=4)
+    planned.check(train())
+    planned.check(train(torque=-13.0, count=1))
+    for changes in ({"torque": -13.1}, {"duration": 0.11}, {"count": 5}, {"torque": math.nan}):
+        with pytest.raises(LimitError, match="not of the protocol's pulses; allowed: at most"):
+            planned.check(train(**changes))
 
 
 def test_a_stop_latches_until_closed_and_configured():

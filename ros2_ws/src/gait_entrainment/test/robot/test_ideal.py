@@ -110,6 +110,13 @@ def test_what_it_must_not_deliver_is_refused_and_changes_nothing(changes, words)
     assert robot.promise(20 * SECOND).torques == (0.0,)
 
 
+def test_first_pulses_rise_in_equal_steps():
+    robot = ideal_robot(limits=DeviceLimits(rising=3))
+    robot.schedule(train(count=6, torque=-12.0))
+    heights = [torque for torque in robot.promise(20 * SECOND).torques if torque]
+    assert heights == [-3.0, -6.0, -9.0, -12.0, -12.0, -12.0]
+
+
 def test_one_train_at_a_time():
     robot = ideal_robot()
     robot.schedule(train())

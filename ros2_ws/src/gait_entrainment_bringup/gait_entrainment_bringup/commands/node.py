@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
     domain = wanted_domain() or 0
     drives, records = options.node == "perturbator", options.node == "bag_recorder"
     protocol, bag = checked_run(options, drives=drives, records=records)
-    set_environment(domain)
+    set_environment(domain, real_time=options.real_time)
     given = chosen_parameters(protocol, bag, options)
     given["experiment"]["protocol"] = write_protocol(protocol)
     with tempfile.TemporaryDirectory(prefix="entrain_") as folder:

@@ -73,7 +73,9 @@ def run_experiment(
 ) -> None:
     """Start the nodes, conduct the protocol, stop the nodes, report."""
     figures = not options.no_figures
-    with supervised(domain, STOP_ORDER, partial(kept, bag)) as supervisor:
+    with supervised(
+        domain, STOP_ORDER, partial(kept, bag), real_time=options.real_time
+    ) as supervisor:
         given = chosen_parameters(protocol, bag, options)
         arguments = parameter_arguments(given, supervisor.folder)
         for node in NODES:

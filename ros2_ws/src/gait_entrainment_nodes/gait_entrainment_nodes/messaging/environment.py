@@ -3,7 +3,9 @@
 
 """What the processes of a run share: environment and installed files."""
 
+import getpass
 import os
+import socket
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
@@ -16,20 +18,35 @@ def shared_file(package: str, name: str) -> Path:
     return Path(get_package_share_directory(package)) / name
 
 
-def fastdds_profiles() -> Path:
-    """Return the Fast DDS profiles that a run needs; the file says what for."""
-    return shared_file(PACKAGE, "config/fastdds.xml")
-
-
-def set_environment(domain: int) -> dict[str, str]:
+def dds_variables(*, real_time: bool) -> dict[str, str]:
     """
-    Put this process into a ROS domain; return the environment for the processes it starts.
+    Return the environment variables that choose discovery and the Fast DDS profiles.
 
-    The range of discovery and the Fast DDS profiles stay as the user has set them.
+    They stay as the user has set them. The files say what the profiles are for; those of real
+    time are for one host, so a wider range of discovery keeps the others.
     """
-    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    os.environ.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(fastdds_profiles()))
+    reach, file = "ROS_AUTOMATIC_DISCOVERY_RANGE", "FASTRTPS_DEFAULT_PROFILES_FILE"
+    ours = str(shared_file(PACKAGE, "config/fastdds.xml"))
+    chosen = {reach: os.environ.get(reach, "LOCALHOST"), file: os.environ.get(file, ours)}
+    if real_time and chosen == {reach: "LOCALHOST", file: ours}:
+        ours = str(shared_file(PACKAGE, "config/fastdds_real_time.xml"))
+        return {reach: "SYSTEM_DEFAULT", file: ours}
+    return chosen
+
+
+def set_environment(domain: int, *, real_time: bool = False) -> dict[str, str]:
+    """Put this process into a ROS domain; return the environment for those it starts."""
+    os.environ.update(dds_variables(real_time=real_time))
     # No node has large matrices: threads for them take longer to start than they save.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ["ROS_DOMAIN_ID"] = str(domain)
     return dict(os.environ)
+
+
+def user_and_host() -> str:
+    """Return who runs this process, and where."""
+    try:
+        user = getpass.getuser()
+    except (KeyError, OSError):  # a container's user that has no name
+        user = f"user {os.getuid()}"
+    return f"{user}@{socket.gethostname()}"

@@ -12,7 +12,11 @@ import rclpy
 from rclpy.duration import Duration
 
 from gait_entrainment_nodes.messaging.raw_messages import serialize
-from gait_entrainment_nodes.messaging.topics import Topic
+from gait_entrainment_nodes.messaging.topics import (
+    EVERY_MESSAGE,
+    EVERY_MESSAGE_IN_REAL_TIME,
+    Topic,
+)
 
 # While the slowest reader catches up, a full writer is tried again this often [s].
 RETRY_PERIOD = 0.002
@@ -35,7 +39,10 @@ class CountedPublisher:
 
     def __init__(self, node: Any, topic: Topic, *, counted: bool = True) -> None:
         self._node, self.counted = node, counted
-        self._publisher = node.create_publisher(topic.type, topic.name, topic.qos)
+        qos = topic.qos
+        if qos is EVERY_MESSAGE and not node.get_parameter("use_sim_time").value:
+            qos = EVERY_MESSAGE_IN_REAL_TIME
+        self._publisher = node.create_publisher(topic.type, topic.name, qos)
         self.count = 0
 
     @property

@@ -28,6 +28,11 @@ from gait_entrainment_msgs import msg
 EVERY_MESSAGE = QoSProfile(
     history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE, depth=0
 )
+# In real time nobody is waited for: what a reader has not taken for so many messages, 2 s of
+# samples at 1 kHz, is lost to it, and the recorder tells a loss by the counts.
+EVERY_MESSAGE_IN_REAL_TIME = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.RELIABLE, depth=2_048
+)
 # The latest state matters, also to who joins late. The writer keeps more than that, so that a
 # recorder which is briefly behind misses nothing.
 LATEST_STATE = QoSProfile(
@@ -88,6 +93,7 @@ CLOCK = Topic(topic_names.CLOCK, ClockMessage)
 TORQUE_PROFILE = Topic(topic_names.TORQUE_PROFILE, msg.TorqueProfile)
 PULSES = Topic(topic_names.PULSES, msg.TorquePulse)
 ROBOT_STATE = Topic(topic_names.ROBOT_STATE, msg.AnkleRobotState)
+ROBOT_SETUP = Topic(topic_names.ROBOT_SETUP, msg.AnkleRobotSetup, LATEST_STATE)
 TROUBLE = Topic(topic_names.TROUBLE, msg.Trouble)
 EMERGENCY_STOP = Topic(topic_names.EMERGENCY_STOP, Bool, LATCHED_STATE)
 

@@ -18,6 +18,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.action import ActionClient
+from rclpy.node import NodeNameNonExistentError
 from rclpy.task import Future
 
 from gait_entrainment.experiment import Conductor, Part
@@ -29,6 +30,7 @@ from gait_entrainment_msgs import msg
 from gait_entrainment_msgs.action import DeliverPulseTrain, RunProtocol
 from gait_entrainment_msgs.srv import StartRun
 from gait_entrainment_nodes.messaging import topics
+from gait_entrainment_nodes.messaging.readers import suspended_readers
 from gait_entrainment_nodes.messaging.stamps import to_time
 from gait_entrainment_nodes.nodes.experiment_run import (
     PERTURBATOR,
@@ -42,7 +44,7 @@ from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.one_goal import OneGoalServer
 from gait_entrainment_nodes.nodes.parameters import texts
 from gait_entrainment_nodes.nodes.participant import Participant
-from gait_entrainment_nodes.nodes.participants import Participants
+from gait_entrainment_nodes.nodes.participants import ClockError, Participants
 from gait_entrainment_nodes.nodes.waiting import Waiting
 
 # How long each step of ending a failed run may take [s]: who fails may not answer any more.
@@ -80,6 +82,13 @@ class Settings:
     )
     ready_timeout: float = setting(
         30.0, "how long to wait for the participants before a run", "s", (1.0, 600.0)
+    )
+    longest_clock_offset: float = setting(
+        0.0,
+        "by which the clock of a participant may differ; 0 compares none, as simulated time needs "
+        "none",
+        "s",
+        (0.0, 10.0),
     )
     protocol: str = setting(
         "",
@@ -124,7 +133,7 @@ class Experiment(Participant):
 
     def why_fixed(self, name: str) -> str:
         """Return why a parameter cannot change now; timeouts always can."""
-        return super().why_fixed(name) if name == "longest_lookahead" else ""
+        return super().why_fixed(name) if name.startswith("longest_") else ""
 
     # The run
 
@@ -143,7 +152,9 @@ class Experiment(Participant):
         """Conduct a protocol, a file or its text; the result says how it ended."""
         self._runs += 1
         recorded = RECORDER in self._participants.names
-        run = self.run = Run(self._runs, self.publish, self._request, recorded=recorded)
+        run = self.run = Run(
+            self._runs, self.publish, self._request, recorded=recorded, held_up=self._held_up
+        )
         self.note_state(DiagnosticStatus.OK, f"run {run.number} goes on")
         result = RunProtocol.Result(run=run.number, outcome=RunProtocol.Result.FAILED)
         try:
@@ -214,12 +225,14 @@ class Experiment(Participant):
             if self._server.cancelled:
                 raise ExperimentError("cancelled by the client")
             try:
-                await self._participants.check()
+                await self._participants.check(self.settings.longest_clock_offset)
                 if not (self._start.service_is_ready() and self._deliver.server_is_ready()):
                     raise ExperimentError(f"{WALKER} or {PERTURBATOR} is not there", WALKER)
                 if waiting := self.not_ready():
                     raise ExperimentError(f"experiment waits for {waiting}", self.get_name())
                 return
+            except ClockError:
+                raise
             except ExperimentError as missing:
                 if time.monotonic() > give_up:
                     what = f"not ready within {timeout:g} s: {missing}"
@@ -271,6 +284,13 @@ class Experiment(Participant):
         super().publish(topic, message)
         if topic is topics.EXPERIMENT_STATE:
             self._server.publish_feedback(RunProtocol.Feedback(state=message))
+
+    def _held_up(self, silent: str) -> str:
+        """Say by whom a node that is silent is held up."""
+        with contextlib.suppress(NodeNameNonExistentError):
+            readers = suspended_readers(self, silent, self.get_namespace())
+            return "; it is held up: " + ", ".join(readers) if readers else ""
+        return ""
 
     def _on_trouble(self, trouble: msg.Trouble) -> None:
         # Before the first horizon of a run the perturbator does not know its number.

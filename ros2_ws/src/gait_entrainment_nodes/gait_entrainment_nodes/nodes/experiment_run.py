@@ -40,7 +40,8 @@ class Run:
     One run, from when its participants are brought together to the walker's last word.
 
     ``request`` asks the perturbator for pulses; ``take_answer`` is then told its answer. If the
-    run is ``recorded``, the walker waits for the recorder. ``clock`` is steady time [s].
+    run is ``recorded``, the walker waits for the recorder. ``held_up`` says by whom a node that is
+    silent is held up, if that is known. ``clock`` is steady time [s].
     """
 
     def __init__(
@@ -50,6 +51,7 @@ class Run:
         request: Callable[[PulseTrain], None],
         *,
         recorded: bool,
+        held_up: Callable[[str], str] = lambda _: "",
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.number = number
@@ -63,7 +65,7 @@ class Run:
         self.stopped_at: float | None = None  # it ended or refused torque, steady time [s]
         self.closing = self.closed = False  # the closing horizon was sent, was answered
         self._publish, self._request = publish, request
-        self._recorded, self._clock = recorded, clock
+        self._recorded, self._held_up, self._clock = recorded, held_up, clock
         self._events = 0
         self._progress: msg.Progress | None = None  # received, not answered yet
         self._grant = self._recorded_grant = -1
@@ -249,7 +251,8 @@ class Run:
             if silent == WALKER and self._progress is not None:
                 total = self._progress.events
                 what = f"{WALKER}: {total - self._events} of {total} gait events missing"
-            self.fail(ExperimentError(f"{what} for {silence_timeout:g} s", silent))
+            why = self._held_up(silent)
+            self.fail(ExperimentError(f"{what} for {silence_timeout:g} s{why}", silent))
 
     def _debt(self) -> tuple[float, str]:
         """Return since when an answer has been owed, on steady time [s], and by whom."""

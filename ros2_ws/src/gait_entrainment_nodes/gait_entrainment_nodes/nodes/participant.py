@@ -19,7 +19,7 @@ from gait_entrainment.settings import SettingError
 from gait_entrainment_msgs.msg import PublishedCounts
 from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.publisher import CountedPublisher, StopRequestedError
-from gait_entrainment_nodes.messaging.stamps import header
+from gait_entrainment_nodes.messaging.stamps import header, to_time
 from gait_entrainment_nodes.messaging.topics import DIAGNOSTICS, PUBLISHED_COUNTS, Topic
 from gait_entrainment_nodes.nodes.parameters import (
     declare_settings,
@@ -170,6 +170,8 @@ class Participant(Node):
     def _on_ready(self, _: Ready.Request, response: Ready.Response) -> Ready.Response:
         response.waiting_for = self.not_ready()
         response.ready = not response.waiting_for
+        # Of the host, whatever clock the node follows: the experiment compares it with its own.
+        response.now = to_time(time.time_ns())
         response.topics, response.matched = list(self.matched), list(self.matched.values())
         return response
 

@@ -3,8 +3,12 @@
 
 """The nodes that take part in an experiment: whether all of them run and hear each other."""
 
+import time
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
+from gait_entrainment.messages import nanoseconds_of
 from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.nodes.experiment_run import RECORDER, ExperimentError
 from gait_entrainment_nodes.nodes.participant import Participant
@@ -12,6 +16,37 @@ from gait_entrainment_nodes.nodes.waiting import Waiting
 
 # A participant that has not answered is asked again after this long [s].
 ASK_AGAIN = 0.5
+
+
+class ClockError(ExperimentError):
+    """The clock of a participant is off; waiting does not mend that."""
+
+
+@dataclass(frozen=True)
+class ClockOffset:
+    """How far a participant's clock is ahead, measured by a question and its answer."""
+
+    offset: float  # [s]
+    uncertainty: float  # half the time from question to answer [s]
+
+    @classmethod
+    def measured(cls, asked: int, told: int, answered: int) -> "ClockOffset":
+        """Return the offset of a clock that was read between two instants of this one [ns]."""
+        middle = (asked + answered) / 2
+        uncertainty = (answered - asked) / 2 / NANOSECONDS_PER_SECOND
+        return cls((told - middle) / NANOSECONDS_PER_SECOND, uncertainty)
+
+    def check(self, name: str, longest: float) -> None:
+        """Raise ClockError if the offset is beyond a limit [s], ExperimentError if unknown."""
+        if abs(self.offset) - self.uncertainty > longest:
+            way = "ahead of" if self.offset > 0 else "behind"
+            raise ClockError(
+                f"the clock of {name} is {1e3 * abs(self.offset):.1f} ms {way} this one; allowed: "
+                f"{1e3 * longest:g} ms: synchronize the hosts (docs/hosts.md)",
+                name,
+            )
+        if self.uncertainty > longest:
+            raise ExperimentError(f"{name} answers too slowly to compare its clock", name)
 
 
 class Participants:
@@ -35,8 +70,12 @@ class Participants:
         self._node, self._waiting = node, waiting
         self._clients = {name: node.create_client(Ready, f"{name}/ready") for name in names}
 
-    async def check(self) -> None:
-        """Raise ExperimentError if a participant is not ready: who, and what it waits for."""
+    async def check(self, longest_clock_offset: float) -> None:
+        """
+        Raise ExperimentError if a participant is not ready: who, and what it waits for.
+
+        Raises ClockError if its clock is off by more than a limit [s]; 0 compares no clocks.
+        """
         here = self._node.get_namespace()
         nodes = self._node.get_node_names_and_namespaces()
         for name, client in self._clients.items():
@@ -50,10 +89,15 @@ class Participants:
                 )
         for name, client in self._clients.items():
             # An answer may be lost, as long as the participant does not know who asked.
+            asked = time.time_ns()
             answer = client.call_async(Ready.Request())
             silence = ExperimentError(f"{name} does not answer", name)
             await self._waiting.until(answer.done, ASK_AGAIN, silence)
             state = answer.result()
+            if longest_clock_offset:
+                told = nanoseconds_of(state.now)
+                offset = ClockOffset.measured(asked, told, time.time_ns())
+                offset.check(name, longest_clock_offset)
             if not state.ready:
                 raise ExperimentError(f"{name} waits for {state.waiting_for}", name)
             self._require_recorded(name, state.topics)

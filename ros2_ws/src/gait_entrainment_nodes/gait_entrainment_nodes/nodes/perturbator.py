@@ -11,7 +11,7 @@ cancelling, with the latched stop service and with the process, whatever ends th
 
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -23,18 +23,21 @@ from gait_entrainment.messages import nanoseconds_of
 from gait_entrainment.robot import (
     DeviceError,
     DeviceLimits,
+    Dose,
     Fault,
     GuardedRobot,
     LimitError,
+    PlannedPulses,
     PulseTrain,
     find_driver,
 )
-from gait_entrainment.robot.faults import NOT_STOPPED, OPERATOR_SILENT
+from gait_entrainment.robot.faults import DEADMAN_SILENT, NOT_STOPPED, OPERATOR_SILENT
 from gait_entrainment.settings import setting
 from gait_entrainment.stop_channel import StopAnswer
 from gait_entrainment_msgs.action import DeliverPulseTrain
-from gait_entrainment_msgs.msg import Horizon, Trouble
+from gait_entrainment_msgs.msg import AnkleRobotSetup, Horizon, Trouble
 from gait_entrainment_nodes.messaging import topics
+from gait_entrainment_nodes.messaging.environment import user_and_host
 from gait_entrainment_nodes.messaging.stamps import header
 from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.one_goal import OneGoalServer
@@ -63,9 +66,24 @@ class Settings:
         "s",
         (0.0, 60.0),
     )
+    deadman_timeout: float = setting(
+        0.0,
+        "longest silence of ~/emergency_stop while torque may come; 0: its silence stops nothing",
+        "s",
+        (0.0, 60.0),
+    )
 
     def __post_init__(self) -> None:
         find_driver(self.driver)  # raises DeviceError if there is none
+
+
+_OFFERED = (
+    topics.TORQUE_PROFILE,
+    topics.PULSES,
+    topics.ROBOT_STATE,
+    topics.ROBOT_SETUP,
+    topics.TROUBLE,
+)
 
 
 class Perturbator(Participant, TolerantLifecycleNode):
@@ -73,20 +91,25 @@ class Perturbator(Participant, TolerantLifecycleNode):
 
     settings: Settings  # the next robot is configured with them
     limits: DeviceLimits
+    planned: PlannedPulses
     run: Run | None
 
     def __init__(self) -> None:
         super().__init__("perturbator")
-        self.begin_participation(settings=Settings, limits=(DeviceLimits, "limits."))
+        groups = {"limits": (DeviceLimits, "limits."), "planned": (PlannedPulses, "planned.")}
+        self.begin_participation(settings=Settings, **groups)
         self._robot: GuardedRobot | None = None  # from configuring to cleaning up
+        self._dose = Dose()  # of everybody who was on the robot since this node was started
+        self._armed_by = ""
         self._stop_latched = False  # somebody stopped while there was no robot
         self._reported: tuple[Fault, ...] = ()  # faults that have been published
-        for topic in (topics.TORQUE_PROFILE, topics.PULSES, topics.ROBOT_STATE, topics.TROUBLE):
+        for topic in _OFFERED:
             self.offer(topic)
         self._now = 0  # latest instant that is known to be over [ns since 1970]
         self._latest_run = 0  # number of the latest run
         self._look_at: float | None = None  # when to look after a real robot, steady time [s]
-        self._operator_at = -math.inf  # when the operator was heard last, steady time [s]
+        # When the operator and the emergency stop were heard last, steady time [s].
+        self._operator_at = self._deadman_at = -math.inf
         self._stop_thread = StopThread(self.get_name(), self._stop_at_once)
 
         self.subscribe(topics.HORIZON, self._on_horizon)
@@ -128,11 +151,11 @@ class Perturbator(Participant, TolerantLifecycleNode):
                 raise DeviceError(
                     f"driver: {driver.name} runs in real time only: use_sim_time must be off"
                 )
-            robot = driver.make(settings.side, self.limits, settings.seed)
+            robot = driver.make(settings.side, self.limits, settings.seed, self._dose)
             robot.configure()
         except (LimitError, DeviceError) as error:
             return self._refuse(error)
-        self._robot, self._reported = robot, ()
+        self._robot, self._reported, self._armed_by = robot, (), ""
         self.note_state(DiagnosticStatus.OK, "configured")
         return TransitionCallbackReturn.SUCCESS
 
@@ -142,7 +165,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
         try:
             self._robot.activate()
             if self.settings.armed:
-                self._robot.arm()
+                self._arm("the parameter armed")
         except DeviceError as error:
             return self._refuse(error)
         if not self._robot.capabilities.simulated:
@@ -197,11 +220,19 @@ class Perturbator(Participant, TolerantLifecycleNode):
 
     # Stopping, arming, faults
 
+    def _arm(self, how: str) -> None:
+        """Allow torque, and say so in the record; raises DeviceError if it must not come."""
+        if self._robot is None:
+            raise DeviceError("the perturbator is not active")
+        self._robot.arm()
+        if not self._robot.capabilities.simulated:
+            self._armed_by = f"{user_and_host()}, by {how}"
+        if self.run is not None:
+            self._publish_setup()
+
     def _on_arm_service(self, _: Trigger.Request, response: Trigger.Response) -> Any:
         try:
-            if self._robot is None:
-                raise DeviceError("the perturbator is not active")
-            self._robot.arm()
+            self._arm("the service ~/arm")
         except DeviceError as error:
             response.message = str(error)
         else:
@@ -228,6 +259,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
         return response
 
     def _on_emergency_stop(self, message: Any) -> None:
+        self._deadman_at = time.monotonic()
         if message.data:
             self._stop_at_once()
             self._report_faults("the emergency stop was pressed")
@@ -235,12 +267,17 @@ class Perturbator(Participant, TolerantLifecycleNode):
     def _on_heartbeat(self, _: Any) -> None:
         self._operator_at = time.monotonic()
 
-    def _require_operator(self) -> None:
-        """End the torque if whoever started the run does not watch it any more."""
-        robot, timeout = self._robot, self.settings.operator_timeout
-        silence = time.monotonic() - self._operator_at
-        if robot is not None and timeout and robot.train is not None and silence > timeout:
-            robot.stop(OPERATOR_SILENT)
+    def _require_signs_of_life(self) -> None:
+        """End the torque if the operator, or who holds the emergency stop, is not there."""
+        robot, now = self._robot, time.monotonic()
+        if robot is None or robot.train is None:
+            return
+        for heard_at, timeout, fault in (
+            (self._operator_at, self.settings.operator_timeout, OPERATOR_SILENT),
+            (self._deadman_at, self.settings.deadman_timeout, DEADMAN_SILENT),
+        ):
+            if timeout and now - heard_at > timeout:
+                robot.stop(fault)
 
     def _end_torque(self, reason: str, outcome: int = Result.STOPPED) -> None:
         """Bring the torque to zero now, whatever was promised."""
@@ -276,6 +313,20 @@ class Perturbator(Participant, TolerantLifecycleNode):
         self.publish(topics.TROUBLE, trouble)
         self.diagnose(self._now, level, message)
 
+    def _publish_setup(self) -> None:
+        """Say for the record what is driven, within which limits, and who allowed torque."""
+        settings, limits = self.settings, asdict(self.limits)
+        setup = AnkleRobotSetup(
+            header=header(self._now),
+            run=self._latest_run,
+            side=settings.side,
+            driver=settings.driver,
+            armed_by=self._armed_by,
+            limit_names=list(limits),
+            limits=[float(value) for value in limits.values()],
+        )
+        self.publish(topics.ROBOT_SETUP, setup)
+
     # The action
 
     def _on_goal(self, goal: DeliverPulseTrain.Goal) -> bool:
@@ -296,16 +347,16 @@ class Perturbator(Participant, TolerantLifecycleNode):
             raise LimitError(f"run: {goal.run} is not under way")
         if goal.side not in tuple(Side):
             raise LimitError(f"side: {goal.side}; allowed: 0 (left), 1 (right)")
-        self.run.schedule(
-            PulseTrain(
-                side=Side(goal.side),
-                first_onset=nanoseconds_of(goal.first_onset),
-                period=goal.period,
-                count=goal.count,
-                torque=goal.torque,
-                duration=goal.duration,
-            )
+        train = PulseTrain(
+            side=Side(goal.side),
+            first_onset=nanoseconds_of(goal.first_onset),
+            period=goal.period,
+            count=goal.count,
+            torque=goal.torque,
+            duration=goal.duration,
         )
+        self.planned.check(train)
+        self.run.schedule(train)
 
     def on_cancel(self) -> None:
         """Bring the torque to zero now: the next horizon may be long in coming."""
@@ -332,6 +383,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
         if new:
             self.run = Run(message.run, self._now, robot, self.publish, self._server.end)
             self._latest_run = message.run
+            self._publish_setup()
         assert self.run is not None
         until = nanoseconds_of(message.until)
         try:
@@ -352,7 +404,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
         if self._robot is None:
             return
         self._look_at = time.monotonic() + MEASURED_PERIOD
-        self._require_operator()
+        self._require_signs_of_life()
         try:
             if self.run is not None:
                 self.run.look_after()

@@ -138,7 +138,7 @@ class Run:
             run=self.number,
             side=self._robot.side,
             number=number,
-            torque=train.torque,
+            torque=train.height(number - 1),
             duration=train.duration,
         )
         self._publish(topics.PULSES, pulse)

@@ -1,0 +1,184 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The perturbator alone, the test in the place of the experiment: what it refuses and ends."""
+
+import itertools
+import time
+
+import pytest
+from harness import Session, claimed_domain, session, stamp_of
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
+from test_drivers import emulated_motor
+
+from gait_entrainment.messages import nanoseconds_of
+from gait_entrainment_bringup.node_list import STOP_ORDER
+from gait_entrainment_msgs.action import DeliverPulseTrain
+from gait_entrainment_msgs.msg import Horizon
+from gait_entrainment_nodes.messaging.stamps import to_time
+from gait_entrainment_nodes.messaging.topics import (
+    EMERGENCY_STOP,
+    HORIZON,
+    ROBOT_STATE,
+    TORQUE_PROFILE,
+    TROUBLE,
+)
+
+UP = (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE)
+SECOND = 10**9
+
+
+class Conductor:
+    """Stands in for the experiment: horizons and goals by hand."""
+
+    def __init__(self, nodes):
+        self.nodes, self.probe = nodes, nodes.probe
+        self.profiles = self.probe.listen(TORQUE_PROFILE)
+        self.troubles = self.probe.listen(TROUBLE)
+        node = self.probe.node
+        self.horizons = node.create_publisher(HORIZON.type, HORIZON.name, HORIZON.qos)
+        for number in UP:
+            assert self.transition(number)
+
+    def transition(self, number):
+        request = ChangeState.Request(transition=Transition(id=number))
+        return self.probe.call(ChangeState, "perturbator/change_state", request).success
+
+    def promise(self, known, until, run=7):
+        """Send a horizon between two instants [s]; return the profile that answers it."""
+        begin, end = round(known * SECOND), round(until * SECOND)
+        message = Horizon(run=run, until=to_time(end))
+        message.header.stamp = to_time(begin)
+        count = len(self.profiles)
+        self.horizons.publish(message)
+        self.probe.until(lambda: len(self.profiles) > count, "a profile")
+        return self.profiles[-1]
+
+    def request(self, onset, **changes):
+        """Ask for a train from an instant [s] on; return the goal's handle."""
+        asked = {"run": 7, "side": 1, "period": 1.0, "count": 100, "torque": 5.0, "duration": 0.5}
+        train = DeliverPulseTrain.Goal(**(asked | changes))
+        train.first_onset = to_time(round(onset * SECOND))
+        return self.probe.send_goal(DeliverPulseTrain, "perturbator/deliver_pulse_train", train)
+
+
+def test_cancelling_the_train_alone_ends_the_torque_at_once(tmp_path):
+    with session(tmp_path, nodes=("perturbator",), strangers=True) as nodes:
+        conductor, probe = Conductor(nodes), nodes.probe
+        conductor.promise(0, 2)
+        goal = conductor.request(3)
+        assert goal.accepted
+        assert list(conductor.promise(1, 4).torques) == [0.0, 5.0, 0.0]
+        profiles = conductor.profiles
+        count = len(profiles)
+        future = goal.cancel_goal_async()
+        # No horizon comes any more: the stop does not wait for one.
+        probe.until(lambda: len(profiles) > count and profiles[-1].stop, "the stop")
+        probe.until(future.done, "an answer to the cancellation")
+        result = probe.result(goal).result
+        assert result.outcome == DeliverPulseTrain.Result.CANCELLED
+        assert result.delivered == 1
+        assert list(conductor.promise(4, 6).torques) == [0.0]
+        # Another train may follow.
+        again = conductor.request(7)
+        assert again.accepted
+        # A run that begins before it is over ends it.
+        assert conductor.promise(7, 9, run=8).stop
+        result = probe.result(again).result
+        assert result.outcome == DeliverPulseTrain.Result.STOPPED
+
+
+def test_a_stranger_gets_no_pulses_that_are_not_of_the_protocol(tmp_path):
+    pulses = ("--torque=5", "--width=0.2", "--pulses=10")
+    with session(tmp_path, *pulses, nodes=("perturbator",)) as nodes:
+        conductor = Conductor(nodes)
+        conductor.promise(0, 2)
+        for changes, words in (
+            ({"torque": 5.1}, "torque: 5.1 is not of the protocol's pulses; allowed: at most 5"),
+            ({"torque": -5.1}, "torque"),
+            ({"duration": 0.21}, "duration: 0.21 is not of the protocol's"),
+            ({"count": 11}, "count: 11 is not"),
+            ({"period": 2e-9, "duration": 1e-9, "count": 2**32 - 1}, "count"),
+        ):
+            begin, count = time.monotonic(), len(conductor.troubles)
+            asked = {"duration": 0.2, "count": 10} | changes
+            assert not conductor.request(3, **asked).accepted
+            heard = conductor.troubles
+            nodes.probe.until(lambda h=heard, c=count: len(h) > c, "a reason")
+            assert words in heard[-1].message
+            assert time.monotonic() - begin < 5.0
+        assert conductor.request(3, duration=0.2, count=10).accepted
+
+
+@pytest.mark.parametrize("driver", ["ideal", "emulated"])
+def test_deactivating_and_activating_in_a_run_breaks_no_promise(tmp_path, driver):
+    options = (f"--driver={driver}",)
+    with session(tmp_path, *options, nodes=("perturbator",), strangers=True) as nodes:
+        conductor = Conductor(nodes)
+        conductor.promise(0, 2)
+        assert conductor.request(3).accepted
+        conductor.promise(2, 4)
+        assert conductor.transition(Transition.TRANSITION_DEACTIVATE)
+        conductor.promise(4, 5)
+        assert conductor.transition(Transition.TRANSITION_ACTIVATE)
+        conductor.promise(5, 6)
+        assert conductor.request(7, count=1).accepted
+        assert max(conductor.promise(6, 9).torques) == pytest.approx(5.0, rel=0.1)
+        told = [profile for profile in conductor.profiles if not profile.stop]
+        assert [profile.stop for profile in conductor.profiles].count(True) == 1
+        assert [profile.revision for profile in conductor.profiles] == list(
+            range(len(conductor.profiles))
+        )
+        for before, after in itertools.pairwise(told):
+            assert stamp_of(after.header) == nanoseconds_of(before.valid_until)
+        off = [p for p in told if 4 * SECOND <= stamp_of(p.header) < 6 * SECOND]
+        assert not any(torque for profile in off for torque in profile.torques)
+
+
+def test_torque_ends_if_whoever_holds_the_emergency_stop_lets_go(tmp_path):
+    with emulated_motor(tmp_path) as (driver, _), claimed_domain() as domain:
+        nodes = Session(tmp_path, domain, [f"--driver={driver}"], real_time=True, strangers=True)
+        nodes.arguments += ["-p", "deadman_timeout:=0.5", "-p", "operator_timeout:=0.0"]
+        try:
+            nodes.start("perturbator")
+            stop = EMERGENCY_STOP
+            button = nodes.probe.node.create_publisher(stop.type, stop.name, stop.qos)
+            conductor = Conductor(nodes)
+            states = nodes.probe.listen(ROBOT_STATE)
+            assert nodes.probe.call(Trigger, "perturbator/arm").success
+            nodes.probe.until(lambda: button.get_subscription_count(), "the button's reader")
+            now = time.time()
+            conductor.promise(now, now + 0.2)
+            button.publish(Bool(data=False))  # held before there is a train
+            assert conductor.request(
+                time.time() + 1.0, period=10.0, count=3, duration=0.5
+            ).accepted
+
+            def held():
+                """Hold the button, and send horizons, as often as this is asked."""
+                button.publish(Bool(data=False))
+                conductor.horizons.publish(horizon_from(time.time()))
+                time.sleep(0.01)
+                return states and states[-1].measured_torque > 0.5
+
+            nodes.probe.until(held, "torque")
+
+            def let_go():
+                conductor.horizons.publish(horizon_from(time.time()))
+                return any(trouble.fault == "deadman_silent" for trouble in conductor.troubles)
+
+            nodes.probe.until(let_go, "the fault")
+            nodes.probe.until(lambda: abs(states[-1].measured_torque) < 0.5, "no torque")
+        finally:
+            nodes.probe.client.close()
+            nodes.supervisor.stop(STOP_ORDER)
+
+
+def horizon_from(now):
+    """Return a horizon from an instant [s] on."""
+    message = Horizon(run=7, until=to_time(round((now + 0.2) * SECOND)))
+    message.header.stamp = to_time(round(now * SECOND))
+    return message

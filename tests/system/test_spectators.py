@@ -1,0 +1,78 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Who only looks on and hangs delays nobody in real time, and is named in lock-step."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from harness import LONG, QUICK, entrain_run
+
+# After so long a suspended reader of shared memory held up its writers for seconds [s].
+HUNG_FOR = 12.0
+SILENCE_TIMEOUT = 3.0
+
+
+@contextmanager
+def suspended_spectator(domain: int) -> Iterator[int]:
+    """Have a process subscribe to every topic, and suspend it; give its number."""
+    program = Path(__file__).with_name("spectator.py")
+    spectator = subprocess.Popen(
+        [sys.executable, program, str(domain)], stdout=subprocess.PIPE, text=True
+    )
+    try:
+        assert spectator.stdout is not None
+        assert spectator.stdout.readline() == "ready\n"
+        os.kill(spectator.pid, signal.SIGSTOP)
+        yield spectator.pid
+    finally:
+        spectator.kill()
+        spectator.wait()
+
+
+def test_in_real_time_a_suspended_reader_delays_nobody(tmp_path):
+    # It is over before the spectator's participant is given up for dead (20 s).
+    options = (*QUICK, "--baseline=2", "--pulses=24", "--washout=2", "--sample-rate=1000")
+    with (
+        entrain_run(tmp_path / "bag", *options, "--real-time", "--json") as run,
+        suspended_spectator(run.domain()),
+    ):
+        begin = time.monotonic()
+        outcome = run.outcome()
+        assert run.ended_at - begin > HUNG_FOR
+    assert outcome["lost"] == 0
+    # A stretch that comes late is one that a publisher was held up for.
+    assert outcome["promises"]["late_stretches"] == 0
+    assert outcome["promises"]["starved_stretches"] == 0
+
+
+def test_in_real_time_a_run_with_a_suspended_reader_is_stopped_as_any(tmp_path):
+    with (
+        entrain_run(tmp_path / "bag", *LONG, "--real-time", "--sample-rate=1000") as run,
+        suspended_spectator(run.domain()),
+    ):
+        run.wait_for_stride(12)
+        begin = time.monotonic()
+        run.process.send_signal(signal.SIGINT)
+        assert run.wait() == 1
+        assert "interrupted" in run.text
+        assert run.ended_at - begin < 5.0
+        assert run.survivors() == []
+
+
+def test_in_lock_step_a_suspended_reader_is_named(tmp_path):
+    with (
+        entrain_run(tmp_path / "bag", *LONG) as run,
+        suspended_spectator(run.domain()) as spectator,
+    ):
+        begin = time.monotonic()
+        assert run.wait() == 1
+        assert f"spectator (process {spectator}) is suspended" in run.text.splitlines()[0]
+        # It takes all that the queues hold before anybody is held up.
+        assert run.ended_at - begin < SILENCE_TIMEOUT + 10
