@@ -24,6 +24,8 @@ _T = TypeVar("_T")
 ANSWER_TIMEOUT = 0.5
 # How often a question is repeated while waiting, since a frame may be lost [s].
 _ASK_PERIOD = 0.05
+# What came while the loop was held up is read away for so long at most [s].
+_DRAIN_TIME = 0.02
 # Commands remembered to tell an echo of one's own from somebody else's: 0.2 s of them.
 _REMEMBERED = 100
 SECOND_MASTER = Fault(
@@ -95,6 +97,12 @@ class CanMotor(TorqueDevice):
                 self.disable()
             self._bus.shutdown()
             self._bus = None
+
+    def forget(self) -> None:
+        """Drop the frames that have come; not for ever, since they may come faster than that."""
+        give_up = time.monotonic() + _DRAIN_TIME
+        while time.monotonic() < give_up and self._bus.recv(0.0) is not None:
+            pass
 
     def _send(self, identifier: int, data: bytes = b"", *, remote: bool = False) -> None:
         if not remote:

@@ -101,10 +101,10 @@ class TorqueLoop:
 
     def _tick(self) -> None:
         time.sleep(max(self._due - time.monotonic(), 0.0))
+        self._listen()
         late = time.monotonic() - self._due
         if late > self._settings.lateness:
             self._end_torque(HOST_LOOP_LATE)
-        self._listen()
         if not self._enabled:
             return
         sent = time.monotonic_ns()
@@ -115,7 +115,7 @@ class TorqueLoop:
             self._end_torque(HOST_SILENT)
             torque = 0.0
         self._monitor.expect(torque, now)
-        reading = self._exchange(torque)
+        reading = self._exchange(torque, late)
         if reading is not None:
             self._answered_at, self._measured = now, reading.torque
             for fault in (*reading.faults, *self._monitor.judge(reading, now)):
@@ -128,9 +128,11 @@ class TorqueLoop:
         # After a hiccup it goes on from now: commands that were missed are not made up for.
         self._due = max(self._due + self._period, time.monotonic() - self._settings.lateness)
 
-    def _exchange(self, torque: float) -> Reading | None:
+    def _exchange(self, torque: float, late: float) -> Reading | None:
         """Exchange a torque for a reading; whatever the driver raises, zero is sent on and on."""
         try:
+            if late > self._period:
+                self._device.forget()
             # Most of the period at most: an answer that comes later is read with the next one.
             return self._device.exchange(torque, 0.8 * self._period)
         except Exception as error:
@@ -197,6 +199,9 @@ class TorqueLoop:
             self._train = None
         elif kind == "stop":
             self._end_torque()  # the parent knows why
+        elif kind == "freeze":
+            os.kill(os.getpid(), signal.SIGSTOP)
+            self._listen()  # whoever lets it go on has said before what then
         elif kind in ("open", "enable", "disable", "close"):
             error = ""
             try:

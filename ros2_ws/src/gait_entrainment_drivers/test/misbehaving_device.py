@@ -55,6 +55,9 @@ class MisbehavingDevice(TorqueDevice):
     def enable(self) -> None:
         """Nothing to enable."""
 
+    def forget(self) -> None:
+        """No answer is ever waiting."""
+
     def disable(self) -> None:
         """Note it."""
         self._note(math.nan)
