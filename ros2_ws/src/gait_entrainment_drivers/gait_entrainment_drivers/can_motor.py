@@ -5,6 +5,7 @@
 
 import contextlib
 import math
+import os
 import time
 from collections import deque
 from collections.abc import Callable
@@ -70,6 +71,11 @@ class CanMotor(TorqueDevice):
 
     def __init__(self, options: Any, name: str, motor_torque: float) -> None:
         self.name, self._options = name, options
+        # A serial line has several names: /dev/serial/by-id has links to it.
+        channel = options.channel
+        channel = os.path.realpath(channel) if channel.startswith("/") else channel
+        port = f" port {options.port}" if options.port else ""
+        self.address = f"{name} on {options.interface} {channel}{port}"
         self._bus: Any = None
         self._others: set[int] = set()  # ids of other motors that were heard
         self._sent: deque[tuple[int, bytes]] = deque(maxlen=_REMEMBERED)

@@ -55,6 +55,7 @@ class TorqueDevice(ABC):
 
     Options: ClassVar[type[Any]]
     name: str  # what it is called in messages, such as "motor 1"
+    address: str  # what nobody else may open meanwhile, such as "motor 1 on can0"
     capabilities: Capabilities
 
     @abstractmethod

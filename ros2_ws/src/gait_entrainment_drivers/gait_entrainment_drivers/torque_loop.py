@@ -35,6 +35,7 @@ from gait_entrainment.robot.faults import (
 from gait_entrainment.robot.pulse_train import PulseTrain
 from gait_entrainment.stop_channel import StopAnswer, StopListener
 from gait_entrainment_drivers.device import Reading, TorqueDevice
+from gait_entrainment_drivers.device_lock import DeviceLock
 from gait_entrainment_drivers.link import Link, Sample
 from gait_entrainment_drivers.monitor import NOT_FALLING, Monitor
 
@@ -70,6 +71,7 @@ class TorqueLoop:
         self._gone = _RUN_DOWN_SHARE * capabilities.peak_torque
         self._near_zero = _NEAR_ZERO_SHARE * capabilities.peak_torque
         self._monitor = Monitor(settings, capabilities.peak_torque, capabilities.torque_bandwidth)
+        self._lock: DeviceLock | None = None  # while the device is open
         self._train: PulseTrain | None = None  # onsets in steady time
         self._faults: tuple[Fault, ...] = ()
         self._enabled = self._closing = False
@@ -95,6 +97,8 @@ class TorqueLoop:
             self._disable()
             with contextlib.suppress(Exception):
                 self._device.shut()
+            if self._lock is not None:
+                self._lock.release()
             self._stop_channel.close()
 
     # One command
@@ -213,6 +217,7 @@ class TorqueLoop:
 
     def _open(self) -> None:
         self._faults, self._halted, self._ended_at = (), False, math.inf
+        self._lock = DeviceLock(self._device.address)
         self._device.open()
 
     def _enable(self) -> None:
