@@ -18,6 +18,7 @@ from gait_entrainment.settings import setting
 from gait_entrainment_drivers.can_bus import open_bus, send
 from gait_entrainment_drivers.device import TorqueDevice
 from gait_entrainment_drivers.host_timed import LoopOptions
+from gait_entrainment_drivers.monitor import SECOND_MASTER
 
 _T = TypeVar("_T")
 
@@ -29,9 +30,6 @@ _ASK_PERIOD = 0.05
 _DRAIN_TIME = 0.02
 # Commands remembered to tell an echo of one's own from somebody else's: 0.2 s of them.
 _REMEMBERED = 100
-SECOND_MASTER = Fault(
-    "second_master", "Somebody else on the bus sends commands to this motor: find and stop it."
-)
 
 
 @dataclass(frozen=True)
