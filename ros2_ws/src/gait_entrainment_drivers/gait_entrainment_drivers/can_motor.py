@@ -5,6 +5,7 @@
 
 import contextlib
 import math
+import os
 import time
 from collections import deque
 from collections.abc import Callable
@@ -17,6 +18,7 @@ from gait_entrainment.settings import setting
 from gait_entrainment_drivers.can_bus import open_bus, send
 from gait_entrainment_drivers.device import TorqueDevice
 from gait_entrainment_drivers.host_timed import LoopOptions
+from gait_entrainment_drivers.monitor import SECOND_MASTER
 
 _T = TypeVar("_T")
 
@@ -24,11 +26,10 @@ _T = TypeVar("_T")
 ANSWER_TIMEOUT = 0.5
 # How often a question is repeated while waiting, since a frame may be lost [s].
 _ASK_PERIOD = 0.05
+# What came while the loop was held up is read away for so long at most [s].
+_DRAIN_TIME = 0.02
 # Commands remembered to tell an echo of one's own from somebody else's: 0.2 s of them.
 _REMEMBERED = 100
-SECOND_MASTER = Fault(
-    "second_master", "Somebody else on the bus sends commands to this motor: find and stop it."
-)
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,11 @@ class CanMotor(TorqueDevice):
 
     def __init__(self, options: Any, name: str, motor_torque: float) -> None:
         self.name, self._options = name, options
+        # A serial line has several names: /dev/serial/by-id has links to it.
+        channel = options.channel
+        channel = os.path.realpath(channel) if channel.startswith("/") else channel
+        port = f" port {options.port}" if options.port else ""
+        self.address = f"{name} on {options.interface} {channel}{port}"
         self._bus: Any = None
         self._others: set[int] = set()  # ids of other motors that were heard
         self._sent: deque[tuple[int, bytes]] = deque(maxlen=_REMEMBERED)
@@ -95,6 +101,12 @@ class CanMotor(TorqueDevice):
                 self.disable()
             self._bus.shutdown()
             self._bus = None
+
+    def forget(self) -> None:
+        """Drop the frames that have come; not for ever, since they may come faster than that."""
+        give_up = time.monotonic() + _DRAIN_TIME
+        while time.monotonic() < give_up and self._bus.recv(0.0) is not None:
+            pass
 
     def _send(self, identifier: int, data: bytes = b"", *, remote: bool = False) -> None:
         if not remote:

@@ -40,6 +40,8 @@ class TorqueDevice(ABC):
                in time; return within ``patience``                      it as silence, goes on
                                                                         sending zero and reports
                                                                         the text
+    forget     drop answers that have come and were not read: the loop  as exchange
+               was held up, and they are old
     disable    disable the device, whose torque is zero already         anything: ignored
     shut       release everything; bears being called twice, and        anything: ignored
                without ``open``
@@ -47,11 +49,13 @@ class TorqueDevice(ABC):
 
     The loop sends the last zero: before ``disable`` it exchanges zero torque until the reading has
     run down. A device must go to zero by itself when commands stop; no software on the host can
-    see to that.
+    see to that. The kit can prove it only if ``exchange`` returns what was measured before the
+    torque that it sends had an effect: ask first, then command, if the device gives the choice.
     """
 
     Options: ClassVar[type[Any]]
     name: str  # what it is called in messages, such as "motor 1"
+    address: str  # what nobody else may open meanwhile, such as "motor 1 on can0"
     capabilities: Capabilities
 
     @abstractmethod
@@ -69,6 +73,10 @@ class TorqueDevice(ABC):
     @abstractmethod
     def exchange(self, torque: float, patience: float) -> Reading | None:
         """Send a torque [N m]; return the answer, or None if none comes in time [s]."""
+
+    @abstractmethod
+    def forget(self) -> None:
+        """Drop answers that have come and were not read."""
 
     @abstractmethod
     def disable(self) -> None:

@@ -8,13 +8,16 @@ The loop is a process of its own (torque_loop.py). Here its samples become promi
 plans are handed to it.
 """
 
+import contextlib
 import math
+import os
 import select
+import signal
 import socket
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, ClassVar
@@ -190,6 +193,24 @@ class HostTimedRobot(AnkleRobot):
         self._listen()
         states, self._states = self._states, []
         return states
+
+    @contextlib.contextmanager
+    def frozen(self) -> Iterator[None]:
+        """Freeze the loop's process between two commands; its ports and buses stay open."""
+        process = self._process
+        if process is None:
+            raise DeviceError("the torque loop is not running; configure first")
+        # It stops itself, so that no command is half sent.
+        self._tell("freeze")
+        give_up = time.monotonic() + _ANSWER_TIMEOUT
+        try:
+            while os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WNOHANG) is None:
+                if time.monotonic() > give_up:
+                    raise DeviceError("the torque loop does not freeze: cut the power")
+                time.sleep(0.001)
+            yield
+        finally:
+            process.send_signal(signal.SIGCONT)
 
     # The loop's messages
 

@@ -29,6 +29,9 @@ TOO_HOT = Fault("too_hot", "The measured temperature is beyond the limit.")
 READING_NOT_FINITE = Fault(
     "reading_not_finite", "The device reports a torque that is not a number."
 )
+SECOND_MASTER = Fault(
+    "second_master", "Somebody else sends commands to this motor: find and stop that."
+)
 
 
 @dataclass(frozen=True)

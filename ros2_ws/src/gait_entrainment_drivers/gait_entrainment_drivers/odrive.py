@@ -15,12 +15,13 @@ from dataclasses import dataclass
 
 from gait_entrainment.robot.faults import Fault
 
-HEARTBEAT, STOP, SET_STATE, ENCODER = 0x01, 0x02, 0x07, 0x09
+HEARTBEAT, STOP, ERRORS, SET_STATE, ENCODER = 0x01, 0x02, 0x03, 0x07, 0x09
 SET_MODE, SET_TORQUE, CLEAR_ERRORS, TORQUES = 0x0B, 0x0E, 0x18, 0x1C
 IDLE, CLOSED_LOOP = 1, 8
 # Control mode torque, input mode passthrough.
 TORQUE_MODE = bytes.fromhex("01000000 01000000")
 STATE = struct.Struct("<I")  # data of SET_STATE
+BITS = struct.Struct("<II")  # data of ERRORS [active errors, reason of the last disarming]
 TORQUE = struct.Struct("<f")  # data of SET_TORQUE [N m]
 PAIR = struct.Struct("<ff")  # data of ENCODER [rev, rev/s] and of TORQUES [target, estimate, N m]
 WATCHDOG_EXPIRED, STOP_REQUESTED = 0x01000000, 0x02000000
@@ -64,6 +65,11 @@ def pack_torque(torque: float, peak: float) -> bytes:
 def unpack_pair(data: bytes) -> tuple[float, float] | None:
     """Return the two floats of ENCODER or TORQUES; None for a frame of another length."""
     return PAIR.unpack(data) if len(data) == PAIR.size else None
+
+
+def unpack_errors(data: bytes) -> tuple[int, int] | None:
+    """Return the two words of ERRORS; None for a frame of another length."""
+    return BITS.unpack(data) if len(data) == BITS.size else None
 
 
 def pack_heartbeat(heartbeat: Heartbeat) -> bytes:

@@ -3,6 +3,7 @@
 
 """Driver of an ODrive axis by CANSimple on any bus that python-can knows."""
 
+import itertools
 import math
 import time
 from dataclasses import dataclass
@@ -49,7 +50,11 @@ class OdriveAxis(CanMotor):
         super().__init__(options, f"ODrive {options.node_id}", options.motor_torque)
         self._heartbeat = odrive.Heartbeat(0, odrive.IDLE)
         self._beat_at = 0.0  # when it came [s, steady]
+        self._errors = 0  # bits that are set, or for which it disarmed since it was enabled
+        self._old_reason: int | None = None  # of a disarming before that
         self._angle = self._velocity = math.nan  # of the motor [rad], [rad/s]
+        # One of them in each tick: either is needed less often than the torque.
+        self._questions = itertools.cycle((odrive.ENCODER, odrive.ERRORS))
 
     def open(self) -> None:
         """Connect, and see that the axis answers; its errors are cleared."""
@@ -60,20 +65,21 @@ class OdriveAxis(CanMotor):
         """Enter closed-loop torque control at zero torque."""
         self._command(odrive.SET_MODE, odrive.TORQUE_MODE)
         self._reach(odrive.CLOSED_LOOP)
+        self._errors, self._old_reason = 0, None
         self._require_zero_torque("is it calibrated?")
 
     def exchange(self, torque: float, patience: float) -> Reading | None:
-        """Send a torque; return torque, position and velocity, which it is asked for."""
+        """Ask for torque, position, velocity and errors, then send a torque."""
         ratio, peak = self._options.ratio, self._options.motor_torque
-        self._command(odrive.SET_TORQUE, odrive.pack_torque(torque / ratio, peak))
         if time.monotonic() - self._beat_at > HEARTBEAT_PERIOD:
             self._command(odrive.HEARTBEAT, remote=True)
-        for question in (odrive.ENCODER, odrive.TORQUES):
+        for question in (odrive.TORQUES, next(self._questions)):
             self._command(question, remote=True)
+        self._command(odrive.SET_TORQUE, odrive.pack_torque(torque / ratio, peak))
         measured = self._answer(self._torque, time.monotonic() + patience)
         if measured is None:
             return None
-        faults = odrive.faults_of(self._heartbeat.error)
+        faults = odrive.faults_of(self._heartbeat.error | self._errors)
         if not faults and self._heartbeat.state != odrive.CLOSED_LOOP:
             faults = (odrive.DISARMED,)
         if time.monotonic() - self._beat_at > HEARTBEAT_LOST:
@@ -128,6 +134,10 @@ class OdriveAxis(CanMotor):
         elif command == odrive.HEARTBEAT and (heartbeat := odrive.unpack_heartbeat(data)):
             self._heartbeat, self._beat_at = heartbeat, time.monotonic()
             return heartbeat
+        elif command == odrive.ERRORS and (errors := odrive.unpack_errors(data)):
+            active, reason = errors
+            self._old_reason = reason if self._old_reason is None else self._old_reason
+            self._errors = active | (reason if reason != self._old_reason else 0)
         elif command == odrive.ENCODER and (estimates := odrive.unpack_pair(data)):
             self._angle, self._velocity = (2 * math.pi * value for value in estimates)
         return None

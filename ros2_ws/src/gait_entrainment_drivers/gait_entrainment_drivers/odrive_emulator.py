@@ -19,13 +19,14 @@ class EmulatedOdrive(EmulatedMotor):
         super().__init__(bandwidth, timeout)
         self._node = node
         self._mode = b""
+        self._reason = 0  # of the last disarming
         self._beat_at = 0.0
 
     def advance(self, now: float) -> None:
         """Let the torque follow up to a time [s]; an error disarms."""
         super().advance(now)
-        if self.error:
-            self.enabled = False
+        if self.error and self.enabled:
+            self.enabled, self._reason = False, self.error
 
     def expire(self) -> None:
         """Report the watchdog if torque was possible."""
@@ -49,7 +50,7 @@ class EmulatedOdrive(EmulatedMotor):
         elif command == odrive.SET_STATE:
             self.enabled = data == odrive.STATE.pack(odrive.CLOSED_LOOP) and not self.error
         elif command == odrive.CLEAR_ERRORS:
-            self.error = 0
+            self.error = self._reason = 0
         elif command == odrive.STOP:
             self.error |= odrive.STOP_REQUESTED
         return []
@@ -66,6 +67,7 @@ class EmulatedOdrive(EmulatedMotor):
             odrive.HEARTBEAT: odrive.pack_heartbeat(
                 odrive.Heartbeat(self.error, odrive.CLOSED_LOOP if self.enabled else odrive.IDLE)
             ),
+            odrive.ERRORS: odrive.BITS.pack(self.error, self._reason),
             odrive.ENCODER: odrive.PAIR.pack(0.0, 0.0),
             odrive.TORQUES: odrive.PAIR.pack(self.command, self.torque),
         }

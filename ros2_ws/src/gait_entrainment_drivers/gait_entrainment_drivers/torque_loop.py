@@ -35,6 +35,7 @@ from gait_entrainment.robot.faults import (
 from gait_entrainment.robot.pulse_train import PulseTrain
 from gait_entrainment.stop_channel import StopAnswer, StopListener
 from gait_entrainment_drivers.device import Reading, TorqueDevice
+from gait_entrainment_drivers.device_lock import DeviceLock
 from gait_entrainment_drivers.link import Link, Sample
 from gait_entrainment_drivers.monitor import NOT_FALLING, Monitor
 
@@ -70,6 +71,7 @@ class TorqueLoop:
         self._gone = _RUN_DOWN_SHARE * capabilities.peak_torque
         self._near_zero = _NEAR_ZERO_SHARE * capabilities.peak_torque
         self._monitor = Monitor(settings, capabilities.peak_torque, capabilities.torque_bandwidth)
+        self._lock: DeviceLock | None = None  # while the device is open
         self._train: PulseTrain | None = None  # onsets in steady time
         self._faults: tuple[Fault, ...] = ()
         self._enabled = self._closing = False
@@ -95,16 +97,18 @@ class TorqueLoop:
             self._disable()
             with contextlib.suppress(Exception):
                 self._device.shut()
+            if self._lock is not None:
+                self._lock.release()
             self._stop_channel.close()
 
     # One command
 
     def _tick(self) -> None:
         time.sleep(max(self._due - time.monotonic(), 0.0))
+        self._listen()
         late = time.monotonic() - self._due
         if late > self._settings.lateness:
             self._end_torque(HOST_LOOP_LATE)
-        self._listen()
         if not self._enabled:
             return
         sent = time.monotonic_ns()
@@ -115,7 +119,7 @@ class TorqueLoop:
             self._end_torque(HOST_SILENT)
             torque = 0.0
         self._monitor.expect(torque, now)
-        reading = self._exchange(torque)
+        reading = self._exchange(torque, late)
         if reading is not None:
             self._answered_at, self._measured = now, reading.torque
             for fault in (*reading.faults, *self._monitor.judge(reading, now)):
@@ -128,9 +132,11 @@ class TorqueLoop:
         # After a hiccup it goes on from now: commands that were missed are not made up for.
         self._due = max(self._due + self._period, time.monotonic() - self._settings.lateness)
 
-    def _exchange(self, torque: float) -> Reading | None:
+    def _exchange(self, torque: float, late: float) -> Reading | None:
         """Exchange a torque for a reading; whatever the driver raises, zero is sent on and on."""
         try:
+            if late > self._period:
+                self._device.forget()
             # Most of the period at most: an answer that comes later is read with the next one.
             return self._device.exchange(torque, 0.8 * self._period)
         except Exception as error:
@@ -197,6 +203,9 @@ class TorqueLoop:
             self._train = None
         elif kind == "stop":
             self._end_torque()  # the parent knows why
+        elif kind == "freeze":
+            os.kill(os.getpid(), signal.SIGSTOP)
+            self._listen()  # whoever lets it go on has said before what then
         elif kind in ("open", "enable", "disable", "close"):
             error = ""
             try:
@@ -208,6 +217,7 @@ class TorqueLoop:
 
     def _open(self) -> None:
         self._faults, self._halted, self._ended_at = (), False, math.inf
+        self._lock = DeviceLock(self._device.address)
         self._device.open()
 
     def _enable(self) -> None:

@@ -35,6 +35,7 @@ class MisbehavingDevice(TorqueDevice):
 
     def __init__(self, options: MisbehavingOptions) -> None:
         self._options = options
+        self.address = f"bench device with trace {options.trace}"
         self.capabilities = Capabilities(
             peak_torque=PEAK,
             torque_rate=math.inf,
@@ -54,6 +55,9 @@ class MisbehavingDevice(TorqueDevice):
 
     def enable(self) -> None:
         """Nothing to enable."""
+
+    def forget(self) -> None:
+        """No answer is ever waiting."""
 
     def disable(self) -> None:
         """Note it."""

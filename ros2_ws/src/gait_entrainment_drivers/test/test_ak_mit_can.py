@@ -4,6 +4,7 @@
 """The CAN driver against the motor emulator in another process, hazards included."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -19,7 +20,7 @@ from gait_entrainment_drivers.ak_mit import ENTER, EXIT, MOTORS, Command, pack_c
 from gait_entrainment_drivers.ak_mit_can import AkMitCanOptions, AkMotorOnCan
 from gait_entrainment_drivers.ak_motor_emulator import EmulatedAkMotor
 
-from .emulator_process import emulator, read_trace, until
+from .emulator_process import CHANNEL, emulator, read_trace, until
 
 MS = 1_000_000
 
@@ -153,6 +154,35 @@ def test_a_stop_in_mid_pulse_brings_zero_and_reconnecting_works(tmp_path):
         pulses(robot)
         profiles, _ = follow(robot, 0.4)
         assert max(torque for profile in profiles for torque in profile.torques) > 7
+
+
+def test_a_motor_has_one_master_at_a_time():
+    with emulator() as driver, robot_on(driver) as first, robot_on(driver) as second:
+        enabled(first)
+        with pytest.raises(DeviceError) as error:
+            second.configure()
+        assert re.fullmatch(
+            rf"motor 1 on udp_multicast {CHANNEL} port \d+ is in use by process {os.getpid()}"
+            r" \(.+\): end that first",
+            str(error.value),
+        )
+        pulses(first)
+        profiles, _ = follow(first, 0.4)
+        assert max(torque for profile in profiles for torque in profile.torques) > 7
+        assert not first.faults
+        first.close()
+        enabled(second)
+        # Its death, in whatever way, lets others in too.
+        os.kill(second._robot._process.pid, signal.SIGKILL)
+        second._robot._process.wait()
+        enabled(first)
+
+
+def test_other_motors_on_the_bus_are_not_held(tmp_path):
+    with emulator(trace=tmp_path / "trace") as driver, robot_on(driver) as robot:
+        enabled(robot)
+        with pytest.raises(DeviceError, match="motor 2 does not answer"):
+            robot_on(driver, motor_id=2).configure()
 
 
 _HOST = """

@@ -9,12 +9,14 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
+from datetime import datetime, timedelta, timezone
 from types import SimpleNamespace
 
 import pytest
+from misbehaving_device import MisbehavingOptions, MisbehavingRobot
 
 from gait_entrainment.commands import main
-from gait_entrainment.robot import find_driver
+from gait_entrainment.robot import AnkleRobot, find_driver, keep_proof, proof_of
 from gait_entrainment.robot.drivers import OWN_DRIVERS, Driver
 from gait_entrainment_drivers.conformance import checks
 from gait_entrainment_drivers.conformance.bench import DriverBench, Tolerances, run_check
@@ -24,7 +26,15 @@ from .broken_robots import BROKEN
 from .emulator_process import emulator
 
 # A machine that others share wakes a process up late: the kit's own limits are for a quiet one.
-PATIENT = Tolerances(onset=0.25, zero_within=1.0, call=0.1, slowest_call=2.0, impulse=0.6)
+PATIENT = Tolerances(
+    onset=0.25, zero_within=1.0, watchdog=1.6, call=0.1, slowest_call=2.0, impulse=0.6
+)
+
+
+@pytest.fixture
+def state(tmp_path, monkeypatch):
+    """Keep what is proved in a folder of the test's own."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
 
 
 def run_checks(text, tolerances=None):
@@ -42,7 +52,7 @@ def test_the_simulated_drivers_keep_every_promise(text):
 
 
 def test_the_can_driver_keeps_every_promise():
-    with emulator() as text:
+    with emulator("--timeout", "0.3") as text:
         results = run_checks(text, PATIENT)
     assert [result for result in results if not result.kept] == []
     figures = {result.check: result.figures for result in results}
@@ -63,7 +73,7 @@ def test_a_broken_driver_is_caught(broken, check, words):
 def test_every_check_can_fail():
     caught = {check for _, check, _ in BROKEN}
     # Those that need real time, or a fault in the guard itself, are caught below.
-    assert {check.__name__ for check in CHECKS} - caught == {"stale_commands"}
+    assert {check.__name__ for check in CHECKS} - caught == {"stale_commands", "silent_host"}
 
 
 def test_silence_that_nobody_notices_is_caught(monkeypatch):
@@ -73,6 +83,51 @@ def test_silence_that_nobody_notices_is_caught(monkeypatch):
     with emulator() as text:
         result = run_check(checks.stale_commands, DriverBench(find_driver(text), PATIENT))
     assert "silence was not noticed" in result.broken
+
+
+MOTORS = [("ak_motor_emulator", "ak_mit_can"), ("odrive_emulator", "odrive_can")]
+HOLDS = (
+    "holds its last command when the host is silent: 8 N m were measured after .* ms of silence"
+)
+
+
+@pytest.mark.usefixtures("state")
+@pytest.mark.parametrize(("program", "name"), MOTORS)
+def test_a_motor_whose_watchdog_is_on_is_proved_and_remembered(program, name, capsys):
+    with emulator("--timeout", "0.02", program=program, driver=name) as text:
+        text = text.replace("rate=250", "rate=500")
+        assert main(["driver", "prove", text, "--arm", "--json"]) == 0
+        (check,) = json.loads(capsys.readouterr().out)["checks"]
+        proof = proof_of(text)
+        assert proof.within == pytest.approx(check["figures"]["zero_within_ms"] / 1e3)
+        assert proof.within > 0.02
+        assert datetime.now(timezone.utc) - datetime.fromisoformat(proof.at) < timedelta(minutes=1)
+
+
+@pytest.mark.usefixtures("state")
+@pytest.mark.parametrize(("program", "name"), MOTORS)
+def test_a_motor_that_holds_its_last_command_is_caught_and_its_proof_taken_back(
+    program, name, capsys
+):
+    with emulator(program=program, driver=name) as text:
+        keep_proof(text, 0.05)
+        assert main(["driver", "prove", text, "--arm"]) == 1
+        assert re.search(HOLDS, capsys.readouterr().out)
+        assert proof_of(text) is None
+
+
+def test_a_driver_that_cannot_fall_silent_proves_nothing():
+    class Unprovable(MisbehavingRobot):
+        frozen = AnkleRobot.frozen
+
+    driver = Driver("unprovable", Unprovable, MisbehavingOptions(rate=250.0, lateness=0.5))
+    result = run_check(checks.silent_host, DriverBench(driver))
+    assert result.broken.startswith("not provable: this driver cannot let its host fall silent")
+
+
+def test_a_simulated_robot_has_nothing_to_prove(capsys):
+    assert main(["driver", "prove", "ideal", "--arm"]) == 1
+    assert "nothing to prove" in capsys.readouterr().err
 
 
 def test_the_command_prints_a_sentence_for_each_promise(capsys):

@@ -25,6 +25,7 @@ from gait_entrainment_drivers.ak_mit import (
 from gait_entrainment_drivers.ak_mit_can import AkMitCanOptions, AkMotorOnCan
 from gait_entrainment_drivers.ak_motor_emulator import EmulatedAkMotor
 from gait_entrainment_drivers.odrive import (
+    CLEAR_ERRORS,
     CLOSED_LOOP,
     ENCODER,
     HEARTBEAT,
@@ -42,6 +43,7 @@ from gait_entrainment_drivers.odrive_can import OdriveAxis, OdriveCanOptions
 from gait_entrainment_drivers.odrive_emulator import EmulatedOdrive
 
 AK = MOTORS["AK80-9"]
+HOT = 0x2000  # an error of an ODrive
 RATIOS = [-9.0, -0.5, 1.0, 3.0]
 
 
@@ -53,9 +55,12 @@ class Wire:
         self.sent = []
         self.strongest = 0.0  # torque that the motor ever showed [N m]
         self.waiting = []
+        self.lost = set()  # ids of frames that get lost on the way to the motor
         self.now = 0.0
 
     def send(self, message):
+        if message.arbitration_id in self.lost:
+            return
         data = bytes(message.data)
         self.sent.append(data)
         assert not message.is_extended_id
@@ -128,6 +133,40 @@ def test_an_odrive_whose_heartbeat_is_switched_off_is_asked_for_it(monkeypatch):
     assert robot.exchange(1.0, 0.01).faults == ()
     wire.motor.obey(frame_id(0, STOP), b"", remote=False, now=wire.now)
     assert [fault.name for fault in robot.exchange(1.0, 0.01).faults] == ["emergency_stop"]
+
+
+def faults_of(robot):
+    """Return the faults of the second of two readings: by then everything has been asked for."""
+    return [robot.exchange(0.0, 0.01), robot.exchange(0.0, 0.01)][1].faults
+
+
+def test_an_odrive_whose_heartbeat_stays_away_is_a_fault_by_name(monkeypatch):
+    robot, wire = odrive()
+    robot.enable()
+    assert faults_of(robot) == ()
+    wire.lost.add(frame_id(0, HEARTBEAT))
+    monkeypatch.setattr(odrive_can, "HEARTBEAT_LOST", 0.0)
+    assert faults_of(robot) == (odrive_can.NO_HEARTBEAT,)
+
+
+@pytest.mark.parametrize("error", [HOT, 0])
+def test_an_odrive_says_why_it_disarmed_before_its_heartbeat_does(error):
+    robot, wire = odrive()
+    robot.enable()
+    assert faults_of(robot) == ()
+    wire.lost.add(frame_id(0, HEARTBEAT))
+    wire.motor.error = HOT
+    wire.motor.advance(wire.now)
+    wire.motor.error = error  # it may be over by now
+    assert [fault.name for fault in faults_of(robot)] == ["motor_too_hot"]
+
+
+def test_why_an_odrive_disarmed_before_it_was_enabled_is_no_fault():
+    robot, wire = odrive()
+    wire.lost.add(frame_id(0, CLEAR_ERRORS))
+    wire.motor._reason = HOT
+    robot.enable()
+    assert faults_of(robot) == ()
 
 
 class Telling:

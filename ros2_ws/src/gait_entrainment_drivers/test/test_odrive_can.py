@@ -65,9 +65,8 @@ def test_an_error_disarms_and_is_a_fault_that_only_an_explicit_step_clears():
         enabled(robot)
         pulses(robot, duration=0.4)
         _, states = follow(robot, 5.0)
-        # A disarmed axis stops following at once; its heartbeat may tell why up to 0.1 s later.
-        (fault,) = robot.faults
-        assert fault.name in ("motor_too_hot", "torque_not_followed")
+        # It stops following at once, its heartbeat comes up to 0.1 s later: it was asked why.
+        assert [fault.name for fault in robot.faults] == ["motor_too_hot"]
         assert max(state.measured for state in states) > 7
         robot.close()
         # The cause is still there.

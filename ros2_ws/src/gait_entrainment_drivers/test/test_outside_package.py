@@ -57,4 +57,4 @@ def test_its_own_test_is_the_kit(outside):
         " -p gait_entrainment_drivers.pytest_plugin -p no:cacheprovider"
     )
     assert done.returncode == 0, done.stdout
-    assert "38 passed" in done.stdout
+    assert "40 passed" in done.stdout

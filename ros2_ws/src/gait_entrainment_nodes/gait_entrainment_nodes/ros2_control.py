@@ -17,6 +17,7 @@ command if messages stop, unless the hardware or the controller has a timeout of
 import math
 import os
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,15 +29,20 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment.robot.contract import Capabilities
-from gait_entrainment.robot.faults import DeviceError
+from gait_entrainment.robot.faults import DeviceError, Fault, LimitError
 from gait_entrainment.settings import setting
 from gait_entrainment_drivers.device import Reading, TorqueDevice
 from gait_entrainment_drivers.host_timed import HostTimedRobot, LoopOptions
+from gait_entrainment_drivers.monitor import SECOND_MASTER
 
-# How long the robot may take to show its joint, its controller and its services [s].
+# How long the robot may take to show its joint and its controller [s].
 _DISCOVERY_TIMEOUT = 5.0
-_SERVICE_TIMEOUT = 2.0
+# The robot's process waits 2 s for the device to be enabled.
+_SERVICE_TIMEOUT = 1.0
+# After the loop was held up, for so long a state is waited for before the next command [s].
+_FRESH_STATE_TIMEOUT = 0.02
 # Only the latest state counts.
 _STATES = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 # What ros2_control's controllers subscribe with is reliable. One command is kept: never a queue.
@@ -55,16 +61,21 @@ class Ros2ControlOptions(LoopOptions):
     joint_index: int = setting(0, "place of the joint in the controller's command", "1", (0, 63))
     joint_count: int = setting(1, "joints in the controller's command", "1", (1, 64))
     manage: bool = setting(True, "activate the controller by controller_manager, if it is there")
-    peak_torque: float = setting(20.0, "largest torque of the joint", "N m", (0.1, 500.0))
-    ratio: float = setting(1.0, "ankle torque per joint effort", "1", (-100.0, 100.0))
+    peak_torque: float = setting(20.0, "largest torque at the ankle", "N m", (0.1, 500.0))
+    ratio: float = setting(
+        1.0,
+        "ankle torque per effort of the joint, and joint angle per ankle angle",
+        "1",
+        (-100.0, 100.0),
+    )
 
     def __post_init__(self) -> None:
         """Check every field, and what has no range of its own."""
         super().__post_init__()
         if self.ratio == 0:
-            raise DeviceError("driver: ratio: 0; allowed: any other number")
+            raise LimitError("driver: ratio: 0; allowed: any other number")
         if self.joint_index >= self.joint_count:
-            raise DeviceError(
+            raise LimitError(
                 f"driver: joint_index: {self.joint_index}; allowed: below joint_count"
                 f" ({self.joint_count})"
             )
@@ -75,6 +86,9 @@ class EffortJoint(TorqueDevice):
 
     def __init__(self, options: Ros2ControlOptions) -> None:
         self.name = f"joint {options.joint}"
+        # A command is for all joints of a controller: it has one master.
+        under = f" under {options.namespace.strip('/')}" if options.namespace else ""
+        self.address = f"{options.controller}{under} in ROS domain {options.domain}"
         self._options = options
         self.capabilities = Capabilities(
             peak_torque=options.peak_torque,
@@ -86,15 +100,18 @@ class EffortJoint(TorqueDevice):
         )
         self._node: Any = None
         self._state: JointState | None = None  # not read yet
+        self._age = math.inf  # of the joint's last state when it came [s]
         self._place = 0  # of the joint in it
 
     def open(self) -> None:
         """Join the robot's domain, and see its joint and its controller."""
         options = self._options
-        if os.environ.get("ROS_DOMAIN_ID", "0") == str(options.domain) and not options.namespace:
+        named_alike = not options.namespace and options.joint_states == "joint_states"
+        if os.environ.get("ROS_DOMAIN_ID", "0") == str(options.domain) and named_alike:
             raise DeviceError(
-                f"driver: domain: {options.domain} is that of the run, whose joint_states would "
-                "meet the robot's; allowed: another domain, or a namespace of the robot"
+                f"driver: domain: {options.domain} is that of the run (ROS_DOMAIN_ID), whose "
+                "joint_states would meet the robot's; allowed: another domain, a namespace of the "
+                "robot, or another name for its joint_states"
             )
         self._context = Context()
         rclpy.init(args=[], context=self._context, domain_id=options.domain)
@@ -111,36 +128,51 @@ class EffortJoint(TorqueDevice):
         self._commands = self._node.create_publisher(
             Float64MultiArray, f"{options.controller}/commands", _COMMANDS
         )
-        self._wait(lambda: self._state is not None, f"no {options.joint_states} with the joint")
-        if not math.isfinite(self._effort()):
+        self._wait(
+            lambda: self._age < math.inf,
+            lambda: f"no {options.joint_states} tell of it: start its joint state broadcaster",
+        )
+        self._wait(
+            lambda: self._state is not None,
+            lambda: (
+                f"its {options.joint_states} are {self._age:.3g} s old when they come: "
+                "synchronize the clocks, and see that they carry stamps"
+            ),
+        )
+        if self._state is None or not math.isfinite(self._reading(self._state).torque):
             raise DeviceError(f"{self.name} reports no effort: its hardware must export one")
-
-    def enable(self) -> None:
-        """Send zero, activate the controller, and see that it listens."""
-        options = self._options
-        self._publish(0.0)
-        if options.manage:
-            self._switch(activate=True)
         self._wait(
             lambda: self._commands.get_subscription_count() > 0,
-            f"nobody listens to {options.controller}/commands: load and activate the controller",
+            lambda: (
+                f"nobody listens to {self._commands.topic_name}: load and configure the controller"
+            ),
         )
+
+    def enable(self) -> None:
+        """Send zero and activate the controller."""
+        if self._masters():
+            raise DeviceError(
+                f"{self.name}: somebody else publishes {self._commands.topic_name}: find and stop"
+                " that"
+            )
+        self._publish(0.0)
+        if self._options.manage:
+            self._switch(activate=True)
         self._publish(0.0)
 
     def exchange(self, torque: float, patience: float) -> Reading | None:
-        """Publish a torque; return the joint's state if a new one came meanwhile."""
+        """Publish a torque; return the joint's state if a new one has come or comes meanwhile."""
         self._publish(torque / self._options.ratio)
-        give_up = time.monotonic() + patience
-        while (left := give_up - time.monotonic()) > 0 and self._state is None:
-            self._executor.spin_once(timeout_sec=left)
+        self._spin(lambda: self._state is not None, patience)
         state, self._state = self._state, None
-        if state is None:
-            return None
-        ratio = self._options.ratio
-        return Reading(
-            state.effort[self._place] * ratio,
-            self._of(state.position) / ratio,
-            self._of(state.velocity) / ratio,
+        return None if state is None else self._reading(state)
+
+    def forget(self) -> None:
+        """Drop the states that have come, and take one that is measured now."""
+        now = time.time_ns()
+        self._state = None
+        self._spin(
+            lambda: self._state is not None and _stamp(self._state) >= now, _FRESH_STATE_TIMEOUT
         )
 
     def disable(self) -> None:
@@ -159,33 +191,43 @@ class EffortJoint(TorqueDevice):
         self._node = None
 
     def _on_state(self, message: JointState) -> None:
-        """Take a state that has the joint in it; those of other joints are nobody's business."""
-        if self._options.joint in message.name:
+        """Take a fresh state that has the joint in it; others are nobody's business."""
+        if self._options.joint not in message.name:
+            return
+        self._age = (time.time_ns() - _stamp(message)) / NANOSECONDS_PER_SECOND
+        if abs(self._age) < self._options.silence:
             self._place = list(message.name).index(self._options.joint)
-            if len(message.effort) > self._place:
-                self._state = message
+            self._state = message
 
-    def _of(self, values: Any) -> float:
-        return float(values[self._place]) if len(values) > self._place else math.nan
+    def _reading(self, state: JointState) -> Reading:
+        effort, position, velocity = (
+            float(values[self._place]) if len(values) > self._place else math.nan
+            for values in (state.effort, state.position, state.velocity)
+        )
+        ratio = self._options.ratio
+        return Reading(effort * ratio, position / ratio, velocity / ratio, faults=self._masters())
 
-    def _effort(self) -> float:
-        return math.nan if self._state is None else self._of(self._state.effort)
+    def _masters(self) -> tuple[Fault, ...]:
+        """The fault of a second master, if there is one."""
+        return (
+            (SECOND_MASTER,) if self._node.count_publishers(self._commands.topic_name) > 1 else ()
+        )
 
     def _publish(self, effort: float) -> None:
         command = [0.0] * self._options.joint_count
         command[self._options.joint_index] = effort
         self._commands.publish(Float64MultiArray(data=command))
 
-    def _wait(self, condition: Any, lacking: str, timeout: float = _DISCOVERY_TIMEOUT) -> None:
-        give_up = time.monotonic() + timeout
-        while not condition():
-            if time.monotonic() > give_up:
-                options = self._options
-                raise DeviceError(
-                    f"{self.name}: {lacking} in domain {options.domain}"
-                    f"{options.namespace and ' under ' + options.namespace}"
-                )
-            self._executor.spin_once(timeout_sec=0.01)
+    def _spin(self, until: Callable[[], bool], patience: float) -> bool:
+        """Take what comes until something is so; return whether it is."""
+        give_up = time.monotonic() + patience
+        while not (so := until()) and (left := give_up - time.monotonic()) > 0:
+            self._executor.spin_once(timeout_sec=left)
+        return so
+
+    def _wait(self, until: Callable[[], bool], lacking: Callable[[], str]) -> None:
+        if not self._spin(until, _DISCOVERY_TIMEOUT):
+            raise DeviceError(f"{self.name} of {self.address}: {lacking()}")
 
     def _switch(self, *, activate: bool) -> None:
         """Activate or deactivate the controller, if controller_manager can be asked."""
@@ -196,19 +238,25 @@ class EffortJoint(TorqueDevice):
         client = self._node.create_client(SwitchController, "controller_manager/switch_controller")
         if not client.wait_for_service(timeout_sec=0.2):
             return
-        request = SwitchController.Request(strictness=SwitchController.Request.STRICT)
+        # One that is active already, or inactive, is left as it is.
+        request = SwitchController.Request(strictness=SwitchController.Request.BEST_EFFORT)
         wanted = [self._options.controller]
         if activate:
             request.activate_controllers = wanted
         else:
             request.deactivate_controllers = wanted
         future = client.call_async(request)
-        self._wait(future.done, "controller_manager does not answer", _SERVICE_TIMEOUT)
+        if not self._spin(future.done, _SERVICE_TIMEOUT):
+            raise DeviceError("controller_manager does not answer: see whether it runs")
         if activate and not future.result().ok:
             raise DeviceError(
                 f"controller_manager does not activate {self._options.controller}: is it loaded, "
                 "and is its joint free?"
             )
+
+
+def _stamp(message: JointState) -> int:
+    return message.header.stamp.sec * NANOSECONDS_PER_SECOND + message.header.stamp.nanosec
 
 
 class Ros2ControlRobot(HostTimedRobot):

@@ -107,9 +107,7 @@ class Protocol:
     washout: int = setting(15, "strides after the strides of the pulses", within=(0, _MOST))
     walker: WalkerParameters = field(default_factory=WalkerParameters)
     limits: DeviceLimits = field(default_factory=DeviceLimits)  # of what the person may get
-    driver: str = setting(
-        "ideal", "ankle robot driver, as entrain driver list has them", plain=True
-    )
+    driver: str = setting("ideal", "ankle robot driver, as entrain driver list has them")
     seed: int = setting(0, "seed of whatever is random", within=(0, 2**63 - 1))
 
     @property

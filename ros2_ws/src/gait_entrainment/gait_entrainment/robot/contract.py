@@ -6,11 +6,12 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.robot.faults import Fault
+from gait_entrainment.robot.faults import DeviceError, Fault
 from gait_entrainment.robot.profile import TorqueProfile
 from gait_entrainment.robot.pulse_train import PulseTrain
 
@@ -96,6 +97,7 @@ class AnkleRobot(ABC):
     way out. A driver need not repeat that, except for what only it can know: a device that no
     longer answers, and a host loop that runs late. Whatever happens to the process, the
     **device** must go to zero by itself when commands stop: software on the host cannot do that.
+    ``frozen`` lets the kit prove it.
     """
 
     Options: ClassVar[type[Any]]
@@ -144,3 +146,14 @@ class AnkleRobot(ABC):
     @abstractmethod
     def close(self) -> None:
         """Bring the torque to zero, disable, release everything; never raises."""
+
+    def frozen(self) -> AbstractContextManager[None]:
+        """
+        Return a context in which the host is silent: nothing goes to the device, as if frozen.
+
+        Only the kit asks for it, of a device in real time that has been activated. It calls
+        nothing but ``stop`` meanwhile, and the first command afterwards must be zero torque.
+        """
+        raise DeviceError(
+            "this driver cannot let its host fall silent: implement AnkleRobot.frozen"
+        )

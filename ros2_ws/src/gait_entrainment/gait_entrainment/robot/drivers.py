@@ -1,14 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""
+r"""
 Ankle robot drivers by name, loaded only when chosen.
 
 A text names a driver, NAME or NAME:OPTION=VALUE,OPTION=VALUE, in the same way everywhere: in a
-protocol, on the command line, as a parameter of the perturbator. Drivers of other packages are
-found under the entry point ``gait_entrainment.drivers``.
+protocol, on the command line, as a parameter of the perturbator. A value may contain anything; of
+a comma in it, and of a backslash before a comma or a backslash, ``\,`` and ``\\`` are written.
+Drivers of other packages are found under the entry point ``gait_entrainment.drivers``.
 """
 
+import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
@@ -81,15 +84,28 @@ def find_driver(text: str) -> Driver:
     return Driver(name, robot, _options(name, robot.Options, options))
 
 
+def split_options(text: str) -> list[str]:
+    """Return the parts of OPTION=VALUE,OPTION=VALUE, each as it is meant."""
+    parts = re.findall(r"(?:\\[\\,]|[^,])+", text)
+    return [re.sub(r"\\([\\,])", r"\1", part) for part in parts]
+
+
+def join_options(parts: Iterable[str]) -> str:
+    """Return the text that split_options takes apart into these parts."""
+    return ",".join(re.sub(r"([\\,])", r"\\\1", part) for part in parts)
+
+
 def _options(name: str, options_type: type[Any], text: str) -> Any:
     """Return a driver's options from OPTION=VALUE,OPTION=VALUE."""
     known = settings_of(options_type)
     values = {}
-    for part in filter(None, text.split(",")):
+    for part in split_options(text):
         key, equals, value = part.partition("=")
         if not equals or key not in known:
             allowed = ", ".join(known) or "none"
             raise LimitError(f"driver: {name}: option {part!r}; allowed: {allowed}, as NAME=VALUE")
+        if key in values:
+            raise LimitError(f"driver: {name}: {key}: appears twice; keep one")
         try:
             values[key] = known[key].parse(f"driver: {name}: {key}", value)
         except SettingError as error:

@@ -7,9 +7,12 @@ import subprocess
 import sys
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.robot import DeviceError, LimitError, driver_names, find_driver
+from gait_entrainment.robot.drivers import join_options, split_options
 
 
 def test_the_drivers_of_this_package_are_there():
@@ -33,6 +36,20 @@ def test_options_reach_the_driver():
     assert driver.make(Side.LEFT).capabilities.peak_torque == 7.5
 
 
+@settings(derandomize=True, deadline=None)
+@given(st.lists(st.text(min_size=1)), st.text(r"\,=a"))
+def test_options_of_any_text_read_back_the_same(parts, value):
+    parts = [*parts, f"channel={value}"]
+    assert split_options(join_options(parts)) == parts
+
+
+def test_only_a_comma_and_a_backslash_before_one_need_a_backslash():
+    text = r"channel=/dev/ttyACM0,path=C:\x,list=1\,2,ends=\\,more=1"
+    assert split_options(text) == [
+        "channel=/dev/ttyACM0", r"path=C:\x", "list=1,2", "ends=\\", "more=1"
+    ]  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -40,6 +57,7 @@ def test_options_reach_the_driver():
         ("emulatd", "'emulatd' is unknown"),
         ("ideal:delay=1", "ideal: option 'delay=1'; allowed: none"),
         ("emulated:delay", "option 'delay'; allowed: bandwidth, .*NAME=VALUE"),
+        ("emulated:delay=0.1,delay=0.2", "delay: appears twice"),
         ("emulated:delay=soon", "delay: 'soon'; allowed: 0 to 0.5 s"),
         ("emulated:delay=nan", "delay: 'nan'; allowed"),
         ("emulated:delay=0.6", "delay: '0.6'; allowed"),

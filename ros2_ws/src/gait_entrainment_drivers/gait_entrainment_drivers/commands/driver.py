@@ -13,10 +13,16 @@ from typing import Any
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.errors import EntrainmentError
-from gait_entrainment.robot import DeviceError, LimitError, driver_names, find_driver
+from gait_entrainment.robot import (
+    DeviceError,
+    LimitError,
+    driver_names,
+    find_driver,
+    keep_proof,
+)
 from gait_entrainment.settings import settings_of
 from gait_entrainment_drivers.conformance.bench import DriverBench, Result, Tolerances, run_check
-from gait_entrainment_drivers.conformance.checks import CHECKS
+from gait_entrainment_drivers.conformance.checks import CHECKS, silent_host
 
 # Where the check of a running node is found: it needs ROS, which this package does not know.
 NODE_CHECK = "gait_entrainment.node_check"
@@ -25,6 +31,7 @@ EXAMPLES = """examples:
   entrain driver list                       every driver, with its options
   entrain driver check emulated:delay=0.01  does it keep every promise of the contract?
   entrain driver check my_robot --arm --json
+  entrain driver prove my_robot --arm       does its torque end when this computer is silent?
   entrain driver check --node perturbator   any node that speaks the perturbator's topics
   entrain driver check --node perturbator --real-time --arm      one that holds a real robot
 """
@@ -47,7 +54,16 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         " (docs/drivers.md). Exit code 1 if one is broken.",
     )
     check.set_defaults(run=check_driver)
-    for action in (listing, check):
+    prove = actions.add_parser(
+        "prove",
+        help="the one check without which no real robot is armed",
+        description="Prove that the device brings its torque to zero by itself when its host falls"
+        " silent. What is proved is remembered on this computer, for exactly these options of the"
+        " driver. `check` proves it too.",
+    )
+    prove.set_defaults(run=prove_driver)
+    prove.add_argument("driver", metavar="NAME[:OPTION=VALUE,...]", help="driver")
+    for action in (listing, check, prove):
         action.add_argument("--json", action="store_true", help="print one JSON object")
     checked = check.add_mutually_exclusive_group(required=True)
     checked.add_argument("driver", nargs="?", metavar="NAME[:OPTION=VALUE,...]", help="driver")
@@ -62,17 +78,23 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         default="right",
         help="ankle of the node's robot (default right)",
     )
-    for name, meaning in (
-        ("--real-time", "the node holds a real robot: check it by the wall clock"),
-        ("--arm", "let a real device deliver torque; nobody may wear it"),
-    ):
-        check.add_argument(name, action="store_true", help=meaning)
     check.add_argument(
-        "--torque",
-        type=float,
-        default=8.0,
-        help="height of the pulses [N m], up to 30 (default 8)",
+        "--real-time",
+        action="store_true",
+        help="the node holds a real robot: check it by the wall clock",
     )
+    for action in (check, prove):
+        action.add_argument(
+            "--arm",
+            action="store_true",
+            help="let a real device deliver torque; nobody may wear it",
+        )
+        action.add_argument(
+            "--torque",
+            type=float,
+            default=8.0,
+            help="height of the pulses [N m], up to 30 (default 8)",
+        )
 
 
 def list_drivers(options: argparse.Namespace) -> int:
@@ -115,12 +137,29 @@ def _description(name: str) -> dict[str, Any]:
 
 def check_driver(options: argparse.Namespace) -> int:
     """Run the conformance kit on a driver or a node; 1 if a promise is broken."""
+    if options.node is not None:
+        return _report(options.node, _check_node(options, _tolerances(options)), options.json)
+    return _report(options.driver, _check_driver(options, CHECKS), options.json)
+
+
+def prove_driver(options: argparse.Namespace) -> int:
+    """Run the check of a silent host on a driver; 1 if the device holds its last command."""
+    if find_driver(options.driver).simulated:
+        raise LimitError(f"{options.driver} applies no real torque: there is nothing to prove")
+    return _report(options.driver, _check_driver(options, (silent_host,)), options.json)
+
+
+def _tolerances(options: argparse.Namespace) -> Tolerances:
     if not 0 < options.torque <= 30:
         raise LimitError(f"--torque: {options.torque:g} N m; allowed: above 0 and at most 30")
-    tolerances = Tolerances(torque=options.torque)
-    if options.node is not None:
-        return _report(options.node, _check_node(options, tolerances), options.json)
-    driver = find_driver(options.driver)
+    return Tolerances(torque=options.torque)
+
+
+def _check_driver(
+    options: argparse.Namespace, checks: Iterable[Callable[[Any], None]]
+) -> Iterator[Result]:
+    """Check a driver; what a real device proves of a silent host is remembered."""
+    tolerances, driver = _tolerances(options), find_driver(options.driver)
     if not driver.simulated:
         if not options.arm:
             raise LimitError(
@@ -130,8 +169,13 @@ def check_driver(options: argparse.Namespace) -> int:
         with driver.make(Side.RIGHT) as robot:
             robot.configure()
     bench = DriverBench(driver, tolerances)
-    results = (run_check(check, bench) for check in CHECKS)
-    return _report(options.driver, results, options.json)
+    for check in checks:
+        result = run_check(check, bench)
+        yield result
+        if check is silent_host and not driver.simulated:
+            keep_proof(
+                options.driver, result.figures["zero_within_ms"] / 1e3 if result.kept else None
+            )
 
 
 def _check_node(options: argparse.Namespace, tolerances: Tolerances) -> Iterator[Result]:

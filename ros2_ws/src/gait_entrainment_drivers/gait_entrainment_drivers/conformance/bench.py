@@ -49,6 +49,7 @@ class Tolerances:
     impulse: float = 0.15  # share by which a pulse's impulse may differ from the commanded one
     onset: float = 0.06  # a pulse may be measured this late [s]
     early: float = 0.002  # or this early [s]
+    watchdog: float = 0.2  # torque must be gone when the host has been silent for so long [s]
     call: float = 0.01  # nine in ten calls return within this time [s] ...
     slowest_call: float = 0.2  # ... and each within this one [s]
     state_rate: float = 0.7  # share of the promised rate of states

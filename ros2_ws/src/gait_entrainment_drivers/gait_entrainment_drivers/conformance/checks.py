@@ -12,7 +12,7 @@ import itertools
 import math
 import time
 from collections.abc import Callable, Iterable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import fields, is_dataclass
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, nanoseconds
@@ -273,6 +273,51 @@ def stale_commands(bench: DriverBench) -> None:
     bench.require_zero(since + nanoseconds(0.1), "the limit of the experiment's silence")
 
 
+def silent_host(bench: DriverBench) -> None:
+    """If its host falls silent in mid-pulse, the device brings the torque to zero by itself."""
+    if bench.simulated:  # no host: its torque ends where its promises do
+        return
+    measures = bench.robot.capabilities.measures_torque
+    require(measures, "not provable: the device does not measure its torque.")
+    silence = torque = 0.0
+    for share in (0.125, 0.25, 0.5, 1.0):
+        silence, torque = _after_silence(bench, share * bench.tolerances.watchdog)
+        if abs(torque) <= bench.tolerances.zero * bench.height:
+            bench.figures["zero_within_ms"] = 1e3 * silence
+            return
+    raise BrokenPromiseError(
+        f"holds its last command when the host is silent: {torque:.3g} N m were measured after "
+        f"{1e3 * silence:.0f} ms of silence; switch on the device's own watchdog."
+    )
+
+
+def _after_silence(bench: DriverBench, seconds: float) -> tuple[float, float]:
+    """Let the host be silent in mid-pulse; return for how long [s], and the torque then [N m]."""
+    bench.renew(guarded=False)  # the guard would end the torque
+    bench.start()
+    bench.run_into_pulse()
+    with ExitStack() as frozen:
+        try:
+            frozen.enter_context(bench.robot.frozen())
+        except DeviceError as error:
+            raise BrokenPromiseError(f"not provable: {error}.") from None
+        time.sleep(seconds)
+        bench.robot.stop()
+        thawed = time.time_ns()
+    give_up = time.monotonic() + 1.0
+    while time.monotonic() < give_up:
+        bench.advance(bench.now)
+        before = [state for state in bench.states if state.stamp <= thawed]
+        after = [s for s in bench.states[len(before) :] if math.isfinite(s.measured)]
+        if after:
+            bench.robot.close()
+            pushed = abs(before[-1].measured) > bench.height / 2
+            require(pushed, "not provable: the pulse was over before the host fell silent.")
+            silence = (after[0].stamp - before[-1].stamp) / NANOSECONDS_PER_SECOND
+            return silence, after[0].measured
+    raise BrokenPromiseError(f"not provable: no reading came after {seconds:g} s of silence.")
+
+
 def states(bench: Bench) -> None:
     """States come at the promised rate, ascending, with finite torques, and without faults."""
     bench.start()
@@ -382,4 +427,4 @@ COMMON = (
     timing,
 )
 # And what only a driver can be: topics show no capabilities, limits and durations of calls.
-CHECKS = (construction, *COMMON, at_limits, stale_commands, prompt_calls)
+CHECKS = (construction, *COMMON, at_limits, stale_commands, silent_host, prompt_calls)

@@ -1,0 +1,74 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What was proved of a robot is remembered for exactly its options, and never makes a fuss."""
+
+import json
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+from gait_entrainment.robot import DeviceError, keep_proof, proof_of
+
+ROBOT = r"ak_mit_can:channel=can0,note=a\,b"
+
+
+@pytest.fixture
+def state(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    return tmp_path / "gait_entrainment" / "proofs.json"
+
+
+def test_a_proof_is_kept_and_can_be_taken_back(state):
+    assert proof_of(ROBOT) is None
+    keep_proof(ROBOT, 0.05)
+    keep_proof("other", 0.1)
+    assert proof_of(ROBOT).within == 0.05
+    assert proof_of(ROBOT).version == version("gait_entrainment")
+    keep_proof(ROBOT, None)
+    assert proof_of(ROBOT) is None
+    assert proof_of("other").within == 0.1
+    assert [file.name for file in state.parent.iterdir()] == ["proofs.json"]
+
+
+@pytest.mark.usefixtures("state")
+def test_only_the_same_options_are_the_same_robot():
+    keep_proof(ROBOT, 0.05)
+    assert proof_of(r"ak_mit_can:note=a\,b,channel=can0")
+    for other in ("ak_mit_can", "ak_mit_can:channel=can1", r"odrive_can:channel=can0,note=a\,b"):
+        assert proof_of(other) is None
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "3", '{"x:": 3}', '{"x:": {"within": 1}}', "\0"])
+def test_a_file_that_cannot_be_read_proves_nothing_and_is_replaced(state, text):
+    state.parent.mkdir()
+    state.write_text(text)
+    assert proof_of("x") is None
+    keep_proof("x", 0.05)
+    assert proof_of("x").within == 0.05
+
+
+def test_bytes_that_are_no_text_prove_nothing(state):
+    state.parent.mkdir()
+    state.write_bytes(b"\xff\xfe")
+    assert proof_of("x") is None
+
+
+def test_without_a_home_nothing_is_proved_and_keeping_says_why(monkeypatch):
+    def no_home():
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setenv("XDG_STATE_HOME", "relative/is/ignored")
+    monkeypatch.setattr(Path, "home", no_home)
+    assert proof_of("x") is None
+    with pytest.raises(DeviceError, match=r"cannot be kept: .*home directory.*XDG_STATE_HOME"):
+        keep_proof("x", 0.05)
+
+
+def test_without_a_state_folder_it_is_in_the_home(tmp_path, monkeypatch):
+    monkeypatch.delenv("XDG_STATE_HOME", raising=False)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    keep_proof("x", 0.05)
+    file = tmp_path / ".local/state/gait_entrainment/proofs.json"
+    assert json.loads(file.read_text())["x:"]["within"] == 0.05

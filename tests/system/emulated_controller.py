@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+What the driver sees of a robot under ros2_control: an effort controller, a state broadcaster.
+
+    python emulated_controller.py DOMAIN [--timeout S] [--namespace NAME] ...
+
+The torque follows the command by a lag of 30 Hz. Without a timeout the last command is held, as
+ros2_control's effort controllers do. Prints a line when it is there.
+"""
+
+import argparse
+import math
+import time
+
+import rclpy
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+
+
+class Controller(Node):
+    """Two joints, of which the ankle is driven."""
+
+    def __init__(self, options):
+        super().__init__("controller_manager", namespace=options.namespace)
+        self.options = options
+        self.command = self.torque = 0.0
+        self.heard_at = self.now = time.monotonic()
+        self.states = self.create_publisher(JointState, options.joint_states, 1)
+        if not options.deaf:
+            topic = "effort_controller/commands"
+            self.create_subscription(Float64MultiArray, topic, self.obey, 1)
+
+    def obey(self, message):
+        self.advance()
+        (self.command,) = message.data
+        self.heard_at = self.now
+
+    def advance(self):
+        now = time.monotonic()
+        if self.options.timeout and now - self.heard_at > self.options.timeout:
+            self.command = 0.0
+        decay = math.exp(-2 * math.pi * 30.0 * (now - self.now))
+        self.torque = self.command + (self.torque - self.command) * decay
+        self.now = now
+
+    def tell(self):
+        self.advance()
+        message = JointState(name=["knee", "ankle"], position=[1.0, 0.1], velocity=[0.0, 0.0])
+        stamp = time.time_ns() - round(self.options.behind * 1e9)
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 1_000_000_000)
+        message.effort = [] if self.options.no_effort else [math.nan, self.torque]
+        self.states.publish(message)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("domain", type=int)
+    parser.add_argument("--timeout", type=float, default=0.0)
+    parser.add_argument("--rate", type=float, default=500.0)
+    parser.add_argument("--namespace", default="")
+    parser.add_argument("--joint-states", default="joint_states")
+    parser.add_argument("--behind", type=float, default=0.0, help="of its clock [s]")
+    parser.add_argument("--deaf", action="store_true", help="no controller")
+    parser.add_argument("--no-effort", action="store_true", help="nothing is measured")
+    options = parser.parse_args()
+    rclpy.init(args=[], domain_id=options.domain)
+    node = Controller(options)
+    executor = EventsExecutor()
+    executor.add_node(node)
+    print("ready", flush=True)
+    due = time.monotonic()
+    while True:
+        node.tell()
+        due += 1 / options.rate
+        while (left := due - time.monotonic()) > 0:
+            executor.spin_once(timeout_sec=left)
+
+
+if __name__ == "__main__":
+    main()

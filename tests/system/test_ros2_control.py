@@ -1,0 +1,179 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The driver of ros2_control robots against an emulated effort controller, in a process."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from gait_entrainment.commands import main
+from gait_entrainment.conventions import Side
+from gait_entrainment.robot import DeviceError, LimitError, PulseTrain, find_driver, proof_of
+from gait_entrainment_drivers.conformance.bench import DriverBench, Tolerances, run_check
+from gait_entrainment_drivers.conformance.checks import CHECKS
+from gait_entrainment_nodes import ros2_control
+from gait_entrainment_nodes.messaging.domain import claimed_domain
+
+EMULATED = Path(__file__).with_name("emulated_controller.py")
+# A machine that others share wakes processes up late: the limits have their own tests.
+PATIENT = Tolerances(
+    onset=0.25, zero_within=1.0, watchdog=1.6, call=0.1, slowest_call=2.0, impulse=0.6
+)
+
+
+@contextmanager
+def controller(*options, **driver):
+    """Run an emulated controller in a domain of its own; gives the driver's text."""
+    with claimed_domain() as domain:
+        process = subprocess.Popen(
+            [sys.executable, str(EMULATED), str(domain), *options],
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        try:
+            assert process.stdout.readline() == "ready\n"
+            chosen = {"domain": domain, "rate": 200, "silence": 0.3, "lateness": 0.5, **driver}
+            yield "ros2_control:" + ",".join(f"{k}={v}" for k, v in chosen.items())
+        finally:
+            process.kill()
+            process.wait(10)
+            process.stdout.close()
+
+
+def robot_on(text):
+    return find_driver(text).make(Side.RIGHT)
+
+
+def pushed(robot, torque):
+    """Push, and return the states up to where the torque has been reached."""
+    robot.configure()
+    robot.activate()
+    robot.arm()
+    robot.begin(time.time_ns())
+    onset = time.time_ns() + 50_000_000
+    robot.schedule(PulseTrain(Side.RIGHT, onset, 1.0, 1, torque, 0.4))
+    states, give_up = [], time.monotonic() + 10
+    while not states or abs(states[-1].measured - torque) > 0.05 * abs(torque):
+        assert time.monotonic() < give_up, robot.faults
+        robot.heard()
+        states += robot.read()
+        time.sleep(0.005)
+    return states
+
+
+def test_a_controller_that_times_out_keeps_every_promise():
+    with controller("--timeout=0.1") as text:
+        bench = DriverBench(find_driver(text), PATIENT)
+        results = [run_check(check, bench) for check in CHECKS]
+    assert [result for result in results if not result.kept] == []
+
+
+def test_a_controller_that_holds_its_last_command_is_found_out(capsys, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    with controller() as text:
+        assert main(["driver", "prove", text, "--arm", "--json"]) == 1
+    (check,) = json.loads(capsys.readouterr().out)["checks"]
+    assert re.match(
+        "holds its last command when the host is silent: 8 N m were measured after 2.. ms",
+        check["broken"],
+    )
+    assert proof_of(text) is None
+
+
+def test_torque_and_angle_are_the_ankles():
+    with controller(ratio=-2.0) as text, robot_on(text) as robot:
+        state = pushed(robot, 6.0)[-1]
+        assert state.measured == pytest.approx(6.0, rel=0.06)
+        assert state.angle == pytest.approx(-0.05)
+        assert not robot.faults
+
+
+def test_a_robot_in_the_domain_of_the_run_needs_names_of_its_own(monkeypatch):
+    with controller("--namespace=exo", "--joint-states=exo_states", "--timeout=0.2") as text:
+        domain = re.search(r"domain=(\d+)", text)[1]
+        monkeypatch.setenv("ROS_DOMAIN_ID", domain)
+        with pytest.raises(DeviceError, match=r"is that of the run .*allowed: another d"):
+            robot_on(text).configure()
+        with robot_on(f"{text},namespace=/exo,joint_states=exo_states") as robot:
+            pushed(robot, 6.0)
+
+
+@pytest.mark.parametrize(
+    ("options", "driver", "words"),
+    [
+        (
+            [],
+            {"joint": "hip"},
+            "joint hip .*: no joint_states tell of it: start its joint state b",
+        ),
+        (["--no-effort"], {}, "joint ankle reports no effort: its hardware must export one"),
+        (["--deaf"], {}, "nobody listens to /effort_controller/commands: load and configure"),
+        (["--behind=2"], {}, r"joint_states are 2\S* s old when they come: synchronize"),
+    ],
+)
+def test_what_is_missing_is_told_in_one_line(options, driver, words, monkeypatch):
+    monkeypatch.setattr(ros2_control, "_DISCOVERY_TIMEOUT", 2.0)
+    with controller(*options, **driver) as text:
+        device = ros2_control.EffortJoint(find_driver(text).options)
+        with pytest.raises(DeviceError, match=words) as error:
+            device.open()
+        device.shut()
+    assert "\n" not in str(error.value)
+
+
+def test_a_second_master_is_a_fault_by_name():
+    with controller("--timeout=0.2") as text, robot_on(text) as robot:
+        pushed(robot, 6.0)
+        domain = re.search(r"domain=(\d+)", text)[1]
+        other = subprocess.Popen(
+            [sys.executable, "-c", _OTHER], env={**os.environ, "ROS_DOMAIN_ID": domain}
+        )
+        try:
+            give_up = time.monotonic() + 20
+            while not robot.faults:
+                assert time.monotonic() < give_up
+                robot.heard()
+                robot.read()
+                time.sleep(0.01)
+        finally:
+            other.kill()
+            other.wait()
+        assert [fault.name for fault in robot.faults] == ["second_master"]
+        robot.close()
+
+
+_OTHER = """
+import rclpy
+from std_msgs.msg import Float64MultiArray
+rclpy.init()
+node = rclpy.create_node("other")
+node.create_publisher(Float64MultiArray, "/effort_controller/commands", 1)
+rclpy.spin(node)
+"""
+
+
+def test_a_controller_has_one_master_of_ours():
+    with controller("--timeout=0.2") as text, robot_on(text) as first:
+        pushed(first, 6.0)
+        with pytest.raises(DeviceError, match=r"effort_controller in ROS domain \d+ is in use by"):
+            robot_on(f"{text},joint=knee").configure()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ("ratio=0", "ratio: 0; allowed: any other number"),
+        ("joint_index=1", r"joint_index: 1; allowed: below joint_count \(1\)"),
+    ],
+)
+def test_a_wrong_option_is_told_in_one_line(options, words):
+    with pytest.raises(LimitError, match=words):
+        find_driver(f"ros2_control:{options}")
