@@ -71,6 +71,10 @@ def test_wrong_usage_is_one_line_and_leaves_nothing(case, tmp_path):
         (["--driver=ak_mit_can:motor=AK1"], ["motor: 'AK1'", "AK80-9"]),
         (["--driver=ak_mit_can"], ["runs in real time only", "add --real-time"]),
         (["--driver=ak_mit_can", "--real-time"], ["applies real torque", "--arm"]),
+        (
+            ["--driver=ak_mit_can", "--real-time", "--arm"],
+            ["watchdog was not proved on this computer", "entrain driver prove 'ak_mit_can'"],
+        ),
     ],
 )
 def test_what_the_robot_cannot_do_is_one_line_and_leaves_nothing(options, named, tmp_path):

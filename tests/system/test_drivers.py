@@ -38,6 +38,7 @@ from gait_entrainment_nodes.messaging.topics import DIAGNOSTICS, EXPERIMENT_STAT
 
 SHORT = ("--baseline=2", "--pulses=3", "--washout=1")
 WASHED_OUT = (*QUICK, "--baseline=2", "--pulses=2", "--washout=100000")
+ARMED = ("--real-time", "--arm", "--unproved")
 CONFIGURE = Transition.TRANSITION_CONFIGURE
 CHANNEL = "239.74.163.2"
 
@@ -135,7 +136,7 @@ def test_emulated_robot_walks_as_in_the_simulation_and_twice_the_same(tmp_path):
 def test_motor_on_a_bus_delivers_the_experiment_in_real_time(tmp_path, motor):
     driver, trace = motor
     bag = tmp_path / "bag"
-    with entrain_run(bag, f"--driver={driver}", "--real-time", "--arm", "--json", *SHORT) as run:
+    with entrain_run(bag, f"--driver={driver}", *ARMED, "--json", *SHORT) as run:
         outcome = run.outcome()
     assert len(outcome["pulses"]) == 3
     assert outcome["pulse_timing"]["measured"]["pulses"] == 3
@@ -162,7 +163,7 @@ def test_motor_on_a_bus_delivers_the_experiment_in_real_time(tmp_path, motor):
 def test_killed_perturbator_leaves_zero_torque_by_the_motors_own_watchdog(tmp_path, motor):
     driver, trace = motor
     pulses = ("--torque=8", "--width=0.4", "--limit-rising=1", *SHORT)
-    options = (f"--driver={driver}", "--real-time", "--arm", *pulses)
+    options = (f"--driver={driver}", *ARMED, *pulses)
     with entrain_run(tmp_path / "bag", *options) as run:
         pid = run.find_nodes()["perturbator"]
         with probe(run.domain()) as listener:
@@ -181,7 +182,7 @@ def test_killed_perturbator_leaves_zero_torque_by_the_motors_own_watchdog(tmp_pa
     ("options", "words"),
     [
         (
-            ["--driver=ak_mit_can:interface=virtual,channel=nobody", "--real-time", "--arm"],
+            ["--driver=ak_mit_can:interface=virtual,channel=nobody", *ARMED],
             "perturbator refused to be configured: motor 1 does not answer .* check its power",
         ),
         (
@@ -239,7 +240,7 @@ def test_stop_in_the_washout_fails_the_run(tmp_path):
 
 def test_fault_of_the_device_in_the_washout_fails_the_run(tmp_path):
     with emulated_motor(tmp_path, "--error=2", "--error-after=2.5") as (driver, _):
-        options = (f"--driver={driver}", "--real-time", "--arm", *WASHED_OUT)
+        options = (f"--driver={driver}", *ARMED, *WASHED_OUT)
         with entrain_run(tmp_path / "bag", *options) as run:
             words = "perturbator: latched: over_current: The motor reports over-current."
             assert_failed_in_washout(run, words, AnkleRobotState.FAULT)

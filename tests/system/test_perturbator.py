@@ -142,6 +142,7 @@ def test_torque_ends_if_whoever_holds_the_emergency_stop_lets_go(tmp_path):
     with emulated_motor(tmp_path) as (driver, _), claimed_domain() as domain:
         nodes = Session(tmp_path, domain, [f"--driver={driver}"], real_time=True, strangers=True)
         nodes.arguments += ["-p", "deadman_timeout:=0.5", "-p", "operator_timeout:=0.0"]
+        nodes.arguments += ["-p", "unproved:=true"]
         try:
             nodes.start("perturbator")
             stop = EMERGENCY_STOP

@@ -84,15 +84,16 @@ def parameters(
     *,
     real_time: bool = False,
     armed: bool = False,
+    unproved: bool = False,
     onset: str = "commanded",
     lead_time: float = LEAD_TIME,
 ) -> Parameters:
     """
     Return the parameters of every node for a run that is recorded into the folder ``bag``.
 
-    If ``armed``, a real robot may deliver torque without another word; ``onset`` is when the
-    analyzer takes a pulse to begin, "commanded" or "measured"; promised torque leads by
-    ``lead_time`` [s] in real time.
+    If ``armed``, a real robot may deliver torque without another word, even one whose watchdog is
+    ``unproved`` (`gait_entrainment.robot.proof`); ``onset`` is when the analyzer takes a pulse to
+    begin, "commanded" or "measured"; promised torque leads by ``lead_time`` [s] in real time.
     """
     side = protocol.side.name.lower()
     measured = real_time and not find_driver(protocol.driver).simulated
@@ -109,6 +110,7 @@ def parameters(
             "driver": protocol.driver,
             "seed": protocol.seed,
             "armed": armed,
+            "unproved": unproved,
             "planned.torque": abs(protocol.pulse_torque),
             "planned.duration": protocol.pulses.width,
             "planned.count": protocol.pulses.count,
@@ -134,13 +136,20 @@ def parameters(
             "operator_timeout": PERSON_SILENCE,
         }
         # No person gets square pulses of full height from the first one on, unless it is said.
-        if protocol.pulse_torque:
-            rate = abs(protocol.pulse_torque) / (FLANK_SHARE * protocol.pulses.width)
-            given["perturbator"].setdefault("limits.rate", min(rate, 1e6))
-        given["perturbator"].setdefault("limits.rising", RISING)
+        gentle = gentle_limits(protocol)
+        given["perturbator"] |= {f"limits.{name}": value for name, value in gentle.items()}
         given["experiment"]["longest_clock_offset"] = CLOCK_OFFSET
         given["bag_recorder"]["required"] = True
     return {name: given[name] | {"use_sim_time": not real_time} for name in given}
+
+
+def gentle_limits(protocol: Protocol) -> dict[str, float]:
+    """Return what limits the pulses of a real robot, unless the protocol says otherwise."""
+    gentle: dict[str, float] = {"rising": RISING}
+    if protocol.pulse_torque:
+        rate = abs(protocol.pulse_torque) / (FLANK_SHARE * protocol.pulses.width)
+        gentle["rate"] = min(rate, 1e6)
+    return gentle | said_limits(protocol)
 
 
 def _drawn(protocol: Protocol) -> dict[str, Any]:

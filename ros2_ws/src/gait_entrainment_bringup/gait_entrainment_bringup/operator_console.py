@@ -30,7 +30,7 @@ class Operator:
     def __call__(self) -> None:
         """Publish the heartbeat; raise NodeError if the stop key was pressed."""
         self._heartbeat.publish(OPERATOR_HEARTBEAT.type())
-        if _pressed() == STOP_KEY:
+        if pressed_key() == STOP_KEY:
             told = [f"{name}: {a.message if a else 'no answer'}" for name, a in stop_all().items()]
             raise NodeError("stopped by the space bar: " + "; ".join(told), "")
 
@@ -49,7 +49,7 @@ def keys_at_once() -> Iterator[None]:
         termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
 
 
-def _pressed() -> str:
+def pressed_key() -> str:
     """Return a key that was pressed, or an empty text."""
     if not sys.stdin.isatty() or not select.select([sys.stdin], [], [], 0)[0]:
         return ""

@@ -12,13 +12,14 @@ from gait_entrainment.commands.outcome_options import add_onset_option
 from gait_entrainment.commands.protocol_options import add_protocol_options, chosen_protocol
 from gait_entrainment.errors import UsageError
 from gait_entrainment.protocol import Protocol
-from gait_entrainment.robot import LimitError, find_driver
+from gait_entrainment.robot import LimitError, find_driver, require_proof
 from gait_entrainment.settings import Setting
 from gait_entrainment_bringup.node_list import LEAD_TIME, Parameters, bag_folder, parameters
 
 _SWITCHES = {
     "--real-time": "at the pace of the wall clock, not in lock-step",
     "--arm": "let a real ankle robot deliver torque (docs/safety.md)",
+    "--unproved": "arm it although its own watchdog was not proved here; the bag says so",
     "--require-record": "end the run if nothing more can be recorded, as on a full disk",
     "--no-ground-reaction": "leave out the ground reaction forces",
 }
@@ -76,6 +77,7 @@ def checked_run(
             raise LimitError(
                 f"driver: {driver.name} applies real torque: see that all is well, then add --arm"
             )
+        require_proof(protocol.driver, unproved=options.unproved)
     bag = options.out or bag_folder(protocol)
     if records:
         check_output(bag)
@@ -111,6 +113,7 @@ def chosen_parameters(protocol: Protocol, bag: Path, options: argparse.Namespace
         bag,
         real_time=options.real_time,
         armed=options.arm,
+        unproved=options.unproved,
         onset=options.onset,
         lead_time=LEAD_TIME if options.lead_time is None else options.lead_time,
     )

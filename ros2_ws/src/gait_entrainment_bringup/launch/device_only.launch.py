@@ -28,7 +28,9 @@ TRANSITIONS = {
 def nodes(context: LaunchContext) -> list[Action]:
     """Make the nodes, and bring the perturbator up meanwhile."""
     namespace, side, driver = (shared.value(context, n) for n in ("namespace", "side", "driver"))
-    given = {"side": side, "driver": driver, "armed": shared.is_true(context, "arm")}
+    arming = {"armed": "arm", "unproved": "unproved"}
+    given = {"side": side, "driver": driver}
+    given |= {name: shared.is_true(context, argument) for name, argument in arming.items()}
     made = [
         shared.make_node(context, "perturbator", namespace, given),
         shared.make_node(context, "gait_analyzer", namespace, {"side": side}),
@@ -57,6 +59,7 @@ def generate_launch_description() -> LaunchDescription:
         ("driver", None, "ankle robot: NAME or NAME:OPTION=VALUE,... (entrain driver list)"),
         ("side", "right", "ankle on which the robot sits: left or right"),
         ("arm", "false", "let a real ankle robot deliver torque at once: see safety.md"),
+        ("unproved", "false", "even one whose own watchdog was not proved on this computer"),
         shared.NAMESPACE,
         shared.PARAMETERS_FILE,
     )

@@ -27,6 +27,7 @@ def nodes(context: LaunchContext) -> list[Action]:
         Path(shared.value(context, "bag") or bag_folder(protocol)),
         real_time=shared.is_true(context, "real_time"),
         armed=shared.is_true(context, "arm"),
+        unproved=shared.is_true(context, "unproved"),
         onset=shared.value(context, "onset"),
     )
     given["experiment"]["protocol"] = write_protocol(protocol)
@@ -44,6 +45,7 @@ def generate_launch_description() -> LaunchDescription:
         ("protocol", "", "protocol file (YAML); empty: the paper's example"),
         ("real_time", "false", "at the pace of the wall clock, not in lock-step"),
         ("arm", "false", "let a real ankle robot deliver torque at once: see safety.md"),
+        ("unproved", "false", "even one whose own watchdog was not proved on this computer"),
         ("onset", "commanded", "when the analyzer takes a pulse to begin: or measured"),
         ("bag", "", "folder of the bag; empty: bags/<time>_<name>"),
         shared.NAMESPACE,

@@ -102,6 +102,7 @@ class AnkleRobot(ABC):
 
     Options: ClassVar[type[Any]]
     capabilities: Capabilities
+    identity = ""  # what a configured device says of itself, such as its firmware
 
     @abstractmethod
     def __init__(self, side: Side, options: Any, seed: int) -> None:

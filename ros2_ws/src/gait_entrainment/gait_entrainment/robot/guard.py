@@ -75,6 +75,11 @@ class GuardedRobot:
         return self._robot.capabilities
 
     @property
+    def identity(self) -> str:
+        """What the device says of itself, such as its firmware; empty if it says nothing."""
+        return self._robot.identity
+
+    @property
     def enabled(self) -> bool:
         """Whether the device has been activated, latched or not."""
         return self._active

@@ -2,11 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What was proved of ankle robots on this computer: that torque ends when their host falls silent.
+What was shown of ankle robots on this computer: the device's own watchdog, and the checklist.
 
-``entrain driver prove`` writes it, whoever is about to arm a robot reads it. A proof holds for a
-driver with exactly these options, in whatever order they are given: another bus or another motor
-is another robot. The file is ``gait_entrainment/proofs.json`` in the user's state folder, which is
+``entrain driver prove`` shows that torque ends when the host falls silent, ``entrain preflight``
+goes through the checklist before a session; whoever is about to arm a robot reads both. They hold
+for a driver with exactly these options, in whatever order they are given: another bus or another
+motor is another robot. The files are in ``gait_entrainment`` in the user's state folder, which is
 ``$XDG_STATE_HOME``, else ``~/.local/state``.
 """
 
@@ -21,6 +22,8 @@ from typing import Any
 from gait_entrainment.robot.drivers import join_options, split_options
 from gait_entrainment.robot.faults import DeviceError
 
+_PROOFS, _PREFLIGHTS = "proofs.json", "preflights.json"
+
 
 @dataclass(frozen=True)
 class Proof:
@@ -31,12 +34,34 @@ class Proof:
     version: str  # of gait_entrainment; empty if it is not installed as a package
 
 
+@dataclass(frozen=True)
+class Preflight:
+    """That the checklist was gone through."""
+
+    failed: str  # the points that failed, separated by commas; empty if all passed
+    at: str  # when that was, by ISO 8601 in UTC
+
+    @property
+    def age(self) -> float:
+        """How long ago that was [s]."""
+        return (datetime.now(timezone.utc) - datetime.fromisoformat(self.at)).total_seconds()
+
+
 def proof_of(driver: str) -> Proof | None:
     """Return what was proved of the driver that a text names; None if nothing can be read."""
     try:
-        return Proof(**json.loads(_file().read_text(encoding="utf-8"))[_key(driver)])
-    except (OSError, RuntimeError, ValueError, LookupError, TypeError):
+        return Proof(**_known(_PROOFS)[_key(driver)])
+    except (LookupError, TypeError):
         return None
+
+
+def require_proof(driver: str, *, unproved: bool) -> None:
+    """Raise DeviceError if nothing was proved of a driver, and none is ready to do without."""
+    if proof_of(driver) is None and not unproved:
+        raise DeviceError(
+            f"driver: the device's own watchdog was not proved on this computer: entrain driver "
+            f"prove '{driver}' --arm (nobody may wear it), or allow it unproved"
+        )
 
 
 def keep_proof(driver: str, within: float | None) -> None:
@@ -49,13 +74,28 @@ def keep_proof(driver: str, within: float | None) -> None:
         if it cannot be written.
 
     """
+    _keep(_PROOFS, driver, None if within is None else Proof(within, _now(), _version()))
+
+
+def preflight_of(driver: str) -> Preflight | None:
+    """Return the latest checklist of the driver that a text names; None if there is none."""
     try:
-        file = _file()
-        known = _known(file)
+        return Preflight(**_known(_PREFLIGHTS)[_key(driver)])
+    except (LookupError, TypeError):
+        return None
+
+
+def keep_preflight(driver: str, failed: str) -> None:
+    """Remember a checklist, and the points that failed; DeviceError if it cannot be written."""
+    _keep(_PREFLIGHTS, driver, Preflight(failed, _now()))
+
+
+def _keep(name: str, driver: str, shown: Proof | Preflight | None) -> None:
+    try:
+        file, known = _file(name), _known(name)
         known.pop(_key(driver), None)
-        if within is not None:
-            now = datetime.now(timezone.utc).isoformat(timespec="seconds")
-            known[_key(driver)] = asdict(Proof(within, now, _version()))
+        if shown is not None:
+            known[_key(driver)] = asdict(shown)
         file.parent.mkdir(parents=True, exist_ok=True)
         # Written apart and then put in place, so that nobody reads half of it.
         written = file.with_name(f"{file.name}.{os.getpid()}")
@@ -63,22 +103,22 @@ def keep_proof(driver: str, within: float | None) -> None:
         written.replace(file)
     except (OSError, RuntimeError) as error:
         raise DeviceError(
-            f"the proof cannot be kept: {error}; set XDG_STATE_HOME to a folder of yours"
+            f"what was shown cannot be kept: {error}; set XDG_STATE_HOME to a folder of yours"
         ) from None
 
 
-def _file() -> Path:
+def _file(name: str) -> Path:
     state = os.environ.get("XDG_STATE_HOME", "")
     # A relative one is to be ignored, says the XDG Base Directory Specification.
     folder = Path(state) if os.path.isabs(state) else Path.home() / ".local" / "state"
-    return folder / "gait_entrainment" / "proofs.json"
+    return folder / "gait_entrainment" / name
 
 
-def _known(file: Path) -> dict[str, Any]:
-    """Return what the file holds; what is unreadable is as good as absent."""
+def _known(name: str) -> dict[str, Any]:
+    """Return what a file holds; what is unreadable is as good as absent."""
     try:
-        known = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        known = json.loads(_file(name).read_text(encoding="utf-8"))
+    except (OSError, RuntimeError, ValueError):
         return {}
     return known if isinstance(known, dict) else {}
 
@@ -86,6 +126,10 @@ def _known(file: Path) -> dict[str, Any]:
 def _key(driver: str) -> str:
     name, _, options = driver.partition(":")
     return f"{name}:{join_options(sorted(split_options(options)))}"
+
+
+def _now() -> str:
+    return datetime.now(timezone.utc).isoformat(timespec="seconds")
 
 
 def _version() -> str:

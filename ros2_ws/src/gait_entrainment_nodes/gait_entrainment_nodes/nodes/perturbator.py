@@ -30,6 +30,9 @@ from gait_entrainment.robot import (
     PlannedPulses,
     PulseTrain,
     find_driver,
+    preflight_of,
+    proof_of,
+    require_proof,
 )
 from gait_entrainment.robot.faults import DEADMAN_SILENT, NOT_STOPPED, OPERATOR_SILENT
 from gait_entrainment.settings import setting
@@ -59,6 +62,10 @@ class Settings:
     seed: int = setting(0, "seed of a driver that draws random numbers", "1", (0, 2**32 - 1))
     armed: bool = setting(
         False, "arm a real robot on activation; else a person does it by the service ~/arm"
+    )
+    unproved: bool = setting(
+        False,
+        "arm a real robot whose own watchdog was not proved on this computer; recorded",
     )
     operator_timeout: float = setting(
         0.0,
@@ -224,6 +231,8 @@ class Perturbator(Participant, TolerantLifecycleNode):
         """Allow torque, and say so in the record; raises DeviceError if it must not come."""
         if self._robot is None:
             raise DeviceError("the perturbator is not active")
+        if not self._robot.capabilities.simulated:
+            require_proof(self.settings.driver, unproved=self.settings.unproved)
         self._robot.arm()
         if not self._robot.capabilities.simulated:
             self._armed_by = f"{user_and_host()}, by {how}"
@@ -316,12 +325,16 @@ class Perturbator(Participant, TolerantLifecycleNode):
     def _publish_setup(self) -> None:
         """Say for the record what is driven, within which limits, and who allowed torque."""
         settings, limits = self.settings, asdict(self.limits)
+        proof, preflight = proof_of(settings.driver), preflight_of(settings.driver)
         setup = AnkleRobotSetup(
             header=header(self._now),
             run=self._latest_run,
             side=settings.side,
             driver=settings.driver,
+            device=self._robot.identity if self._robot is not None else "",
             armed_by=self._armed_by,
+            watchdog=f"zero within {proof.within:g} s, {proof.at}" if proof else "",
+            preflight=f"{preflight.at}: {preflight.failed or 'passed'}" if preflight else "",
             limit_names=list(limits),
             limits=[float(value) for value in limits.values()],
         )

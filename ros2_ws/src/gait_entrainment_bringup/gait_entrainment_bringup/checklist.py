@@ -1,0 +1,188 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The points of the checklist before a session, each with what was found."""
+
+import math
+import shutil
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
+from gait_entrainment.messages import nanoseconds_of
+from gait_entrainment.protocol import Protocol
+from gait_entrainment.robot import DeviceError, GuardedRobot, find_driver, proof_of
+from gait_entrainment.robot.faults import STOPPED
+from gait_entrainment.stop_channel import StopAnswer, stop_all
+from gait_entrainment_bringup.node_list import CLOCK_OFFSET, gentle_limits
+from gait_entrainment_bringup.operator_console import STOP_KEY, pressed_key
+from gait_entrainment_msgs.srv import Ready
+from gait_entrainment_nodes.messaging.client import Client
+from gait_entrainment_nodes.messaging.domain import wanted_domain
+from gait_entrainment_nodes.messaging.environment import set_environment
+from gait_entrainment_nodes.nodes.participants import ClockOffset
+from gait_entrainment_nodes.nodes.stop_thread import StopThread
+
+# How long the commands of the robot's loop are watched [s].
+_WATCHED = 3.0
+# A command may come later than its period by this [s]: a quarter of what the loop itself allows.
+_LATE = 0.0125
+# Space that a session needs at the least [bytes]: an hour of samples at 1 kHz.
+_SPACE = 2 * 10**9
+# A clock is compared so often; the quickest answer tells most.
+_ASKED = 20
+# Torque has this long to fall after the stop [s].
+_FALL_TIME = 0.3
+# Torque that a sensor may show without any, as a share of the device's peak.
+_NEAR_ZERO_SHARE = 0.05
+
+
+@dataclass
+class Point:
+    """One point of the checklist."""
+
+    name: str
+    passed: bool
+    finding: str
+
+
+def points(
+    protocol: Protocol, bag: Path, elsewhere: Sequence[str], patience: float
+) -> Iterator[Point]:
+    """
+    Go through the checklist with a protocol's robot, enabled at zero torque.
+
+    ``elsewhere`` are nodes on other hosts; the stop has to be pressed within ``patience`` [s].
+    """
+    yield _limits(protocol)
+    yield _watchdog(protocol.driver)
+    yield _record(bag)
+    if elsewhere:
+        yield from _clocks(elsewhere)
+    driver = find_driver(protocol.driver)
+    try:
+        with driver.make(protocol.side, protocol.limits, protocol.seed) as robot:
+            robot.configure()
+            robot.activate()
+            yield Point("device", True, robot.identity or "answers; it does not say what it is")
+            yield _loop(robot)
+            yield _stop(robot, patience)
+    except DeviceError as error:
+        yield Point("device", False, str(error))
+
+
+def _limits(protocol: Protocol) -> Point:
+    limits = replace(protocol.limits, **gentle_limits(protocol))
+    told = ", ".join(f"{name} {value:g}" for name, value in asdict(limits).items())
+    plan = protocol.pulses
+    pulses = f"{plan.count} pulses of {protocol.pulse_torque:g} N m for {plan.width:g} s"
+    return Point("limits", True, f"{pulses}; {told}")
+
+
+def _watchdog(driver: str) -> Point:
+    proof = proof_of(driver)
+    if proof is None:
+        return Point("watchdog", False, f"not proved: entrain driver prove '{driver}' --arm")
+    within = f"torque ends {1e3 * proof.within:.0f} ms after the host falls silent"
+    return Point("watchdog", True, f"{within}, proved {proof.at}")
+
+
+def _record(bag: Path) -> Point:
+    parent = next(folder for folder in bag.absolute().parents if folder.exists())
+    free = shutil.disk_usage(parent).free
+    return Point("record", free > _SPACE, f"{free / 1e9:.1f} GB free in {parent}")
+
+
+def _clocks(nodes: Sequence[str]) -> Iterator[Point]:
+    """Compare the clocks of other hosts with this one."""
+    set_environment(wanted_domain() or 0, real_time=True)
+    with Client("entrain_preflight") as client:
+        for node in nodes:
+            offsets = []
+            for _ in range(_ASKED):
+                question = client.ask(Ready, f"{node}/ready")
+                if not client.wait(question.answer, 5.0):
+                    break
+                asked = time.time_ns()
+                answer = client.call(Ready, f"{node}/ready")
+                told = nanoseconds_of(answer.now)
+                offsets.append(ClockOffset.measured(asked, told, time.time_ns()))
+            if not offsets:
+                yield Point("clock", False, f"{node} does not answer")
+                continue
+            best = min(offsets, key=lambda offset: offset.uncertainty)
+            ahead, uncertain = 1e3 * best.offset, 1e3 * best.uncertainty
+            found = f"that of {node} is ahead by {ahead:+.2f} ms, give or take {uncertain:.2f} ms"
+            allowed = abs(ahead) + uncertain <= 1e3 * CLOCK_OFFSET
+            yield Point("clock", allowed, f"{found}; allowed: {1e3 * CLOCK_OFFSET:g} ms")
+
+
+def _loop(robot: GuardedRobot) -> Point:
+    """Watch how regularly the device is commanded."""
+    robot.begin(time.time_ns())
+    stamps: list[int] = []
+    _watch(robot, lambda: False, _WATCHED, stamps)
+    if robot.faults:
+        return Point("loop", False, "; ".join(f"{f.name}: {f.meaning}" for f in robot.faults))
+    gaps = np.array([b - a for a, b in pairwise(stamps)]) / NANOSECONDS_PER_SECOND
+    if not len(gaps):
+        return Point("loop", False, "the device gave no reading")
+    late = gaps - 1 / robot.capabilities.state_rate
+    p50, p99, worst = 1e3 * np.quantile(late, (0.5, 0.99, 1.0))
+    return Point(
+        "loop",
+        bool(late.max() < _LATE),
+        f"commands late by {p50:.2f} ms (median), {p99:.2f} ms (99 %), {worst:.2f} ms (worst)",
+    )
+
+
+def _stop(robot: GuardedRobot, patience: float) -> Point:
+    """Have the stop pressed, and see that it is obeyed."""
+
+    def stop() -> StopAnswer:
+        robot.stop()
+        return StopAnswer(True, "the stop is latched")
+
+    def pressed() -> bool:
+        if pressed_key() == STOP_KEY:
+            stop_all()
+        return STOPPED in robot.faults
+
+    print(
+        f"      press the stop within {patience:g} s: the space bar here, or `entrain stop` in "
+        "another terminal",
+        file=sys.stderr,
+    )
+    channel = StopThread("preflight", stop)
+    try:
+        _watch(robot, pressed, patience, [])
+        if STOPPED not in robot.faults:
+            return Point("stop", False, f"not pressed within {patience:g} s")
+        measured = _watch(robot, lambda: False, _FALL_TIME, [])
+    finally:
+        channel.close()
+    near_zero = _NEAR_ZERO_SHARE * robot.capabilities.peak_torque
+    if not abs(measured) <= near_zero:
+        return Point("stop", False, f"pressed, but {measured:.2f} N m are measured: cut the power")
+    return Point("stop", True, f"obeyed and latched, {measured:+.2f} N m measured")
+
+
+def _watch(
+    robot: GuardedRobot, over: Callable[[], bool], longest: float, stamps: list[int]
+) -> float:
+    """Read a robot until something is so, or for a time [s]; return the torque measured last."""
+    give_up, measured = time.monotonic() + longest, math.nan
+    while time.monotonic() < give_up and not over():
+        time.sleep(0.01)
+        robot.heard()
+        robot.promise(max(time.time_ns(), robot.promised_until))
+        for state in robot.read():
+            stamps.append(state.stamp)
+            measured = state.measured
+    return measured

@@ -1,0 +1,69 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""entrain preflight: the checklist before a session with a real ankle robot."""
+
+import argparse
+import json
+from collections.abc import Iterator
+
+from gait_entrainment.errors import UsageError
+from gait_entrainment.robot import find_driver, keep_preflight
+from gait_entrainment_bringup.checklist import Point, points
+from gait_entrainment_bringup.operator_console import keys_at_once
+from gait_entrainment_bringup.run_options import add_run_options, checked_run
+
+DESCRIPTION = (
+    "Go through the checklist before a session: what the protocol asks for and what limits it, the"
+    " device's own watchdog, the stop, the loop that times the torque, the record, the clocks of"
+    " other hosts. The robot is enabled at zero torque; no pulse is delivered. The result is"
+    " remembered on this computer for this driver, and each bag says what it was."
+)
+EXAMPLES = """examples:
+  entrain preflight my_protocol.yaml --arm       then press the stop, when asked to
+  entrain preflight my_protocol.yaml --arm --elsewhere walker_sim
+"""
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    add_run_options(parser)
+    parser.add_argument(
+        "--elsewhere",
+        action="append",
+        metavar="NODE",
+        default=[],
+        help="compare the clock of this node's host, on which it runs already; repeatable",
+    )
+    parser.add_argument(
+        "--patience", type=float, default=60.0, help="how long to wait for the stop [s] (60)"
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Go through the checklist; 1 if a point of it fails."""
+    options.real_time = options.unproved = True  # a lacking proof is a point that fails
+    protocol, bag = checked_run(options)
+    if find_driver(protocol.driver).simulated:
+        raise UsageError(
+            f"driver: {protocol.driver} applies no real torque; allowed: a real robot"
+        )
+    with keys_at_once():
+        found = list(_told(points(protocol, bag, options.elsewhere, options.patience), options))
+    failed = ", ".join(point.name for point in found if not point.passed)
+    keep_preflight(protocol.driver, failed)
+    if options.json:
+        print(json.dumps({"passed": not failed, "points": [vars(point) for point in found]}))
+    elif failed:
+        print(f"not fit for a session: {failed}")
+    else:
+        print("fit for a session")
+    return int(bool(failed))
+
+
+def _told(found: Iterator[Point], options: argparse.Namespace) -> Iterator[Point]:
+    for point in found:
+        if not options.json:
+            print(f"{'ok  ' if point.passed else 'FAIL'}  {point.name:<10} {point.finding}")
+        yield point

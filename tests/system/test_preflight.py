@@ -1,0 +1,66 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The checklist before a session, with an emulated motor: what passes, fails, is remembered."""
+
+import json
+import subprocess
+
+import pytest
+from harness import entrain_run
+from test_drivers import SHORT, emulated_motor, entrain
+
+from gait_entrainment.robot import keep_proof, preflight_of
+from gait_entrainment_bags import BagReader
+
+
+@pytest.fixture
+def state(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+
+
+@pytest.mark.usefixtures("state")
+def test_a_robot_that_is_fit_for_a_session_is_armed_and_its_bag_says_so(tmp_path):
+    with emulated_motor(tmp_path) as (driver, _):
+        keep_proof(driver, 0.1)
+        words = ["entrain", "preflight", f"--driver={driver}", "--arm", "--json"]
+        checklist = subprocess.Popen(
+            words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        assert "press the stop" in checklist.stderr.readline()
+        code, out, _ = entrain(None, "stop")
+        assert code == 0, out
+        told, problems = checklist.communicate(timeout=30)
+        assert (checklist.returncode, problems) == (0, "")
+        found = json.loads(told)
+        assert found["passed"]
+        names = [point["name"] for point in found["points"]]
+        assert names == ["limits", "watchdog", "record", "device", "loop", "stop"]
+        assert preflight_of(driver).failed == ""
+        bag = tmp_path / "bag"
+        with entrain_run(bag, f"--driver={driver}", "--real-time", "--arm", *SHORT) as run:
+            assert run.wait() == 0, run.text
+    with BagReader(bag) as reader:
+        ((_, setup),) = reader.decoded(["/perturbator/setup"])
+    assert setup.preflight.endswith(": passed")
+    assert setup.watchdog.startswith("zero within 0.1 s, ")
+
+
+@pytest.mark.usefixtures("state")
+def test_what_is_not_proved_or_not_pressed_fails_by_name(tmp_path):
+    with emulated_motor(tmp_path) as (driver, _):
+        options = (f"--driver={driver}", "--arm", "--patience=0.5")
+        code, out, _ = entrain(None, "preflight", *options)
+    assert code == 1
+    assert out.splitlines()[-1] == "not fit for a session: watchdog, stop"
+    assert "entrain driver prove" in out
+    assert preflight_of(driver).failed == "watchdog, stop"
+
+
+@pytest.mark.usefixtures("state")
+def test_a_robot_that_is_not_there_fails():
+    options = ("--driver=ak_mit_can:interface=virtual,channel=nobody", "--arm")
+    code, out, _ = entrain(None, "preflight", *options)
+    assert code == 1
+    assert "FAIL  device" in out
+    assert "check its power" in out
