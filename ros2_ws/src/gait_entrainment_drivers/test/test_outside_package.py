@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A driver of another package, built apart by colcon, takes the place of ours: nothing changes."""
+"""Drivers of other packages, built apart by colcon, take the place of ours: nothing changes."""
 
 import json
 import shutil
@@ -11,15 +11,15 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[4]
-EXAMPLE = ROOT / "examples" / "pneumatic_ankle_robot"
-pytestmark = pytest.mark.skipif(not EXAMPLE.exists(), reason="the repository is not here")
+EXAMPLES = ROOT / "examples"
+pytestmark = pytest.mark.skipif(not EXAMPLES.exists(), reason="the repository is not here")
 
 
 @pytest.fixture(scope="module")
 def outside(tmp_path_factory):
-    """Build the example in a workspace of its own; return what runs a command in it."""
+    """Build the examples in a workspace of their own; return what runs a command in it."""
     workspace = tmp_path_factory.mktemp("outside")
-    shutil.copytree(EXAMPLE, workspace / "src" / EXAMPLE.name)
+    shutil.copytree(EXAMPLES, workspace / "src")
 
     def run(command, *, sourced=True):
         setup = "source install/local_setup.bash && " if sourced else ""
@@ -58,3 +58,11 @@ def test_its_own_test_is_the_kit(outside):
     )
     assert done.returncode == 0, done.stdout
     assert "40 passed" in done.stdout
+
+
+def test_the_worked_example_passes_its_own_tests(outside):
+    done = outside(
+        "cd src/serial_ankle_robot && python -m pytest -q --disable-plugin-autoload"
+        " -p no:cacheprovider"
+    )
+    assert done.returncode == 0, done.stdout
