@@ -135,11 +135,10 @@ def _loop(robot: GuardedRobot) -> Point:
         return Point("loop", False, "the device gave no reading")
     late = gaps - 1 / robot.capabilities.state_rate
     p50, p99, worst = 1e3 * np.quantile(late, (0.5, 0.99, 1.0))
-    return Point(
-        "loop",
-        bool(late.max() < _LATE),
-        f"commands late by {p50:.2f} ms (median), {p99:.2f} ms (99 %), {worst:.2f} ms (worst)",
-    )
+    found = f"commands late by {p50:.2f} ms (median), {p99:.2f} ms (99 %), {worst:.2f} ms (worst)"
+    if refused := robot.scheduling_refused:
+        found += f"; the system does not permit {refused}: docs/safety.md"
+    return Point("loop", bool(late.max() < _LATE), found)
 
 
 def _stop(robot: GuardedRobot, patience: float) -> Point:

@@ -57,6 +57,7 @@ class TorqueDevice(ABC):
     name: str  # what it is called in messages, such as "motor 1"
     address: str  # what nobody else may open meanwhile, such as "motor 1 on can0"
     capabilities: Capabilities
+    identity = ""  # what an open device says of itself, such as its firmware
 
     @abstractmethod
     def __init__(self, options: Any) -> None:

@@ -84,7 +84,6 @@ class HostTimedRobot(AnkleRobot):
         self._promised = 0  # up to this instant [ns]; 0 until a run begins
         self._offset = time.time_ns() - time.monotonic_ns()  # from steady time to stamps
         self._done: dict[str, str] = {}  # answers of the loop: error texts
-        self.scheduling_refused = ""
 
     # Lifecycle
 
@@ -260,6 +259,8 @@ class HostTimedRobot(AnkleRobot):
                 name, self._done[name] = content[0], content[1]
             elif kind == "scheduling":
                 (self.scheduling_refused,) = content
+            elif kind == "identity":
+                (self.identity,) = content
 
     def _take(self, sample: Sample) -> None:
         stamp, reading = sample.sent + self._offset, sample.reading

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 from gait_entrainment.robot.faults import Fault
 
-HEARTBEAT, STOP, ERRORS, SET_STATE, ENCODER = 0x01, 0x02, 0x03, 0x07, 0x09
+VERSION, HEARTBEAT, STOP, ERRORS, SET_STATE, ENCODER = 0x00, 0x01, 0x02, 0x03, 0x07, 0x09
 SET_MODE, SET_TORQUE, CLEAR_ERRORS, TORQUES = 0x0B, 0x0E, 0x18, 0x1C
 IDLE, CLOSED_LOOP = 1, 8
 # Control mode torque, input mode passthrough.
@@ -24,6 +24,9 @@ STATE = struct.Struct("<I")  # data of SET_STATE
 BITS = struct.Struct("<II")  # data of ERRORS [active errors, reason of the last disarming]
 TORQUE = struct.Struct("<f")  # data of SET_TORQUE [N m]
 PAIR = struct.Struct("<ff")  # data of ENCODER [rev, rev/s] and of TORQUES [target, estimate, N m]
+# Data of VERSION: of the protocol, then of hardware and firmware (major, minor, variant or
+# revision), and whether the firmware is not a released one.
+VERSIONS = struct.Struct("<8B")
 WATCHDOG_EXPIRED, STOP_REQUESTED = 0x01000000, 0x02000000
 # By error bit; firmware 0.6.
 FAULTS = {

@@ -3,6 +3,7 @@
 
 """Driver of an ODrive axis by CANSimple on any bus that python-can knows."""
 
+import contextlib
 import itertools
 import math
 import time
@@ -60,6 +61,10 @@ class OdriveAxis(CanMotor):
         """Connect, and see that the axis answers; its errors are cleared."""
         self._open_bus()
         self._reach(odrive.IDLE)
+        with contextlib.suppress(DeviceError):  # firmware before 0.6 does not say
+            self.identity = self._ask(
+                lambda: self._command(odrive.VERSION, remote=True), self._version
+            )
 
     def enable(self) -> None:
         """Enter closed-loop torque control at zero torque."""
@@ -141,6 +146,19 @@ class OdriveAxis(CanMotor):
         elif command == odrive.ENCODER and (estimates := odrive.unpack_pair(data)):
             self._angle, self._velocity = (2 * math.pi * value for value in estimates)
         return None
+
+    def _version(self, message: Any) -> str | None:
+        """Return what a frame says of the versions, in words, if it does."""
+        data = bytes(message.data)
+        told = message.arbitration_id == odrive.frame_id(self._options.node_id, odrive.VERSION)
+        if not told or len(data) != odrive.VERSIONS.size:
+            self._beat(message)
+            return None
+        _, *hardware, major, minor, revision, unreleased = odrive.VERSIONS.unpack(data)
+        return (
+            f"ODrive {'.'.join(map(str, hardware))}, firmware {major}.{minor}.{revision}"
+            f"{' (not released)' if unreleased else ''}"
+        )
 
     def _torque(self, message: Any) -> float | None:
         """Note what a frame says; return the torque of the motor [N m] if it is in it."""

@@ -70,6 +70,7 @@ class EmulatedOdrive(EmulatedMotor):
             odrive.ERRORS: odrive.BITS.pack(self.error, self._reason),
             odrive.ENCODER: odrive.PAIR.pack(0.0, 0.0),
             odrive.TORQUES: odrive.PAIR.pack(self.command, self.torque),
+            odrive.VERSION: odrive.VERSIONS.pack(2, 5, 2, 0, 0, 6, 11, 0),
         }
         return [(odrive.frame_id(self._node, what), answers[what])] if what in answers else []
 

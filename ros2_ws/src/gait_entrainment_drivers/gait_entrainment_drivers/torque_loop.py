@@ -219,6 +219,7 @@ class TorqueLoop:
         self._faults, self._halted, self._ended_at = (), False, math.inf
         self._lock = DeviceLock(self._device.address)
         self._device.open()
+        self._link.send("identity", self._device.identity)
 
     def _enable(self) -> None:
         try:

@@ -74,6 +74,13 @@ def test_an_error_disarms_and_is_a_fault_that_only_an_explicit_step_clears():
             enabled(robot)
 
 
+def test_the_axis_says_which_firmware_it_runs():
+    with axis() as driver, robot_on(driver) as robot:
+        assert robot.identity == ""
+        robot.configure()
+        assert robot.identity == "ODrive 5.2.0, firmware 0.6.11"
+
+
 def test_an_axis_that_is_not_there_is_told_with_those_that_are():
     with (
         axis() as driver,

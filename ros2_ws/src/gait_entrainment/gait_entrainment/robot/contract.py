@@ -103,6 +103,7 @@ class AnkleRobot(ABC):
     Options: ClassVar[type[Any]]
     capabilities: Capabilities
     identity = ""  # what a configured device says of itself, such as its firmware
+    scheduling_refused = ""  # what the system did not permit the loop that times the torque
 
     @abstractmethod
     def __init__(self, side: Side, options: Any, seed: int) -> None:

@@ -80,6 +80,11 @@ class GuardedRobot:
         return self._robot.identity
 
     @property
+    def scheduling_refused(self) -> str:
+        """What the system did not permit the loop that times the torque; empty if nothing."""
+        return self._robot.scheduling_refused
+
+    @property
     def enabled(self) -> bool:
         """Whether the device has been activated, latched or not."""
         return self._active
