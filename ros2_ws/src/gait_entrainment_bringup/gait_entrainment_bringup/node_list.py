@@ -42,7 +42,7 @@ RISING = 5
 # By how much the clocks of the hosts of a real robot may differ [s]: what a phase lag is worth.
 CLOCK_OFFSET = 0.005
 # How long any node, or the operator, may be silent while a real robot is worn [s].
-PERSON_SILENCE = 0.75
+PERSON_SILENCE = 0.3
 
 # Names at the root that are moved into a namespace: each experiment keeps its own time.
 MOVED = (

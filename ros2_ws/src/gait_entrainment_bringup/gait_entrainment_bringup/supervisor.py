@@ -27,6 +27,8 @@ PATIENCE = 1.5
 # How long the recorder may take to close the bag after the experiment or replay has ended [s].
 CLOSING_TIMEOUT = 15.0
 LOG_LINES = 8
+# In real time this process and its nodes come before others, if the system permits.
+NICENESS = -10
 METHOD = "fork"  # of starting the nodes of a command
 
 
@@ -132,6 +134,9 @@ def supervised(
     once everything has stopped, and the end of the log of the node to blame.
     """
     environment = set_environment(domain, real_time=real_time)
+    if real_time:
+        with suppress(OSError):  # not permitted: then it takes its turn like others
+            os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
     load()
     with tempfile.TemporaryDirectory(prefix="entrain_") as folder:
         supervisor = Supervisor(Path(folder), environment, METHOD)
