@@ -12,4 +12,4 @@ from gait_entrainment.gait.drift import Drift, drift_of
 from gait_entrainment.gait.plausibility import GaitLimits, GaitWatch
 from gait_entrainment.gait.pulse_phase import PulsePhase
 from gait_entrainment.gait.strides import EventCounts, GaitEvent, Stride, StrideTracker
-from gait_entrainment.gait.verdict import Entrainment, Verdict, VerdictSettings
+from gait_entrainment.gait.verdict import Entrainment, Reason, Verdict, VerdictSettings

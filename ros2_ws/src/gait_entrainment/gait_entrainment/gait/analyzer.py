@@ -9,9 +9,15 @@ from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
+from gait_entrainment.conventions import Side
 from gait_entrainment.gait.pulse_phase import LagFollower, PulsePhase, depends_on_next_toe_off
-from gait_entrainment.gait.strides import EventCounts, GaitEvent, Stride, StrideTracker
+from gait_entrainment.gait.strides import (
+    EventCounts,
+    GaitEvent,
+    Stride,
+    StrideTracker,
+    UnperturbedPeriod,
+)
 from gait_entrainment.gait.verdict import Entrainment, EntrainmentTest, VerdictSettings
 
 Result = Stride | PulsePhase | Entrainment
@@ -26,26 +32,6 @@ class PulseCounts:
     outside_strides: int = 0  # before stride 1, in a missed stride, or after the last stride
     late: int = 0  # dropped: came after the promise that no such pulse would come
     withdrawn: int = 0  # announced, then called off by a stop
-
-
-class _UnperturbedPeriod:
-    """Mean period of the complete strides before the first pulse, in exact integer arithmetic."""
-
-    def __init__(self) -> None:
-        self._count = self._sum = self._squares = 0
-        self.mean = math.nan  # [s]
-        self.standard_error = math.nan  # [s]
-
-    def add(self, stride: Stride) -> None:
-        period = stride.end - stride.start
-        self._count += 1
-        self._sum += period
-        self._squares += period * period
-        n, total = self._count, self._sum
-        self.mean = total / (n * NANOSECONDS_PER_SECOND)
-        if n > 1:
-            variance = (n * self._squares - total * total) / (n * n * (n - 1))
-            self.standard_error = math.sqrt(variance) / NANOSECONDS_PER_SECOND
 
 
 class GaitAnalyzer:
@@ -68,7 +54,7 @@ class GaitAnalyzer:
         self._tracker = StrideTracker(side)
         self._test = EntrainmentTest(settings or VerdictSettings())
         self._lags = LagFollower()
-        self._unperturbed = _UnperturbedPeriod()
+        self._unperturbed = UnperturbedPeriod()
         self._strides: deque[Stride] = deque()  # closed, pulses not placed yet
         self._before: Stride | None = None  # the latest stride whose pulses are placed
         self._onsets: list[int] = []  # announced, not placed yet; ascending
@@ -148,20 +134,20 @@ class GaitAnalyzer:
             before = None
         if after is not None and after.number != stride.number + 1:
             after = None
-        period = self._unperturbed
+        unperturbed = self._unperturbed
         pulses: list[PulsePhase] = []
         for onset in onsets:
             self._number += 1
             if onset < stride.start:
                 self.pulse_counts.outside_strides += 1
                 continue
-            pulse = self._lags.place(self._number, onset, stride, before, after, period.mean)
+            pulse = self._lags.place(self._number, onset, stride, before, after, unperturbed.mean)
             self.pulse_counts.placed += 1
             self.pulse_counts.without_lag += pulse.toe_off is None
             pulses.append(pulse)
         if self._number == 0:
-            period.add(stride)
-        entrainment = self._test.add(stride, pulses, period.mean, period.standard_error)
+            unperturbed.add(stride)
+        entrainment = self._test.add(stride, pulses, unperturbed)
         return [*pulses, entrainment] if entrainment else list(pulses)
 
 

@@ -145,3 +145,26 @@ class StrideTracker:
             )
         toe_off = self._stamps.get(event.place - 1)
         return Stride(closed, self.side, start, event.stamp, toe_off, step_periods)
+
+
+class UnperturbedPeriod:
+    """Mean period of the complete strides before the first pulse, in exact integer arithmetic."""
+
+    def __init__(self) -> None:
+        self._count = self._sum = self._squares = 0
+        self.mean = math.nan  # [s]
+        self.deviation = math.nan  # standard deviation of the strides [s]; NaN with one
+        self.standard_error = math.nan  # of the mean [s]; NaN with one stride
+
+    def add(self, stride: Stride) -> None:
+        """Take one stride."""
+        period = stride.end - stride.start
+        self._count += 1
+        self._sum += period
+        self._squares += period * period
+        n, total = self._count, self._sum
+        self.mean = total / (n * NANOSECONDS_PER_SECOND)
+        if n > 1:
+            variance = (n * self._squares - total * total) / (n * n * (n - 1))
+            self.standard_error = math.sqrt(variance) / NANOSECONDS_PER_SECOND
+            self.deviation = self.standard_error * math.sqrt(n)
