@@ -7,7 +7,7 @@ The gait: events and the strides they bound, pulse phases, phase lags, the entra
 Nothing here knows a walker: a person's signals take the same path as the model's.
 """
 
-from gait_entrainment.gait.analyzer import Analysis, GaitAnalyzer, PulseCounts, analyze
+from gait_entrainment.gait.analyzer import Analysis, GaitAnalyzer, Hole, PulseCounts, analyze
 from gait_entrainment.gait.drift import Drift, drift_of
 from gait_entrainment.gait.plausibility import GaitLimits, GaitWatch
 from gait_entrainment.gait.pulse_phase import PulsePhase

@@ -149,7 +149,7 @@ class Entrainment:
 
     verdict: Verdict
     reason: Reason
-    train: int  # number of the pulse train in the run, from 1
+    stretch: int  # of pulses of one train without a hole between them, from 1
     stride: int  # stride at which the question was asked
     stamp: int  # heel strike that closes it [ns]
     since_stride: int  # stride since which this verdict has held
@@ -204,20 +204,21 @@ class EntrainmentTest:
 
     def __init__(self, settings: VerdictSettings) -> None:
         self._settings = settings
-        self._verdict: Verdict | None = None
-        self._since = self._train = 0
-        self.restart(1, hole=False)
-
-    def restart(self, train: int, *, hole: bool) -> None:
-        """Forget the pulses so far: another train begins, or a hole in the record ends."""
-        settings = self._settings
-        longest = max(settings.window, settings.longest_window)
-        self._window: deque[tuple[PulsePhase, Stride]] = deque(maxlen=longest)
+        self._since = self._stretch = 0
         self._strides: list[int] = []  # stride of each pulse with a lag
+        self.restart(hole=False)
+
+    def restart(self, *, hole: bool) -> None:
+        """Forget the pulses so far: another train begins, or a hole in the record ends."""
+        self._stretch += bool(self._strides) or not self._stretch
+        self._after_hole = hole and bool(self._strides)
+        longest = max(self._settings.window, self._settings.longest_window)
+        self._window: deque[tuple[PulsePhase, Stride]] = deque(maxlen=longest)
+        self._strides = []
         self._above, self._below = _Outliers(), _Outliers()
         self._passed = 0  # successive evaluations that met the criteria for entrained
         self._was_entrained = False
-        self._train, self._after_hole = train, hole
+        self._verdict: Verdict | None = None
 
     def add(
         self, stride: Stride, pulses: Sequence[PulsePhase], unperturbed: UnperturbedPeriod
@@ -259,7 +260,7 @@ class EntrainmentTest:
         return Entrainment(
             verdict=verdict,
             reason=reason,
-            train=self._train,
+            stretch=self._stretch,
             stride=stride.number,
             stamp=stride.end,
             since_stride=self._since,
