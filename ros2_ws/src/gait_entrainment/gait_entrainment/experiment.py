@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from gait_entrainment.conventions import nanoseconds
 from gait_entrainment.errors import EntrainmentError
 from gait_entrainment.gait import GaitEvent, GaitLimits, StrideTracker
+from gait_entrainment.gait.strides import PLACES
 from gait_entrainment.protocol import Protocol, ProtocolError
 from gait_entrainment.robot import PulseTrain
 
@@ -166,11 +167,11 @@ class Conductor:
     def _require_steady_baseline(self) -> None:
         """Raise GaitError if the baseline's strides are not those of one steady gait."""
         periods = self._periods
-        doubted = self.strides - len(periods)
+        doubted = math.ceil(self._tracker.counts.implausible / PLACES)  # a stride's worth of events
         if doubted > len(periods):
             raise GaitError(
-                f"baseline: {doubted} of {self.strides} strides cannot be or were not seen: check "
-                "the sensor, or whether the person stood still"
+                f"baseline: {doubted} of {doubted + len(periods)} strides cannot be: check the "
+                "sensor, or whether the person stood still"
             )
         if len(periods) < 3:
             return

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind
-from gait_entrainment.gait import Analysis, Entrainment, GaitEvent, Reason, Verdict
+from gait_entrainment.gait import Analysis, Entrainment, GaitEvent, Hole, Reason, Verdict
 from gait_entrainment.protocol import Protocol
 from gait_entrainment.robot import PulseTiming
 from gait_entrainment.robot.timing import distribution
@@ -21,7 +21,7 @@ FINAL_PULSES = 5
 _MEANINGS = {
     "drifting": "the pulses run through the stride",
     "lost": "the gait followed the pulses, then drifted",
-    "few_pulses": "too few pulses yet",
+    "few_pulses": "neither locked nor drifting for certain: too few pulses yet",
     "hole": "the record has a hole, and too few pulses follow it",
     "unclear": "neither locked nor drifting for certain; more pulses may tell",
     "creeping": "the lag creeps: a slow passage or an unfinished approach; more pulses tell",
@@ -82,16 +82,26 @@ def outcome_of(run: Run) -> dict[str, Any]:
             "stretches": _stretches(analysis.entrainments),
             "holes": [
                 {
-                    "start": (hole.start - start) / NANOSECONDS_PER_SECOND,
+                    "start": max(hole.start - start, 0) / NANOSECONDS_PER_SECOND,
                     "end": (hole.end - start) / NANOSECONDS_PER_SECOND,
                     "missing": hole.missing,
                 }
-                for hole in analysis.holes
+                for hole in holes_of(run)
             ],
+            "gait_events": asdict(analysis.event_counts),
             "parameters": parameters,
         }
     )
     return outcome
+
+
+def holes_of(run: Run) -> list[Hole]:
+    """Return what the record of a run lacks; its last strides too, whether walked or not."""
+    holes, strides = list(run.analysis.holes), run.analysis.strides
+    if strides and (missing := run.protocol.strides - strides[-1].number) > 0:
+        end = strides[-1].end
+        holes.append(Hole(end, end, f"the last {missing} strides"))
+    return holes
 
 
 def _stretches(entrainments: Sequence[Entrainment]) -> list[dict[str, Any]]:
@@ -140,7 +150,13 @@ def summary(outcome: dict[str, Any]) -> str:
         listed = [f"{h['missing']} at {h['start']:.1f} s" for h in holes[:_HOLES_LISTED]]
         if len(holes) > _HOLES_LISTED:
             listed.append(f"{len(holes) - _HOLES_LISTED} more")
-        lines.append(f"holes            {', '.join(listed)}: missing in the record")
+        lines.append(f"holes            {', '.join(listed)}: not in the record")
+    if doubts := [
+        f"{number} {fate.replace('_', ' ')}"
+        for fate, number in outcome["gait_events"].items()
+        if number and fate != "accepted"
+    ]:
+        lines.append(f"gait events      {', '.join(doubts)}")
     lag, double_stance = outcome["final_phase_lag"], outcome["double_stance"]
     if lag is not None and outcome["entrained"]:
         lines.append(f"final phase lag  {lag * 1e3:+.1f} ms: {_place(lag, double_stance)}")
