@@ -16,7 +16,7 @@ import math
 import statistics
 from dataclasses import dataclass
 
-from gait_entrainment.conventions import nanoseconds
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, nanoseconds
 from gait_entrainment.errors import EntrainmentError
 from gait_entrainment.gait import GaitEvent, GaitLimits, StrideTracker
 from gait_entrainment.gait.strides import PLACES
@@ -154,10 +154,14 @@ class Conductor:
         if len(self._periods) > 1:
             spread = statistics.stdev(self._periods, self.measured_period)
             self.measured_period_error = spread / math.sqrt(len(self._periods))
-        delay = (1 + plan.initial_phase) * stride
+        delay = nanoseconds((1 + plan.initial_phase) * stride)
+        if self._periods:
+            # The stamps of a constant gait are rounded, so its next stride can be a nanosecond
+            # longer than the mean: a pulse at phase 0 is not to come before the strike.
+            delay = math.floor((1 + plan.initial_phase) * stride * NANOSECONDS_PER_SECOND) + 1
         return PulseTrain(
             side=protocol.side,
-            first_onset=strike + nanoseconds(delay),
+            first_onset=strike + delay,
             period=plan.period_for(stride),
             count=plan.count,
             torque=protocol.pulse_torque,
@@ -167,7 +171,9 @@ class Conductor:
     def _require_steady_baseline(self) -> None:
         """Raise GaitError if the baseline's strides are not those of one steady gait."""
         periods = self._periods
-        doubted = math.ceil(self._tracker.counts.implausible / PLACES)  # a stride's worth of events
+        doubted = math.ceil(
+            self._tracker.counts.implausible / PLACES
+        )  # a stride's worth of events
         if doubted > len(periods):
             raise GaitError(
                 f"baseline: {doubted} of {doubted + len(periods)} strides cannot be: check the "

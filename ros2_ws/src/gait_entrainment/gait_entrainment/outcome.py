@@ -73,6 +73,7 @@ def outcome_of(run: Run) -> dict[str, Any]:
                 }
                 for pulse in analysis.pulses
             ],
+            "train_fits": _train_fits(run),
             "verdict": verdict.name.lower(),
             "reason": reason.name.lower() if reason else None,
             "entrained": entrained,
@@ -93,6 +94,15 @@ def outcome_of(run: Run) -> dict[str, Any]:
         }
     )
     return outcome
+
+
+def _train_fits(run: Run) -> bool:
+    """Whether the strides of the run have room for the train, at the unperturbed period."""
+    protocol = run.protocol
+    plan = protocol.pulses
+    strides = plan.count + protocol.washout - plan.initial_phase
+    room = strides * run.measured_period - (plan.count - 1) * run.pulse_period
+    return not room < plan.width  # true also where no train was planned
 
 
 def holes_of(run: Run) -> list[Hole]:
@@ -126,6 +136,8 @@ def summary(outcome: dict[str, Any]) -> str:
     all_strides = parameters["baseline"] + planned + parameters["washout"]
     counted = _of(len(strides), all_strides), _of(len(pulses), planned)
     lines = [f"strides          {counted[0]}, pulses placed in them: {counted[1]}"]
+    if not outcome["train_fits"]:
+        lines[0] += "; the train is longer than the strides of the run: add washout strides"
     if strides:
         measured = "not measured" if unperturbed is None else f"{unperturbed:.4f} s"
         lines.append(f"stride period    {measured} unperturbed, {strides[-1]:.4f} s last")

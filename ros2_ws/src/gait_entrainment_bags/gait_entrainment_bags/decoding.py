@@ -43,7 +43,7 @@ def decoder_for(topic: TopicInfo) -> Callable[[bytes], Any]:
     schema = Schema(1, topic.schema_text.encode(), "ros2msg", topic.type)
     try:
         # The parser prints what it raises.
-        with contextlib.redirect_stderr(None):
+        with contextlib.redirect_stdout(None), contextlib.redirect_stderr(None):
             decode: Any = DecoderFactory().decoder_for("cdr", schema)
     except Exception as error:  # its parser raises whatever a line of text leads it to
         raise BagError(

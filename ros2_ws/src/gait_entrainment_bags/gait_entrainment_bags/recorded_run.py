@@ -293,6 +293,8 @@ def _difference(topic: str, published: Sequence[Any], anew: Sequence[dict[str, A
     """Say where published messages first differ from results; an empty text if nowhere."""
     for number, (message, values) in enumerate(zip(published, anew, strict=False), start=1):
         for name, value in values.items():
+            if not hasattr(message, name):
+                return f"{topic}: its messages have no field {name}: recorded by another version"
             found = _plain(getattr(message, name))
             if _bits(found) != _bits(value):
                 return f"{topic}: {name} of message {number}: {found} recorded, {value} anew"

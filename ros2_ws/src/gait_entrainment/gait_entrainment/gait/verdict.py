@@ -205,13 +205,14 @@ class EntrainmentTest:
     def __init__(self, settings: VerdictSettings) -> None:
         self._settings = settings
         self._since = self._stretch = 0
+        self._after_hole = False
         self._strides: list[int] = []  # stride of each pulse with a lag
         self.restart(hole=False)
 
     def restart(self, *, hole: bool) -> None:
         """Forget the pulses so far: another train begins, or a hole in the record ends."""
         self._stretch += bool(self._strides) or not self._stretch
-        self._after_hole = hole and bool(self._strides)
+        self._after_hole = hole and (self._after_hole or bool(self._strides))
         longest = max(self._settings.window, self._settings.longest_window)
         self._window: deque[tuple[PulsePhase, Stride]] = deque(maxlen=longest)
         self._strides = []
