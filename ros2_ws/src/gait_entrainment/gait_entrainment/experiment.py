@@ -16,9 +16,10 @@ import math
 import statistics
 from dataclasses import dataclass
 
-from gait_entrainment.conventions import EventKind, nanoseconds
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, nanoseconds
 from gait_entrainment.errors import EntrainmentError
-from gait_entrainment.gait import GaitEvent, GaitLimits, GaitWatch, StrideTracker
+from gait_entrainment.gait import GaitEvent, GaitLimits, StrideTracker
+from gait_entrainment.gait.strides import PLACES
 from gait_entrainment.protocol import Protocol, ProtocolError
 from gait_entrainment.robot import PulseTrain
 
@@ -67,10 +68,10 @@ class Conductor:
         # Mean stride period over the baseline [s] and its standard error; NaN if not measured.
         self.measured_period = math.nan
         self.measured_period_error = math.nan
-        self._tracker = StrideTracker(protocol.side)
         self._limits = limits or GaitLimits()
-        self._watch = GaitWatch(protocol.side, self._limits.scaled(protocol.walker.time_scale))
-        self._periods: list[float] = []  # of the baseline strides that are believed [s]
+        own = self._limits.scaled(protocol.walker.time_scale)
+        self._tracker = StrideTracker(protocol.side, own)
+        self._periods: list[float] = []  # of the baseline strides [s]
         self._longest_lookahead = longest_lookahead
         self._lookahead = min(_shortest_stride(protocol), longest_lookahead)
         self._longest_promise = self._lookahead
@@ -102,14 +103,11 @@ class Conductor:
         Raises ProtocolError if they would overlap at the resulting period, GaitError if the
         baseline is not one to measure a period by.
         """
-        accepted = self._tracker.counts.accepted
+        strike = self._tracker.latest_strike
         stride = self._tracker.add(event)
-        if self._tracker.counts.accepted == accepted:
-            return None  # the tracker has dropped it
-        believed = self._watch.believes(event)
-        if event.side is not self.protocol.side or event.kind is not EventKind.HEEL_STRIKE:
-            return None
-        if stride is not None and believed and self.train is None:
+        if self._tracker.latest_strike == strike:
+            return None  # not a heel strike of the leg, or not believed
+        if stride is not None and self.train is None:
             self._periods.append(stride.period)
             # A promise must end before the next strike can be an onset's reference: see horizon.
             self._lookahead = min(self._longest_lookahead, *self._periods)
@@ -136,7 +134,7 @@ class Conductor:
         """
         if self._closing_strike is not None:
             return Horizon(self._closing_strike + nanoseconds(self._longest_promise), last=True)
-        stopped = self._watch.stopped(known_until) if self.train is not None else ""
+        stopped = self._tracker.watch.stopped(known_until) if self.train is not None else ""
         if stopped:
             raise GaitError(stopped)
         return Horizon(known_until + nanoseconds(self._lookahead), last=False)
@@ -156,10 +154,14 @@ class Conductor:
         if len(self._periods) > 1:
             spread = statistics.stdev(self._periods, self.measured_period)
             self.measured_period_error = spread / math.sqrt(len(self._periods))
-        delay = (1 + plan.initial_phase) * stride
+        delay = nanoseconds((1 + plan.initial_phase) * stride)
+        if self._periods:
+            # The stamps of a constant gait are rounded, so its next stride can be a nanosecond
+            # longer than the mean: a pulse at phase 0 is not to come before the strike.
+            delay = math.floor((1 + plan.initial_phase) * stride * NANOSECONDS_PER_SECOND) + 1
         return PulseTrain(
             side=protocol.side,
-            first_onset=strike + nanoseconds(delay),
+            first_onset=strike + delay,
             period=plan.period_for(stride),
             count=plan.count,
             torque=protocol.pulse_torque,
@@ -168,7 +170,10 @@ class Conductor:
 
     def _require_steady_baseline(self) -> None:
         """Raise GaitError if the baseline's strides are not those of one steady gait."""
-        doubted, periods = self._watch.disbelieved, self._periods
+        periods = self._periods
+        doubted = math.ceil(
+            self._tracker.counts.implausible / PLACES
+        )  # a stride's worth of events
         if doubted > len(periods):
             raise GaitError(
                 f"baseline: {doubted} of {doubted + len(periods)} strides cannot be: check the "

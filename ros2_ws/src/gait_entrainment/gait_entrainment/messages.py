@@ -59,6 +59,19 @@ def profile_of(message: Any, start: int = 0) -> TorqueProfile:
     )
 
 
+def hole_before(message: Any, promised: float | None, start: int = 0) -> tuple[int, int] | None:
+    """
+    Return the span [ns] of which no torque profile is here, before a TorqueProfile message.
+
+    ``promised`` [ns] is how far the profile before it went: None for the first one, infinity after
+    a stop, which voids what was promised. Returns None if the profiles adjoin.
+    """
+    begin = nanoseconds_of(message.times[0]) - start
+    if promised is None:
+        return (0, begin) if message.revision else None
+    return (int(promised), begin) if begin > promised else None
+
+
 def pulse_of(message: Any, start: int = 0) -> tuple[int, float, float]:
     """Return onset [ns], height [N m] and width [s] of a TorquePulse message."""
     return nanoseconds_of(message.header.stamp) - start, message.torque, message.duration

@@ -10,20 +10,27 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind
-from gait_entrainment.gait import Analysis, GaitEvent, Verdict
+from gait_entrainment.gait import Analysis, Entrainment, GaitEvent, Hole, Reason, Verdict
 from gait_entrainment.protocol import Protocol
 from gait_entrainment.robot import PulseTiming
 from gait_entrainment.robot.timing import distribution
 
 # Pulses whose lags make up the final one: the paper's locked gait repeats itself exactly.
 FINAL_PULSES = 5
-# What a verdict other than entrained says to a person.
+# What a verdict other than entrained, or the reason for claiming nothing, says to a person.
 _MEANINGS = {
     "drifting": "the pulses run through the stride",
     "lost": "the gait followed the pulses, then drifted",
-    "untestable": "pulse period and stride period are too close to tell them apart",
-    "undecided": "neither locked nor drifting for certain; more pulses may tell",
+    "few_pulses": "neither locked nor drifting for certain: too few pulses yet",
+    "hole": "the record has a hole, and too few pulses follow it",
+    "unclear": "neither locked nor drifting for certain; more pulses may tell",
+    "creeping": "the lag creeps: a slow passage or an unfinished approach; more pulses tell",
+    "too_close": "pulse period and stride period are too close to tell them apart",
+    "baseline_unknown": "fewer than two complete strides before the first pulse to compare with",
+    "not_one_to_one": "only pulses at about one a stride are analyzed",
 }
+# Holes that are listed to a person; the others are counted.
+_HOLES_LISTED = 3
 
 
 @dataclass(frozen=True)
@@ -46,6 +53,7 @@ def outcome_of(run: Run) -> dict[str, Any]:
     start = strides[0].start if strides else 0
     last = analysis.entrainments[-1] if analysis.entrainments else None
     verdict = last.verdict if last else Verdict.UNDECIDED
+    reason = last.reason if last else Reason.FEW_PULSES
     entrained = verdict is Verdict.ENTRAINED
     placed = [p for p in analysis.pulses if p.toe_off is not None]  # the others have no lag
     lags = [p.phase_lag for p in placed[-FINAL_PULSES:]]
@@ -65,15 +73,58 @@ def outcome_of(run: Run) -> dict[str, Any]:
                 }
                 for pulse in analysis.pulses
             ],
+            "train_fits": _train_fits(run),
             "verdict": verdict.name.lower(),
+            "reason": reason.name.lower() if reason else None,
             "entrained": entrained,
             "entrained_since_stride": last.entrained_since_stride if last and entrained else None,
             "final_phase_lag": statistics.median(lags) if lags else math.nan,
             "double_stance": _double_stance(run.events, placed[-1].toe_off if placed else None),
+            "stretches": _stretches(analysis.entrainments),
+            "holes": [
+                {
+                    "start": max(hole.start - start, 0) / NANOSECONDS_PER_SECOND,
+                    "end": (hole.end - start) / NANOSECONDS_PER_SECOND,
+                    "missing": hole.missing,
+                }
+                for hole in holes_of(run)
+            ],
+            "gait_events": asdict(analysis.event_counts),
             "parameters": parameters,
         }
     )
     return outcome
+
+
+def _train_fits(run: Run) -> bool:
+    """Whether the strides of the run have room for the train, at the unperturbed period."""
+    protocol = run.protocol
+    plan = protocol.pulses
+    strides = plan.count + protocol.washout - plan.initial_phase
+    room = strides * run.measured_period - (plan.count - 1) * run.pulse_period
+    return not room < plan.width  # true also where no train was planned
+
+
+def holes_of(run: Run) -> list[Hole]:
+    """Return what the record of a run lacks; its last strides too, whether walked or not."""
+    holes, strides = list(run.analysis.holes), run.analysis.strides
+    if strides and (missing := run.protocol.strides - strides[-1].number) > 0:
+        end = strides[-1].end
+        holes.append(Hole(end, end, f"the last {missing} strides"))
+    return holes
+
+
+def _stretches(entrainments: Sequence[Entrainment]) -> list[dict[str, Any]]:
+    """Return the verdict at the end of each stretch of one train without a hole."""
+    stretches: dict[int, dict[str, Any]] = {}
+    for entrainment in entrainments:
+        first = stretches.get(entrainment.stretch, {}).get("first_stride", entrainment.stride)
+        stretches[entrainment.stretch] = {
+            "first_stride": first,
+            "last_stride": entrainment.stride,
+            "verdict": entrainment.verdict.name.lower(),
+        }
+    return list(stretches.values())
 
 
 def summary(outcome: dict[str, Any]) -> str:
@@ -81,7 +132,12 @@ def summary(outcome: dict[str, Any]) -> str:
     parameters = outcome["parameters"]
     strides, pulses = outcome["stride_period"], outcome["pulses"]
     unperturbed, period = outcome["unperturbed_stride_period"], outcome["perturbation_period"]
-    lines = [f"strides          {len(strides)}, pulses placed in them: {len(pulses)}"]
+    planned = parameters["pulses"]["count"]
+    all_strides = parameters["baseline"] + planned + parameters["washout"]
+    counted = _of(len(strides), all_strides), _of(len(pulses), planned)
+    lines = [f"strides          {counted[0]}, pulses placed in them: {counted[1]}"]
+    if not outcome["train_fits"]:
+        lines[0] += "; the train is longer than the strides of the run: add washout strides"
     if strides:
         measured = "not measured" if unperturbed is None else f"{unperturbed:.4f} s"
         lines.append(f"stride period    {measured} unperturbed, {strides[-1]:.4f} s last")
@@ -95,12 +151,32 @@ def summary(outcome: dict[str, Any]) -> str:
     if outcome["entrained"]:
         verdict += f" since stride {outcome['entrained_since_stride']}"
     else:
-        verdict += f": {_MEANINGS[verdict]}"
+        verdict += f": {_MEANINGS[outcome['reason'] or verdict]}"
     lines.append(f"verdict          {verdict}")
+    if len(outcome["stretches"]) > 1:
+        lines += [
+            f"                 {s['verdict']} in strides {s['first_stride']} to {s['last_stride']}"
+            for s in outcome["stretches"]
+        ]
+    if holes := outcome["holes"]:
+        listed = [f"{h['missing']} at {h['start']:.1f} s" for h in holes[:_HOLES_LISTED]]
+        if len(holes) > _HOLES_LISTED:
+            listed.append(f"{len(holes) - _HOLES_LISTED} more")
+        lines.append(f"holes            {', '.join(listed)}: not in the record")
+    if doubts := [
+        f"{number} {fate.replace('_', ' ')}"
+        for fate, number in outcome["gait_events"].items()
+        if number and fate != "accepted"
+    ]:
+        lines.append(f"gait events      {', '.join(doubts)}")
     lag, double_stance = outcome["final_phase_lag"], outcome["double_stance"]
     if lag is not None and outcome["entrained"]:
         lines.append(f"final phase lag  {lag * 1e3:+.1f} ms: {_place(lag, double_stance)}")
     return "\n".join(lines)
+
+
+def _of(found: int, planned: int) -> str:
+    return str(found) if found == planned else f"{found} of {planned}"
 
 
 def _place(lag: float, double_stance: float | None) -> str:
@@ -110,10 +186,7 @@ def _place(lag: float, double_stance: float | None) -> str:
     if double_stance is None or -lag > double_stance:
         return "before double stance"
     percent = 100 * (1 + lag / double_stance)
-    place = f"the pulse begins {percent:.0f} % into double stance ({double_stance:.3f} s)"
-    if percent < 50:
-        place += "\n                 so early, a slow passage may look locked: ask entrain lock"
-    return place
+    return f"the pulse begins {percent:.0f} % into double stance ({double_stance:.3f} s)"
 
 
 def _double_stance(events: Sequence[GaitEvent], toe_off: int | None) -> float:

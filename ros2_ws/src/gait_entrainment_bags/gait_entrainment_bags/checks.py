@@ -22,6 +22,7 @@ from mcap.records import Channel
 from gait_entrainment_bags.decoding import CDR_HEADER_SIZE, decoder_for
 from gait_entrainment_bags.definitions import is_type_name, missing_definitions
 from gait_entrainment_bags.errors import BagError, UnreadableBagError, noting
+from gait_entrainment_bags.holes import RunRecord
 from gait_entrainment_bags.mcap_file import McapFile
 from gait_entrainment_bags.mcap_records import BagMessage, Chunk, Contents
 from gait_entrainment_bags.metadata import (
@@ -79,8 +80,17 @@ _CONSEQUENCES = {
     "metadata-files": "rosbag2 does not open the bag, or leaves a file out",
     "metadata-topics": "rosbag2 does not play the topic, or shows wrong numbers",
     "metadata-times": "`ros2 bag info` shows wrong times, start offsets go astray",
+    "record": "an analysis goes no further than the hole, and begins anew after it",
 }
-_MINOR = {"summary", "offered-qos", "type-hash", "chunk-index", "message-index", "rosbag2-record"}
+_MINOR = {
+    "record",
+    "summary",
+    "offered-qos",
+    "type-hash",
+    "chunk-index",
+    "message-index",
+    "rosbag2-record",
+}
 RULES = {
     rule: (Severity.WARNING if rule in _MINOR else Severity.ERROR, consequence)
     for rule, consequence in _CONSEQUENCES.items()
@@ -136,10 +146,12 @@ def check(path: Path | str) -> list[Finding]:
     path = Path(path)
     report = _Report()
     with report.adding("mcap"):
-        stocks = {}
+        stocks, record = {}, RunRecord()
         for file in bag_files(path):
             with report.adding("mcap"), closing(McapFile(file)) as opened:
-                stocks[file.name] = _FileCheck(opened, report).run()
+                stocks[file.name] = _FileCheck(opened, report, record).run()
+        for hole in record.holes():
+            report.add("record", f"{path}: lacks {hole}")
         if path.is_dir():
             with report.adding("metadata-file"):
                 _check_metadata_file(path, stocks, report)
@@ -149,10 +161,12 @@ def check(path: Path | str) -> list[Finding]:
 class _FileCheck:
     """Checks one MCAP file."""
 
-    def __init__(self, file: McapFile, report: _Report) -> None:
+    def __init__(self, file: McapFile, report: _Report, record: RunRecord) -> None:
         self._file = file
         self._report = report
+        self._record = record
         self._stock = Contents()
+        self._topics: dict[str, TopicInfo] = {}  # as first announced
         self._decoded: set[str] = set()  # topics of which a message was decoded
 
     def _add(self, rule: str, detail: str) -> None:
@@ -200,12 +214,17 @@ class _FileCheck:
             begin = message.data[:CDR_HEADER_SIZE].hex(" ") or "nothing"
             self._add("cdr-header", f"{message.topic}: begins with {begin}")
             return
+        topic = self._topics.get(message.topic)
+        if topic is None:
+            topic = next(topic for topic in self._stock.topics if topic.name == message.topic)
+            self._topics[message.topic] = topic
+        self._record.add(topic, message.data)
         if message.topic in self._decoded:
             return
         self._decoded.add(message.topic)
-        topic = next(topic for topic in self._stock.topics if topic.name == message.topic)
-        if not is_type_name(topic.type):
-            return
+        decodable = (topic.message_encoding, topic.schema_encoding) == ("cdr", "ros2msg")
+        if not (decodable and is_type_name(topic.type)):
+            return  # which the rules of schemas and channels tell
         # A type without fields is serialized as one byte, which is padded to four.
         if not topic.schema_text.strip() and len(message.data) > CDR_HEADER_SIZE + 4:
             self._add("schema-text", f"{topic.type}: is empty")

@@ -34,10 +34,16 @@ def decoder_for(topic: TopicInfo) -> Callable[[bytes], Any]:
     Raises BagError if the definition cannot be understood; the decoder raises UnreadableBagError
     for bytes that are no message of the type.
     """
+    encodings = topic.message_encoding, topic.schema_encoding
+    if encodings != ("cdr", "ros2msg"):
+        raise BagError(
+            f"{topic.name}: cannot be decoded: {encodings[0]} messages with "
+            f"{encodings[1] or 'no'} definition; allowed: cdr with ros2msg"
+        )
     schema = Schema(1, topic.schema_text.encode(), "ros2msg", topic.type)
     try:
         # The parser prints what it raises.
-        with contextlib.redirect_stderr(None):
+        with contextlib.redirect_stdout(None), contextlib.redirect_stderr(None):
             decode: Any = DecoderFactory().decoder_for("cdr", schema)
     except Exception as error:  # its parser raises whatever a line of text leads it to
         raise BagError(

@@ -30,6 +30,10 @@ class NoBagError(UnreadableBagError):
     exit_code = 2
 
 
+class NothingToPlayError(BagError):
+    """A bag without a message on the topics that are to be played."""
+
+
 class DefinitionMissingError(BagError):
     """No definition of a message type is installed, so no viewer could decode its messages."""
 

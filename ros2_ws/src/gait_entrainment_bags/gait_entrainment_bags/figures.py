@@ -10,6 +10,7 @@ import numpy as np
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment.drawing import BLUE, GREEN, GREY, ORANGE, new_figure
+from gait_entrainment.outcome import holes_of
 from gait_entrainment.robot.timing import distribution, lateness_ms
 from gait_entrainment_bags.recorded_run import RecordedRun, drawn_strides
 
@@ -41,8 +42,10 @@ def _stride_period(run: RecordedRun) -> Any:
     ):
         if np.isfinite(period):
             axes.axhline(period, color=colour, ls=style, lw=1.2, label=f"{text} {period:.4f} s")
-    strides = [s for s in run.analysis.strides if s.number <= run.protocol.strides]
-    axes.plot([s.number for s in strides], [s.period for s in strides], **_DOTTED_LINE)
+    periods = {s.number: s.period for s in run.analysis.strides}
+    numbers = range(1, min(max(periods, default=0), run.protocol.strides) + 1)
+    axes.plot(numbers, [periods.get(number, np.nan) for number in numbers], **_DOTTED_LINE)
+    _shade_holes(axes, run)
     axes.set(xlabel="stride", ylabel="stride period [s]", title="Stride period")
     axes.ticklabel_format(useOffset=False)
     if axes.get_legend_handles_labels()[0]:
@@ -53,9 +56,15 @@ def _stride_period(run: RecordedRun) -> Any:
 def _phase_lag(run: RecordedRun) -> Any:
     figure, axes = new_figure(size=_SIZE)
     axes.axhline(0, color=GREY, ls="--", lw=1.2, label="toe-off: end of double stance")
-    strides = [pulse.stride for pulse in run.analysis.pulses]
-    lags = [pulse.phase_lag * 1e3 for pulse in run.analysis.pulses]
-    axes.plot(strides, lags, label="pulse onset", **_DOTTED_LINE)
+    pulses = {pulse.number: pulse for pulse in run.analysis.pulses}
+    points = [
+        (pulses[number].stride, pulses[number].phase_lag * 1e3)
+        if number in pulses
+        else (np.nan, np.nan)  # no line across a hole
+        for number in range(1, max(pulses, default=0) + 1)
+    ]
+    axes.plot(*np.array(points).reshape(-1, 2).T, label="pulse onset", **_DOTTED_LINE)
+    _shade_holes(axes, run)
     last = run.analysis.entrainments[-1] if run.analysis.entrainments else None
     if last is not None and (since := last.entrained_since_stride):
         label = f"near its final lag since stride {since}"
@@ -63,6 +72,16 @@ def _phase_lag(run: RecordedRun) -> Any:
     axes.set(xlabel="stride", ylabel="onset minus toe-off [ms]", title="Phase lag of the pulses")
     axes.legend(frameon=False)
     return figure
+
+
+def _shade_holes(axes: Any, run: RecordedRun) -> None:
+    """Shade the strides of which the record lacks something."""
+    strides = run.analysis.strides
+    for place, hole in enumerate(holes_of(run)):
+        before = max((s.number for s in strides if s.end <= hole.start), default=0)
+        after = min((s.number for s in strides if s.start >= hole.end), default=before + 2)
+        label = None if place else "not in the record"
+        axes.axvspan(before + 0.5, after - 0.5, color=GREY, alpha=0.25, lw=0, label=label)
 
 
 def _pulse_timing(run: RecordedRun) -> Any:

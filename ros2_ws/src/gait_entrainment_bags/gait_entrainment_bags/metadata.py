@@ -20,6 +20,7 @@ import yaml
 from mcap.records import Channel, Metadata, Schema
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
+from gait_entrainment_bags.definitions import is_type_name
 from gait_entrainment_bags.errors import UnreadableBagError
 
 METADATA_VERSION = 9
@@ -94,7 +95,8 @@ class TopicInfo:
     A topic as it is announced in a bag.
 
     ``type`` reads ``package/msg/Type``, ``type_hash`` is ``RIHS01_`` and 64 hex digits,
-    ``schema_text`` the definition of the message with all that it depends on.
+    ``schema_text`` the definition of the message with all that it depends on; bytes of it that are
+    no text are surrogates. Topics of ROS 2 have the encodings that are the defaults.
     """
 
     name: str
@@ -102,6 +104,13 @@ class TopicInfo:
     schema_text: str
     type_hash: str = ""
     qos_profiles: tuple[QosProfile, ...] = ()
+    message_encoding: str = "cdr"
+    schema_encoding: str = "ros2msg"
+
+    @property
+    def is_storable(self) -> bool:
+        """Whether the name of the type is one that the encoding of the messages wants."""
+        return self.message_encoding != "cdr" or is_type_name(self.type)
 
 
 @dataclass
@@ -139,7 +148,7 @@ class BagDescription:
                     "topic_metadata": {
                         "name": topic.name,
                         "type": topic.type,
-                        "serialization_format": "cdr",
+                        "serialization_format": topic.message_encoding,
                         "offered_qos_profiles": [qos.as_map() for qos in topic.qos_profiles],
                         "type_description_hash": topic.type_hash,
                     },
@@ -251,9 +260,10 @@ def topic_of(channel: Channel, schema: Schema | None) -> TopicInfo:
         qos = parse_qos_profiles(channel.metadata.get("offered_qos_profiles", ""), channel.topic)
     type_hash = channel.metadata.get("topic_type_hash", "")
     if schema is None:
-        return TopicInfo(channel.topic, "", "", type_hash, qos)
-    text = schema.data.decode(errors="replace")
-    return TopicInfo(channel.topic, schema.name, text, type_hash, qos)
+        return TopicInfo(channel.topic, "", "", type_hash, qos, channel.message_encoding, "")
+    text = schema.data.decode(errors="surrogateescape")
+    encodings = channel.message_encoding, schema.encoding
+    return TopicInfo(channel.topic, schema.name, text, type_hash, qos, *encodings)
 
 
 def offered_qos_text(profiles: Iterable[QosProfile]) -> str:

@@ -16,7 +16,7 @@ from itertools import islice
 from typing import NamedTuple
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
-from gait_entrainment_bags.errors import BagError
+from gait_entrainment_bags.errors import BagError, NothingToPlayError
 from gait_entrainment_bags.mcap_records import BagMessage
 from gait_entrainment_bags.reader import BagReader
 
@@ -43,8 +43,8 @@ class Playback:
     `FASTEST` is no pace at all. The clock ticks every ``clock_period`` seconds of the bag from
     the start on, 0: never; so a listener sees the same ticks at every rate.
 
-    Raises BagError if a number is out of range, a topic is not in the bag, or the bag holds no
-    message; UnreadableBagError, from every method that moves on, if the bag is damaged.
+    Raises BagError if a number is out of range or a topic is not in the bag, NothingToPlayError if
+    none has a message; UnreadableBagError, from every method that moves on, if the bag is damaged.
     """
 
     def __init__(
@@ -60,8 +60,9 @@ class Playback:
         clock_period: float = 0.0,
     ) -> None:
         self._topics = list(bag.require_topics(topics))
-        if not bag.message_count:
-            raise BagError(f"{bag.path}: holds no message to play")
+        if not any(bag.counts[topic] for topic in self._topics):
+            chosen = ", ".join(self._topics) or "nothing"
+            raise NothingToPlayError(f"{bag.path}: holds no message to play on {chosen}")
         _require_positive("rate", rate)
         _require_positive("duration", duration, " s")
         self.rate = rate

@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 
 from gait_entrainment import messages, topic_names
 from gait_entrainment.conventions import Side
-from gait_entrainment.experiment import Conductor
-from gait_entrainment.gait import Analysis, Stride, VerdictSettings, analyze
+from gait_entrainment.experiment import Conductor, GaitError
+from gait_entrainment.gait import Analysis, GaitEvent, Stride, VerdictSettings, analyze
 from gait_entrainment.gait.analyzer import Result
 from gait_entrainment.outcome import Run, outcome_of, timing_outcome
 from gait_entrainment.protocol import Protocol, ProtocolError, read_protocol
@@ -103,14 +103,14 @@ def read_run(
         if live_onset not in onsets:
             raise BagError(f"{path}: its onset is {live_onset!r}; allowed: {', '.join(onsets)}")
         live, analysis = (
-            analyze(record.events, onsets[kind], protocol.side, settings)
+            analyze(record.events, onsets[kind], protocol.side, settings, record.unknown)
             for kind in (live_onset, onset or live_onset)
         )
         conductor = Conductor(protocol)
         try:
             for event in record.events:
                 conductor.add_event(event)
-        except ProtocolError:
+        except (GaitError, ProtocolError):
             pass  # too few events are left to plan by: the periods stay unknown
         drawn = drawn_strides(protocol, analysis) if torques else []
         return RecordedRun(
@@ -171,16 +171,23 @@ class _Record:
         self._messages: dict[str, list[BagMessage]] = {name: [] for name in self._names.values()}
         self.real_time_factor = self._read()
         events = self._messages[self._names[topic_names.GAIT_EVENTS]]
-        self.events = list(self._values(topic_names.GAIT_EVENTS, messages.event_of))
+        self.events = [e for e in self._values(topic_names.GAIT_EVENTS, _event_of) if e]
         # Whether the log times are the stamps, so that instants can be looked up.
         self._stamped = [m.log_time for m in events] == [event.stamp for event in self.events]
         self.onsets: list[int] = []
+        self.unknown: list[tuple[int, int]] = []  # spans of which no torque profile is here [ns]
         measured = MeasuredOnsets()
-        for promise in self._values(topic_names.TORQUE_PROFILE, _promise_of):
+        adjoins: float | None = None
+        for message in self._values(topic_names.TORQUE_PROFILE, lambda message: message):
+            promise = _promise_of(message)
             if isinstance(promise, TorqueProfile):
+                if hole := messages.hole_before(message, adjoins):
+                    self.unknown.append(hole)
+                adjoins = promise.valid_until
                 self.onsets += promise.onsets
                 measured.add_promise(promise.onsets, promise.valid_until)
             else:
+                adjoins = math.inf
                 self.onsets = [onset for onset in self.onsets if onset < promise]
                 measured.stop(promise)
         for pulse in self._values(topic_names.PULSES, messages.pulse_of):
@@ -255,6 +262,14 @@ def _find(bag: BagReader, relative: str) -> str | None:
     return next((name for name in names if name.endswith(f"/{relative}")), None)
 
 
+def _event_of(message: Any) -> GaitEvent | None:
+    """Return the event of a message; None for one that cannot be, which the analyzer drops too."""
+    try:
+        return messages.event_of(message)
+    except messages.MessageError:
+        return None
+
+
 def _promise_of(message: Any) -> TorqueProfile | int:
     """Return what a TorqueProfile message promises, or the instant of the stop it reports."""
     stop = messages.stop_of(message)
@@ -278,6 +293,8 @@ def _difference(topic: str, published: Sequence[Any], anew: Sequence[dict[str, A
     """Say where published messages first differ from results; an empty text if nowhere."""
     for number, (message, values) in enumerate(zip(published, anew, strict=False), start=1):
         for name, value in values.items():
+            if not hasattr(message, name):
+                return f"{topic}: its messages have no field {name}: recorded by another version"
             found = _plain(getattr(message, name))
             if _bits(found) != _bits(value):
                 return f"{topic}: {name} of message {number}: {found} recorded, {value} anew"

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gait_entrainment_bags.definitions import is_type_name
 from gait_entrainment_bags.errors import UnreadableBagError, noting
+from gait_entrainment_bags.holes import RunRecord
 from gait_entrainment_bags.mcap_file import McapFile
 from gait_entrainment_bags.mcap_records import Contents
 from gait_entrainment_bags.metadata import (
@@ -56,6 +56,7 @@ def recover(path: Path | str, out: Path | str) -> Recovery:
         for file in files:
             losses += rescue.take(file)
         losses += rescue.refused.values()
+        losses += rescue.record.holes()
         missing = "; ".join(losses) or "nothing is missing"
         description = rescue.description or described_beside(path)
         writer.custom_data |= custom_data_of(description)
@@ -72,6 +73,7 @@ class _Rescue:
         self.last = 0
         self.description: dict[str, Any] = {}
         self.refused: dict[str, str] = {}  # reason by topic
+        self.record = RunRecord()
         self._topics: dict[str, TopicInfo] = {}
         self._announced: object = None
 
@@ -90,6 +92,7 @@ class _Rescue:
                         message.topic, message.data, message.log_time, message.publish_time
                     )
                     self.last = max(self.last, message.log_time)
+                    self.record.add(self._topics[message.topic], message.data)
         self._announce(contents)
         self.description = recorded_description(contents.metadata) or self.description
         losses += contents.damages
@@ -110,7 +113,7 @@ class _Rescue:
                 self.refused[topic.name] = f"{topic.name} has {difference}: the rest of it is lost"
             if topic.name in self.writer.counts or topic.name in self.refused:
                 continue
-            if is_type_name(topic.type):
+            if topic.is_storable:
                 self.writer.add_topic(topic)
             else:
                 self.refused[topic.name] = (

@@ -37,6 +37,14 @@ _ROWS_AT_ONCE = 65536
 _Getter = Callable[[Any], Any]
 
 
+class ExportError(BagError):
+    """Topics of which no table could be made; ``files`` are those of the others, by topic."""
+
+    def __init__(self, files: dict[str, Path], refused: dict[str, str]) -> None:
+        super().__init__("; ".join(refused.values()))
+        self.files, self.refused = files, refused
+
+
 @dataclass(frozen=True)
 class Column:
     """A column of a table: what it is called, its unit, and how a message fills it."""
@@ -62,8 +70,8 @@ def export(
 
     The format is ``csv`` or ``parquet``, ``out`` a folder to make; without ``topics`` it is all
     that have messages. Returns the files by topic. Raises BagExistsError if the folder is already
-    there, UnreadableBagError if the bag is damaged, BagError if the format is unknown, a topic is
-    not in the bag or cannot be decoded, or pyarrow is missing.
+    there, BagError if the format is unknown, a topic is not in the bag, or pyarrow is missing;
+    and, once the other tables are written, ExportError for topics that cannot be decoded.
     """
     out = Path(out)
     if format_name not in FORMATS:
@@ -79,14 +87,24 @@ def export(
         files = {
             name: out / f"{name.strip('/').replace('/', '.')}.{format_name}" for name in topics
         }
+        refused: dict[str, str] = {}
         try:
             for name, file in files.items():
-                _write_table(reader, reader.topics[name], file)
+                try:
+                    _write_table(reader, reader.topics[name], file)
+                except BagError as error:
+                    file.unlink(missing_ok=True)  # a table that breaks off is worse than none
+                    refused[name] = str(error)
         except BaseException as error:
-            shutil.rmtree(out, ignore_errors=True)  # tables that break off are worse than none
+            shutil.rmtree(out, ignore_errors=True)
             if isinstance(error, (OSError, ValueError)):
                 raise BagWriteError(f"{file}: cannot be written: {first_line(error)}") from None
             raise
+        files = {name: file for name, file in files.items() if name not in refused}
+        if refused and not files:
+            shutil.rmtree(out, ignore_errors=True)
+        if refused:
+            raise ExportError(files, refused)
         return files
 
 

@@ -23,7 +23,6 @@ from typing import Any
 from mcap.writer import LIBRARY_IDENTIFIER, CompressionType, Writer
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
-from gait_entrainment_bags.definitions import is_type_name
 from gait_entrainment_bags.errors import BagError, BagWriteError, DiskFullError, make_folder
 from gait_entrainment_bags.metadata import (
     RECORD_NAME,
@@ -104,7 +103,7 @@ class BagWriter(AbstractContextManager["BagWriter"]):
         """Announce a topic: it is in the bag even without messages; BagError if it already is."""
         if topic.name in self._topics:
             raise BagError(f"{topic.name}: already in the bag")
-        if not is_type_name(topic.type):
+        if not topic.is_storable:
             raise BagError(f"{topic.name}: type {topic.type!r} does not read package/msg/Type")
         self._require_open()
         self._topics[topic.name] = topic
@@ -221,23 +220,23 @@ class BagWriter(AbstractContextManager["BagWriter"]):
         self._files.append(FileInformation(path.name))
         output: Any = self._file
         self._writer = Writer(output, self._chunk_size, self._compression, enable_data_crcs=True)
-        self._schemas: dict[tuple[str, str], int] = {}  # id by type and text
+        self._schemas = {("", "", ""): 0}  # id by type, encoding and text; 0 is no schema
         self._channels: dict[str, int] = {}  # id by topic
         self._flush_at = None
         self._writer.start("ros2", f"gait_entrainment {LIBRARY_IDENTIFIER}")
         self._writer.add_metadata(RECORD_NAME, self._description().as_record())
 
     def _register(self, topic: TopicInfo) -> None:
-        schema = (topic.type, topic.schema_text)
+        schema = topic.type, topic.schema_encoding, topic.schema_text
         if schema not in self._schemas:
-            text = topic.schema_text.encode()
-            self._schemas[schema] = self._writer.register_schema(topic.type, "ros2msg", text)
+            data = topic.schema_text.encode(errors="surrogateescape")
+            self._schemas[schema] = self._writer.register_schema(*schema[:2], data)
         metadata = {
             "offered_qos_profiles": offered_qos_text(topic.qos_profiles),
             "topic_type_hash": topic.type_hash,
         }
         self._channels[topic.name] = self._writer.register_channel(
-            topic.name, "cdr", self._schemas[schema], metadata
+            topic.name, topic.message_encoding, self._schemas[schema], metadata
         )
 
     def _close_file(self) -> None:

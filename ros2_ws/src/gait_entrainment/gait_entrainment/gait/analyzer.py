@@ -9,9 +9,20 @@ from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
-from gait_entrainment.gait.pulse_phase import LagFollower, PulsePhase, depends_on_next_toe_off
-from gait_entrainment.gait.strides import EventCounts, GaitEvent, Stride, StrideTracker
+from gait_entrainment.conventions import Side
+from gait_entrainment.gait.pulse_phase import (
+    LagFollower,
+    PulseNumbers,
+    PulsePhase,
+    depends_on_next_toe_off,
+)
+from gait_entrainment.gait.strides import (
+    EventCounts,
+    GaitEvent,
+    Stride,
+    StrideTracker,
+    UnperturbedPeriod,
+)
 from gait_entrainment.gait.verdict import Entrainment, EntrainmentTest, VerdictSettings
 
 Result = Stride | PulsePhase | Entrainment
@@ -28,24 +39,13 @@ class PulseCounts:
     withdrawn: int = 0  # announced, then called off by a stop
 
 
-class _UnperturbedPeriod:
-    """Mean period of the complete strides before the first pulse, in exact integer arithmetic."""
+@dataclass(frozen=True, slots=True, order=True)
+class Hole:
+    """A part of a run of which the record lacks something."""
 
-    def __init__(self) -> None:
-        self._count = self._sum = self._squares = 0
-        self.mean = math.nan  # [s]
-        self.standard_error = math.nan  # [s]
-
-    def add(self, stride: Stride) -> None:
-        period = stride.end - stride.start
-        self._count += 1
-        self._sum += period
-        self._squares += period * period
-        n, total = self._count, self._sum
-        self.mean = total / (n * NANOSECONDS_PER_SECOND)
-        if n > 1:
-            variance = (n * self._squares - total * total) / (n * n * (n - 1))
-            self.standard_error = math.sqrt(variance) / NANOSECONDS_PER_SECOND
+    start: int  # [ns]
+    end: int  # [ns]
+    missing: str  # such as "2 strides"
 
 
 class GaitAnalyzer:
@@ -61,20 +61,23 @@ class GaitAnalyzer:
     happens.)
 
     Pulses outside every complete stride are counted in ``pulse_counts``, not published; they keep
-    their number.
+    their number. What the record lacks is in ``holes``: lags are followed, and verdicts formed,
+    from the latest hole or the beginning of the latest train on.
     """
 
     def __init__(self, side: Side, settings: VerdictSettings | None = None) -> None:
         self._tracker = StrideTracker(side)
         self._test = EntrainmentTest(settings or VerdictSettings())
         self._lags = LagFollower()
-        self._unperturbed = _UnperturbedPeriod()
+        self._unperturbed = UnperturbedPeriod()
         self._strides: deque[Stride] = deque()  # closed, pulses not placed yet
         self._before: Stride | None = None  # the latest stride whose pulses are placed
         self._onsets: list[int] = []  # announced, not placed yet; ascending
         self._promised = -math.inf  # no pulse before this instant will be added [ns]
         self._finished = False
-        self._number = 0  # of the latest pulse placed
+        self._numbers = PulseNumbers()
+        self._unknown: list[tuple[int, int]] = []  # spans in which pulses may have begun [ns]
+        self.holes: list[Hole] = []
         self.pulse_counts = PulseCounts()
 
     @property
@@ -106,6 +109,11 @@ class GaitAnalyzer:
                 self._onsets.insert(place, onset)
         self._promised = max(self._promised, valid_until)
         return self._place()
+
+    def add_hole(self, start: int, end: int) -> None:
+        """Take that it is not known which pulses began in [start, end) [ns], ahead of promises."""
+        self._unknown.append((start, end))
+        self.holes.append(Hole(start, end, "which pulses began"))
 
     def stop(self, stamp: int) -> None:
         """Take a stop [ns]: no announced pulse begins from it on, and no promise goes beyond."""
@@ -144,25 +152,59 @@ class GaitAnalyzer:
     ) -> list[Result]:
         """Place the pulses that began before the end of a stride; then ask for the verdict."""
         before = self._before
-        if before is not None and before.number != stride.number - 1:
+        number = 0 if before is None else before.number
+        if stride.number != number + 1:
+            start = stride.start if before is None else before.end
+            missing = _count(stride.number - number - 1, "stride")
+            self._begin_anew(Hole(start, stride.start, missing))
             before = None
         if after is not None and after.number != stride.number + 1:
             after = None
-        period = self._unperturbed
+        unperturbed = self._unperturbed
         pulses: list[PulsePhase] = []
+        judged = 0  # the first of them that neither a hole nor another train comes after
         for onset in onsets:
-            self._number += 1
+            if self._numbered(onset):
+                judged = len(pulses)
             if onset < stride.start:
                 self.pulse_counts.outside_strides += 1
                 continue
-            pulse = self._lags.place(self._number, onset, stride, before, after, period.mean)
+            place = self._numbers.number, onset, stride, before, after, unperturbed.mean
+            pulse = self._lags.place(*place)
             self.pulse_counts.placed += 1
             self.pulse_counts.without_lag += pulse.toe_off is None
             pulses.append(pulse)
-        if self._number == 0:
-            period.add(stride)
-        entrainment = self._test.add(stride, pulses, period.mean, period.standard_error)
+        # Once it is not known whether pulses have begun, no stride is an unperturbed one.
+        if self._numbers.number == 0 and not any(s < stride.end for s, _ in self._unknown):
+            unperturbed.add(stride)
+        if any(s < stride.end and stride.start < e for s, e in self._unknown):
+            self._begin_anew(None)
+            return list(pulses)
+        entrainment = self._test.add(stride, pulses[judged:], unperturbed)
         return [*pulses, entrainment] if entrainment else list(pulses)
+
+    def _numbered(self, onset: int) -> bool:
+        """Number a pulse; return whether lags and verdicts begin anew with it."""
+        latest, first = self._numbers.latest, self._numbers.number == 0
+        missing = self._numbers.place(onset)
+        if missing == 0 or first:
+            return False
+        if missing is None:
+            self._begin_anew(None, another_train=True)
+        else:
+            self._begin_anew(Hole(latest, onset, _count(missing, "pulse")))
+        return True
+
+    def _begin_anew(self, hole: Hole | None, *, another_train: bool = False) -> None:
+        """Follow lags and form verdicts anew: after a hole, known already if None, or a train."""
+        if hole is not None:
+            self.holes.append(hole)
+        self._lags = LagFollower()
+        self._test.restart(hole=not another_train)
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 @dataclass(frozen=True)
@@ -174,6 +216,7 @@ class Analysis:
     entrainments: tuple[Entrainment, ...]  # the last one is the verdict of the run
     event_counts: EventCounts
     pulse_counts: PulseCounts
+    holes: tuple[Hole, ...]  # in the record, in order
 
 
 def analyze(
@@ -181,13 +224,17 @@ def analyze(
     onsets: Iterable[int],
     side: Side,
     settings: VerdictSettings | None = None,
+    unknown: Iterable[tuple[int, int]] = (),
 ) -> Analysis:
     """
     Analyze a whole run of one perturbed leg offline, with the very class that runs online.
 
-    Events come in the order in which they were received; onsets [ns] in any.
+    Events come in the order in which they were received; onsets [ns] in any. It is ``unknown``
+    which pulses began from one instant to another [ns].
     """
     analyzer = GaitAnalyzer(side, settings)
+    for start, end in unknown:
+        analyzer.add_hole(start, end)
     results = [result for event in events for result in analyzer.add_event(event)]
     results += analyzer.add_promise(onsets, 0) + analyzer.finish()
     return Analysis(
@@ -196,4 +243,5 @@ def analyze(
         entrainments=tuple(result for result in results if isinstance(result, Entrainment)),
         event_counts=analyzer.event_counts,
         pulse_counts=analyzer.pulse_counts,
+        holes=tuple(sorted(analyzer.holes)),
     )

@@ -5,7 +5,8 @@
 Which gait events can be believed, and whether somebody walks at all.
 
 An event comes from a sensor, and a sensor counts twice, misses, or is knocked. Torque follows from
-what is believed here, so the rule is the same in the node, in a simulation and in an analysis.
+what is believed here, so the rule is the same in the node, in a simulation and in an analysis: the
+stride tracker asks it about every event.
 """
 
 import math
@@ -13,8 +14,7 @@ import statistics
 from collections import deque
 from dataclasses import dataclass, replace
 
-from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
-from gait_entrainment.gait.strides import GaitEvent
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
 from gait_entrainment.settings import check_settings, setting, settings_of
 
 # Strides whose median is the person's own: enough that two wrong ones do not move it.
@@ -64,26 +64,20 @@ class GaitLimits:
 
 class GaitWatch:
     """
-    Follows the heel strikes of one leg; says which strides are believed and when the gait stops.
+    Knows the person's own stride; says which strides can be, and when the gait has stopped.
 
     Parameters
     ----------
     side
-        The leg that is watched.
+        The leg whose strides are taken.
     limits
         What a stride can be.
-
-    Attributes
-    ----------
-    disbelieved
-        Strides that were not believed, so far.
 
     """
 
     def __init__(self, side: Side, limits: GaitLimits) -> None:
         self.side, self.limits = side, limits
-        self.disbelieved = 0
-        self._latest: int | None = None  # heel strike of the leg [ns]
+        self._latest: int | None = None  # heel strike of the leg that was believed last [ns]
         self._own: deque[float] = deque(maxlen=_OWN_STRIDES)  # periods that were believed [s]
 
     @property
@@ -91,23 +85,21 @@ class GaitWatch:
         """The person's own stride period [s]; NaN before it is known."""
         return statistics.median(self._own) if len(self._own) >= _KNOWN_STRIDES else math.nan
 
-    def believes(self, event: GaitEvent) -> bool:
-        """Take an event in its turn; whether the stride that it closes can be."""
-        if event.side is not self.side or event.kind is not EventKind.HEEL_STRIKE:
-            return True
-        before, self._latest = self._latest, event.stamp
-        if before is None:
-            return True
-        period = (event.stamp - before) / NANOSECONDS_PER_SECOND
-        limits, median = self.limits, self.median
-        believed = limits.stride_least <= period <= limits.stride_most
-        if believed and not math.isnan(median):
-            believed = abs(period - median) <= limits.stride_change * median
-        if believed:
+    def believes(self, strides: float, elapsed: int) -> bool:
+        """Whether so many strides, not necessarily whole ones, can have taken so long [ns]."""
+        limits, median, seconds = self.limits, self.median, elapsed / NANOSECONDS_PER_SECOND
+        least, most = limits.stride_least, limits.stride_most
+        if not math.isnan(median):
+            least = max(least, (1 - limits.stride_change) * median)
+            most = min(most, (1 + limits.stride_change) * median)
+        # Of less than a stride only the end is bounded: its parts are anybody's own.
+        return (strides < 1 or least * strides <= seconds) and seconds <= most * max(strides, 1)
+
+    def add(self, strike: int, period: float | None) -> None:
+        """Take a believed heel strike [ns], and the period [s] of the stride that it closes."""
+        self._latest = strike
+        if period is not None:
             self._own.append(period)
-        else:
-            self.disbelieved += 1
-        return believed
 
     def stopped(self, now: int) -> str:
         """Return why nobody seems to walk at an instant [ns], or an empty text."""

@@ -14,7 +14,7 @@ from gait_entrainment.gait.strides import Stride
 class PulsePhase:
     """One pulse, placed in the gait cycle of the perturbed leg."""
 
-    number: int  # of the pulse in the run, from 1
+    number: int  # of the pulse in the run, from 1; those that the record lacks are counted
     onset: int  # [ns]
     stride: int  # stride in which the pulse began
     phase: float  # (onset - heel strike) / stride period, in [0, 1)
@@ -57,6 +57,43 @@ def nearest_toe_off(
     return min(candidates, key=lambda candidate: abs(onset - candidate[0]))
 
 
+class PulseNumbers:
+    """
+    Numbers the pulses of a run; tells trains apart, and knows how many are missing between.
+
+    The period of a train is known once two intervals in a row agree. From then on an interval of
+    several periods is a train with pulses missing, any other interval the pause before another
+    train. Intervals agree within a quarter of a period, more than any robot jitters.
+    """
+
+    TOLERANCE = 0.25  # of a period
+
+    def __init__(self) -> None:
+        self.number = 0  # of the latest pulse
+        self._first = self.latest = 0  # onsets of the train's first and latest pulse [ns]
+        self._periods = 0  # from the first to the latest
+        self._steady = False  # the period is known
+
+    def place(self, onset: int) -> int | None:
+        """Take the next onset [ns]; return how many pulses lack before it, None in a new train."""
+        steps = 1.0
+        if self._periods:
+            steps = (onset - self.latest) * self._periods / (self.latest - self._first)
+        whole = round(steps)
+        self._steady &= self._periods > 0
+        agrees = whole == 1 or (self._steady and whole > 1)
+        if not self.number or not agrees or abs(steps - whole) > self.TOLERANCE:
+            self.number += 1
+            self._first = self.latest = onset
+            self._periods, self._steady = 0, False
+            return None
+        self._steady = self._periods > 0
+        self.number += whole
+        self._periods += whole
+        self.latest = onset
+        return whole - 1
+
+
 class LagFollower:
     """
     Follows the phase lag across its wraps.
@@ -64,7 +101,7 @@ class LagFollower:
     Pulse n is compared with the toe-off n strides after that of the first pulse. That toe-off
     may lie in the future, so its distance from the nearest one is counted in unperturbed strides
     T: unwrapped lag = lag + (m - n) T if m strides and n pulses have passed since the first lag.
-    It presumes one train with one pulse a stride (1:1 entrainment).
+    It presumes one train with one pulse a stride (1:1 entrainment) and a record without holes.
     """
 
     def __init__(self) -> None:

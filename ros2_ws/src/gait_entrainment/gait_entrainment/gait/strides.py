@@ -7,6 +7,10 @@ import math
 from dataclasses import dataclass
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
+from gait_entrainment.gait.plausibility import GaitLimits, GaitWatch
+
+# Heel strike and toe-off of each leg.
+PLACES = 4
 
 # How many places of the gait are remembered, four strides: enough to tell an event that comes
 # twice from one that comes late, and a bound on memory if a leg's strikes stop coming.
@@ -61,6 +65,7 @@ class EventCounts:
     repeated: int = 0  # dropped: the same event again
     late: int = 0  # dropped: what it belongs to had been closed or given up
     contradictory: int = 0  # dropped: stamp, side or step disagree with the events before
+    implausible: int = 0  # dropped: no stride of this person lasts so long, or so short
     missing: int = 0  # places of the gait, up to the latest, whose event was not accepted
     missed_strides: int = 0  # strides without one of their two heel strikes
 
@@ -73,11 +78,15 @@ class StrideTracker:
     number. Out of order is fine as long as nothing that depends on the event has been decided: an
     event that is earlier in the gait than the leg's latest heel strike is late, since that strike
     has closed one stride and given up those that still lacked a bound. The side of step 0 is
-    taken from the first event. If two events contradict each other, the first to come is believed.
+    taken from the first event. If two events contradict each other, the first to come is believed,
+    and an event is believed only if the strides since the ones before can have taken so long. So
+    that one wrong event cannot silence all that follow, a stride of events that fit each other
+    but not what was believed, without one that fits, is believed from then on.
     """
 
-    def __init__(self, side: Side) -> None:
+    def __init__(self, side: Side, limits: GaitLimits | None = None) -> None:
         self.side = side  # the leg whose strides are wanted
+        self.watch = GaitWatch(side, limits or GaitLimits())
         self.counts = EventCounts()  # what became of the events received so far
         self.stride_in_progress = 0  # the one that the leg's latest heel strike started
         self.latest_strike: int | None = None  # its stamp [ns]
@@ -85,13 +94,19 @@ class StrideTracker:
         self._stamps: dict[int, int] = {}  # remembered events: place -> stamp
         self._latest_place = -1
         self._strike_place = -1
+        self._rival: StrideTracker | None = (
+            None  # of the latest events, dropped, that fit together
+        )
 
     def add(self, event: GaitEvent) -> Stride | None:
         """Take one event; return the stride that it closes, if it closes one."""
         fate = self._fate(event)
         setattr(self.counts, fate, getattr(self.counts, fate) + 1)
+        if fate in ("contradictory", "implausible"):
+            return self._doubt(event)
         if fate != "accepted":
             return None
+        self._rival = None
         place = event.place
         if place > self._latest_place:
             self.counts.missing += place - self._latest_place - 1
@@ -116,12 +131,36 @@ class StrideTracker:
             return "contradictory"
         if place in self._stamps:
             return "repeated" if stamp == self._stamps[place] else "contradictory"
-        if place < max(self._strike_place, self._latest_place - REMEMBERED_PLACES):
-            return "late"
         for other, known in self._stamps.items():
             if known == stamp or (other < place) != (known < stamp):
                 return "contradictory"
-        return "accepted"
+        if place < max(self._strike_place, self._latest_place - REMEMBERED_PLACES):
+            return "late"
+        return "accepted" if self._believes(place, stamp) else "implausible"
+
+    def _believes(self, place: int, stamp: int) -> bool:
+        """Whether the strides since the latest event at least one stride before can be."""
+        since = max((p for p in self._stamps if p <= place - PLACES), default=None)
+        if since is None:  # the run has just begun
+            since = min(self._stamps, default=place)
+        elapsed = stamp - self._stamps.get(since, stamp)
+        return self.watch.believes((place - since) / PLACES, elapsed)
+
+    def _doubt(self, event: GaitEvent) -> Stride | None:
+        """Drop an event, unless a stride of dropped ones fits together: then go on with those."""
+        rival = self._rival
+        if rival is None or rival._fate(event) != "accepted":
+            rival = StrideTracker(self.side, self.watch.limits)
+        stride = rival.add(event) if rival._fate(event) == "accepted" else None
+        self._rival = rival
+        if rival.counts.accepted <= PLACES:
+            return None
+        counts = self.counts
+        counts.missing += max(rival.counts.missing - self._latest_place - 1, 0)
+        seen = max(self.stride_in_progress - 1, 0)
+        counts.missed_strides += max(rival.counts.missed_strides - seen, 0)
+        self.__dict__.update(rival.__dict__, counts=counts)
+        return stride
 
     def _first_step_if(self, event: GaitEvent) -> int:
         """Return the step of the leg's first heel strike, 0 or 1, that the event implies."""
@@ -134,8 +173,10 @@ class StrideTracker:
         self.stride_in_progress, self.latest_strike = closed + 1, event.stamp
         self._strike_place = event.place
         if start is None or closed != started:
-            self.counts.missed_strides += closed - max(started - 1, 0)
+            self.watch.add(event.stamp, None)
+            self.counts.missed_strides += max(closed - max(started - 1, 0), 0)
             return None
+        self.watch.add(event.stamp, (event.stamp - start) / NANOSECONDS_PER_SECOND)
         middle = self._stamps.get(event.place - 2)
         step_periods = (math.nan, math.nan)
         if middle is not None:
@@ -145,3 +186,26 @@ class StrideTracker:
             )
         toe_off = self._stamps.get(event.place - 1)
         return Stride(closed, self.side, start, event.stamp, toe_off, step_periods)
+
+
+class UnperturbedPeriod:
+    """Mean period of the complete strides before the first pulse, in exact integer arithmetic."""
+
+    def __init__(self) -> None:
+        self._count = self._sum = self._squares = 0
+        self.mean = math.nan  # [s]
+        self.deviation = math.nan  # standard deviation of the strides [s]; NaN with one
+        self.standard_error = math.nan  # of the mean [s]; NaN with one stride
+
+    def add(self, stride: Stride) -> None:
+        """Take one stride."""
+        period = stride.end - stride.start
+        self._count += 1
+        self._sum += period
+        self._squares += period * period
+        n, total = self._count, self._sum
+        self.mean = total / (n * NANOSECONDS_PER_SECOND)
+        if n > 1:
+            variance = (n * self._squares - total * total) / (n * n * (n - 1))
+            self.standard_error = math.sqrt(variance) / NANOSECONDS_PER_SECOND
+            self.deviation = self.standard_error * math.sqrt(n)

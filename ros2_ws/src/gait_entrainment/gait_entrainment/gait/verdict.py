@@ -4,10 +4,11 @@
 """
 The entrainment verdict: the gait is shown to follow the pulses, or shown not to, or neither.
 
-"The 95 % interval of the slope contains zero" is a failure to reject and calls noise entrained.
-The verdict is an equivalence test instead: entrained if drift and difference of periods are shown
-to be small compared with what an indifferent walker would show, drifting if the drift is shown
-not to be small, undecided if the data allow neither claim.
+The lag of an indifferent walker is a random walk: each stride adds pulse period minus stride
+period, so it drifts by D, their mean difference, and wanders with the noise of the strides. The
+lag of a locked walker is stationary. So the gait is entrained if the lag stays put: if its spread
+is small compared with what D would make of it, and with what wandering would. That the slope of
+the lag does not differ from zero is a failure to reject, and calls noise entrained.
 """
 
 import cmath
@@ -20,34 +21,74 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
-from gait_entrainment.gait.drift import Drift, drift_of
+from gait_entrainment.gait.drift import Drift, Steadiness, drift_of, steadiness_of
 from gait_entrainment.gait.pulse_phase import PulsePhase
-from gait_entrainment.gait.strides import Stride
+from gait_entrainment.gait.strides import Stride, UnperturbedPeriod
 from gait_entrainment.settings import check_settings, setting
 
 
 class Verdict(enum.IntEnum):
     """What can be claimed about the gait and the pulses."""
 
-    UNDECIDED = 0  # too few pulses, or neither claim can be made
-    ENTRAINED = 1  # drift and difference of periods shown to be small, for several strides
+    UNDECIDED = 0  # neither claim can be made
+    ENTRAINED = 1  # the lag is shown to stay put, for several strides
     DRIFTING = 2  # drift shown not to be small, never entrained before
     LOST = 3  # drift shown not to be small, entrained before
-    UNTESTABLE = 4  # pulse period too close to the unperturbed period, or the latter unknown
+    UNTESTABLE = 4  # no number of such pulses could tell
+
+
+class Reason(enum.IntEnum):
+    """Why nothing is claimed."""
+
+    NONE = 0  # something is: entrained, drifting or lost
+    FEW_PULSES = 1  # fewer than the window takes
+    HOLE = 2  # the same, since the record has a hole
+    UNCLEAR = 3  # the lag neither stays put nor is shown to drift
+    CREEPING = 4  # the lag moves on smoothly: a slow passage, or an approach that is not over
+    TOO_CLOSE = 5  # pulse period and unperturbed period, to tell them apart
+    BASELINE_UNKNOWN = 6  # fewer than two complete strides before the first pulse
+    NOT_ONE_TO_ONE = 7  # pulses at another rate than one a stride
 
 
 @dataclass(frozen=True)
 class VerdictSettings:
     """Every number in the verdict; raises SettingError for one that is out of range."""
 
-    window: int = setting(20, "latest pulses judged at a time", "1", (5, 1000))
+    window: int = setting(20, "fewest pulses judged at a time", "1", (5, 1000))
+    longest_window: int = setting(40, "most pulses judged at a time", "1", (5, 1000))
+    judged_from: int = setting(
+        25, "pulses from which on a window that is not full yet is judged", "1", (5, 1000)
+    )
+    window_deviations: float = setting(
+        100.0,
+        "drift of an indifferent gait over the window, in standard deviations of the baseline's "
+        "stride period; the window is as long as that takes, within its bounds",
+        "1",
+        (1.0, 10_000.0),
+    )
+    spread_margin: float = setting(
+        0.35,
+        "largest spread of an entrained lag, as the steady drift per stride that would spread it "
+        "as much, as a fraction of the difference between pulse period and unperturbed period",
+        "1",
+        (0.01, 1.0),
+    )
+    scatter_margin: float = setting(
+        0.32, "the same as a fraction of the lag's scatter from pulse to pulse", "1", (0.01, 1.0)
+    )
+    quiet_margin: float = setting(
+        0.12,
+        "spread that is small whatever the scatter, as a fraction of the difference of periods",
+        "1",
+        (0.001, 1.0),
+    )
     confidence: float = setting(
         0.95, "two-sided confidence level of the drift's interval", "1", (0.5, 0.9999)
     )
     drift_margin: float = setting(
         0.25,
-        "largest drift per stride of an entrained gait, as a fraction of the "
-        "difference between pulse period and unperturbed period",
+        "drift per stride above which a gait drifts, as a fraction of the difference between "
+        "pulse period and unperturbed period",
         "1",
         (0.01, 1.0),
     )
@@ -77,6 +118,13 @@ class VerdictSettings:
     smallest_difference_errors: float = setting(
         2.0, "the same in standard errors of the unperturbed period", "1", (0.0, 100.0)
     )
+    largest_difference: float = setting(
+        0.25,
+        "largest difference between pulse period and unperturbed period at which there is one "
+        "pulse a stride, as a fraction of the latter",
+        "1",
+        (0.01, 0.5),
+    )
     stretch_tolerance: float = setting(
         0.010,
         "distance from the final lag within which a stride counts as entrained",
@@ -100,6 +148,8 @@ class Entrainment:
     """The verdict at one stride, and the figures that it rests on."""
 
     verdict: Verdict
+    reason: Reason
+    stretch: int  # of pulses of one train without a hole between them, from 1
     stride: int  # stride at which the question was asked
     stamp: int  # heel strike that closes it [ns]
     since_stride: int  # stride since which this verdict has held
@@ -111,6 +161,9 @@ class Entrainment:
     drift_interval: float  # half width of its confidence interval [s per stride]
     autocorrelation: float  # lag 1, of the residuals, in [0, largest_autocorrelation]
     effective_pulses: float  # pulses in the window, discounted for autocorrelation
+    window: int  # pulses that the verdict takes
+    spread: float  # of the lag, as the steady drift that would spread it as much [s per stride]
+    scatter: float  # of the lag from pulse to pulse [s]; NaN with fewer than three pulses
     phase_locking_value: float  # length of the mean phase vector, 0 to 1; reported, not used
     entrained_since_stride: int | None  # since when every lag has been near the final one
 
@@ -151,20 +204,25 @@ class EntrainmentTest:
 
     def __init__(self, settings: VerdictSettings) -> None:
         self._settings = settings
-        self._window: deque[tuple[PulsePhase, Stride]] = deque(maxlen=settings.window)
+        self._since = self._stretch = 0
+        self._after_hole = False
         self._strides: list[int] = []  # stride of each pulse with a lag
+        self.restart(hole=False)
+
+    def restart(self, *, hole: bool) -> None:
+        """Forget the pulses so far: another train begins, or a hole in the record ends."""
+        self._stretch += bool(self._strides) or not self._stretch
+        self._after_hole = hole and (self._after_hole or bool(self._strides))
+        longest = max(self._settings.window, self._settings.longest_window)
+        self._window: deque[tuple[PulsePhase, Stride]] = deque(maxlen=longest)
+        self._strides = []
         self._above, self._below = _Outliers(), _Outliers()
         self._passed = 0  # successive evaluations that met the criteria for entrained
         self._was_entrained = False
         self._verdict: Verdict | None = None
-        self._since = 0
 
     def add(
-        self,
-        stride: Stride,
-        pulses: Sequence[PulsePhase],
-        unperturbed_period: float,
-        unperturbed_period_error: float,
+        self, stride: Stride, pulses: Sequence[PulsePhase], unperturbed: UnperturbedPeriod
     ) -> Entrainment | None:
         """Take one stride with its pulses; returns None if none of them has a lag."""
         placed = [pulse for pulse in pulses if pulse.toe_off is not None]
@@ -175,7 +233,11 @@ class EntrainmentTest:
             self._above.add(pulse.unwrapped_lag, position)
             self._below.add(-pulse.unwrapped_lag, position)
             self._window.append((pulse, stride))
-        window = [pulse for pulse, _ in self._window]
+        first, last = self._window[0][0], self._window[-1][0]
+        pulse_period = _mean_period(first.onset, last.onset, last.number - first.number)
+        difference = abs(pulse_period - unperturbed.mean)
+        size = self._size(difference, unperturbed.deviation)
+        window = [pulse for pulse, _ in self._window][-size:]
         lags = [pulse.unwrapped_lag for pulse in window]
         drift = drift_of(
             [pulse.stride + pulse.phase for pulse in window],
@@ -183,65 +245,88 @@ class EntrainmentTest:
             self._settings.confidence,
             self._settings.largest_autocorrelation,
         )
-        first, last = window[0], window[-1]
-        oldest = self._window[0][1]
-        pulse_period = _mean_period(first.onset, last.onset, last.number - first.number)
+        steadiness = steadiness_of([pulse.number for pulse in window], lags)
+        oldest = self._window[-len(window)][1]
         mean_period = _mean_period(oldest.start, stride.end, stride.number - oldest.number + 1)
-        difference = abs(pulse_period - unperturbed_period)
-        verdict = self._judge(
-            drift, difference, unperturbed_period_error, abs(mean_period - pulse_period)
-        )
+        reason = self._untestable(difference, unperturbed)
+        if reason is Reason.NONE or len(window) < 2:
+            near = abs(mean_period - pulse_period) < self._settings.period_margin * difference
+            full = len(window) >= min(size, self._settings.judged_from)
+            verdict, reason = self._judge(drift, steadiness, difference, near=near, full=full)
+        else:
+            self._passed, verdict = 0, Verdict.UNTESTABLE
         if verdict != self._verdict:
             self._verdict, self._since = verdict, stride.number
         entrained = verdict == Verdict.ENTRAINED
         return Entrainment(
             verdict=verdict,
+            reason=reason,
+            stretch=self._stretch,
             stride=stride.number,
             stamp=stride.end,
             since_stride=self._since,
-            unperturbed_period=unperturbed_period,
-            unperturbed_period_error=unperturbed_period_error,
+            unperturbed_period=unperturbed.mean,
+            unperturbed_period_error=unperturbed.standard_error,
             pulse_period=pulse_period,
             mean_period=mean_period,
             drift=drift.slope,
             drift_interval=drift.half_width,
             autocorrelation=drift.autocorrelation,
             effective_pulses=drift.effective_pulses,
+            window=size,
+            spread=steadiness.spread,
+            scatter=steadiness.scatter,
             phase_locking_value=_phase_locking_value(window),
             entrained_since_stride=self._first_near(lags) if entrained else None,
         )
 
-    def _judge(
-        self, drift: Drift, difference: float, period_error: float, deviation: float
-    ) -> Verdict:
+    def _size(self, difference: float, deviation: float) -> int:
         """
-        Return what can be claimed now.
+        Return how many pulses to judge; difference of periods and deviation of strides in s.
 
-        ``difference`` is that of pulse period and unperturbed period [s], whose standard error is
-        ``period_error``; ``deviation`` that of pulse period and mean stride period [s].
+        The noisier the gait, the longer it takes to tell drift from wandering.
         """
-        settings, size = self._settings, len(self._window)
-        full = size == settings.window
-        testable = (
-            difference >= settings.smallest_difference
-            and difference >= settings.smallest_difference_errors * period_error
-        )
-        margin = settings.drift_margin * difference
-        passes = (
-            full
-            and testable
-            and abs(drift.slope) + drift.half_width < margin
-            and deviation < settings.period_margin * difference
-        )
-        self._passed = self._passed + 1 if passes else 0
-        if size > 1 and not testable:
-            return Verdict.UNTESTABLE
+        settings, longest = self._settings, self._window.maxlen or 0
+        if not deviation * settings.window_deviations < longest * difference:
+            return settings.window if math.isnan(deviation) else longest
+        return max(settings.window, math.ceil(settings.window_deviations * deviation / difference))
+
+    def _untestable(self, difference: float, unperturbed: UnperturbedPeriod) -> Reason:
+        """Return why no number of such pulses could tell; NONE if it could."""
+        settings = self._settings
+        if math.isnan(unperturbed.standard_error):
+            return Reason.BASELINE_UNKNOWN
+        if difference > settings.largest_difference * unperturbed.mean:
+            return Reason.NOT_ONE_TO_ONE
+        least = settings.smallest_difference_errors * unperturbed.standard_error
+        if difference >= max(settings.smallest_difference, least):
+            return Reason.NONE
+        return Reason.TOO_CLOSE
+
+    def _judge(
+        self, drift: Drift, steadiness: Steadiness, difference: float, *, near: bool, full: bool
+    ) -> tuple[Verdict, Reason]:
+        """
+        Return what can be claimed now, and why no more.
+
+        ``difference`` is that of pulse period and unperturbed period [s]; the mean stride period
+        is ``near`` the pulse period; the window is ``full``.
+        """
+        settings = self._settings
+        if not full:
+            self._passed = 0
+            return Verdict.UNDECIDED, Reason.HOLE if self._after_hole else Reason.FEW_PULSES
+        scattered = settings.scatter_margin * steadiness.scatter
+        largest = max(scattered, settings.quiet_margin * difference)
+        stays = near and steadiness.spread < min(largest, settings.spread_margin * difference)
+        self._passed = self._passed + 1 if stays and not steadiness.creeps else 0
         if self._passed >= settings.successive:
             self._was_entrained = True
-            return Verdict.ENTRAINED
-        if full and abs(drift.slope) - drift.half_width > margin:
-            return Verdict.LOST if self._was_entrained else Verdict.DRIFTING
-        return Verdict.UNDECIDED
+            return Verdict.ENTRAINED, Reason.NONE
+        if abs(drift.slope) - drift.half_width > settings.drift_margin * difference:
+            return Verdict.LOST if self._was_entrained else Verdict.DRIFTING, Reason.NONE
+        creeping = stays and steadiness.creeps
+        return Verdict.UNDECIDED, Reason.CREEPING if creeping else Reason.UNCLEAR
 
     def _first_near(self, lags: Sequence[float]) -> int:
         """Return the stride since which every lag has been near the median of the window."""

@@ -73,7 +73,7 @@ def test_no_promise_covers_an_onset_that_is_not_planned(baseline, periods, phase
     train = conductor.train
     assert conductor.measured_period == pytest.approx(measured, abs=2e-9)
     # The definition, from the strike that starts the last baseline stride.
-    onset = strikes[baseline - 1] + round((1 + phase) * conductor.measured_period * 1e9)
+    onset = strikes[baseline - 1] + math.floor((1 + phase) * conductor.measured_period * 1e9) + 1
     assert train.first_onset == onset
     assert train.period == conductor.measured_period - 0.05
 
@@ -93,6 +93,18 @@ def test_the_end_lies_behind_everything_promised_and_behind_the_last_stride(peri
     assert horizons[-1].until > strikes[protocol.strides]
     assert [h.until for h in horizons] == sorted(h.until for h in horizons)
     assert conductor.strides >= protocol.strides
+
+
+@settings(derandomize=True, deadline=None, max_examples=200)
+@given(baseline=st.integers(2, 30), period=st.floats(0.9, 1.6), start=st.floats(0, 1))
+def test_first_pulse_of_a_constant_gait_is_never_before_the_stride_after_the_baseline(
+    baseline, period, start
+):
+    conductor = Conductor(Protocol(baseline=baseline, pulses=PulsePlan(count=1)), limits=ANY_GAIT)
+    strikes = [round((start + k * period) * 1e9) for k in range(baseline + 1)]
+    for k, stamp in enumerate(strikes):
+        conductor.add_event(GaitEvent(stamp, EventKind.HEEL_STRIKE, Side.RIGHT, 2 * k))
+    assert 0 <= conductor.train.first_onset - strikes[baseline] <= 2
 
 
 def test_an_absolute_period_needs_no_measurement():

@@ -10,7 +10,7 @@ Prints the table of docs/analysis.md: python monte_carlo.py [TRIALS]
 import statistics
 import sys
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,12 +25,16 @@ from synthetic_gait import (
     locks_within_80_ms,
     long_range,
     noisy_walk,
+    perturbed,
+    recorded_strides,
     slips,
     white,
 )
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.gait import Verdict, VerdictSettings, analyze, drift_of
+from gait_entrainment.gait import GaitEvent, Verdict, analyze, drift_of
+
+STEADY = 0.025  # coefficient of variation below which a recorded stretch is called steady
 
 
 @dataclass(frozen=True)
@@ -40,12 +44,11 @@ class Case:
     response: Response
     noise: Noise
     variation: float  # coefficient of variation of the stride periods
-    window: int = 20  # pulses judged at a time
 
     def __str__(self) -> str:
         walker = self.response.__name__.replace("_", " ")
         noise = self.noise.__name__.replace("_", " ")
-        return f"| {walker} | {noise} | {100 * self.variation:g} % | {self.window} |"
+        return f"| {walker} | {noise} | {100 * self.variation:g} % |"
 
 
 @dataclass(frozen=True)
@@ -81,11 +84,27 @@ def rate(successes: int, trials: int) -> str:
 
 def run(case: Case, trials: int, seed: int = 2012) -> Outcome:
     """Run independent trials of one case; the same seed gives the same trials."""
-    rule = VerdictSettings(window=case.window)
-    ever, final, since = 0, Counter[Verdict](), []
-    for rng in np.random.default_rng(seed).spawn(trials):
-        events, onsets = noisy_walk(rng, case.response, case.noise, case.variation)
-        entrainments = analyze(events, onsets, Side.RIGHT, rule).entrainments
+    return outcome_of(
+        noisy_walk(rng, case.response, case.noise, case.variation)
+        for rng in np.random.default_rng(seed).spawn(trials)
+    )
+
+
+def run_recorded(response: Response, *, steady: bool, seed: int = 2012) -> Outcome:
+    """Let a walker respond on every recorded stretch that is steady, or is not."""
+    strides = [s for s in recorded_strides() if (np.std(s) < STEADY * np.mean(s)) == steady]
+    rngs = np.random.default_rng(seed).spawn(len(strides))
+    return outcome_of(
+        perturbed(rng, response, free) for rng, free in zip(rngs, strides, strict=True)
+    )
+
+
+def outcome_of(walks: Iterable[tuple[list[GaitEvent], list[int]]]) -> Outcome:
+    """Judge walks."""
+    trials, ever, final, since = 0, 0, Counter[Verdict](), []
+    for events, onsets in walks:
+        entrainments = analyze(events, onsets, Side.RIGHT).entrainments
+        trials += 1
         ever += any(e.verdict == Verdict.ENTRAINED for e in entrainments)
         last = entrainments[-1]
         final[last.verdict] += 1
@@ -110,28 +129,26 @@ NOISES: tuple[Noise, ...] = (white, autoregressive, long_range)
 
 def cases() -> Iterator[Case]:
     """Yield the rows of the table."""
-    for response in (ignores, follows_partly, slips):
-        for noise in NOISES:
-            yield Case(response, noise, 0.02)
-    for response, variations in ((locks, (0.02, 0.01)), (locks_within_80_ms, (0.02, 0.01, 0.005))):
-        for variation in variations:
+    for response in (ignores, follows_partly, slips, locks, locks_within_80_ms):
+        for variation in (0.03, 0.02, 0.01):
             for noise in NOISES:
                 yield Case(response, noise, variation)
-    for response in (ignores, locks):
-        for noise in NOISES:
-            yield Case(response, noise, 0.02, window=30)
 
 
 if __name__ == "__main__":
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
     print(
-        "| walker | noise | CV | N | ever entrained, % (95 % interval) | at the last pulse: "
+        "| walker | noise | CV | ever entrained, % (95 % interval) | at the last pulse: "
         "entrained, % | undecided, % | drifting, % | lost, % | untestable, % | entrained since "
         "stride, median |"
     )
-    print("| --- " * 11 + "|")
+    print("| --- " * 10 + "|")
     for each in cases():
         print(each, run(each, count), sep="", flush=True)
+    for walker in (ignores, locks) if recorded_strides() else ():
+        for limit, calm in (("below", True), ("above", False)):
+            name = f"| {walker.__name__} | recorded | {limit} {100 * STEADY:g} % |"
+            print(name, run_recorded(walker, steady=calm), sep="", flush=True)
     for noise in NOISES:
         print(
             f"coverage of the drift's interval, {noise.__name__}: {coverage(noise, 4 * count):.3f}"

@@ -4,6 +4,7 @@
 """Synthetic gait events and pulses: exact ones for examples, noisy ones for Monte Carlo."""
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -79,6 +80,25 @@ def long_range(rng: np.random.Generator, n: int) -> Floats:
     return np.fft.fft(np.sqrt(spectrum / size) * normal).real[:n]
 
 
+def recorded_strides(strides: int = 80) -> list[Floats]:
+    """
+    Return stretches of stride periods [s] that people walked, from PhysioNet's gait-maturation-db.
+
+    Without a stop or a missed step: every stride is within a quarter of its stretch's median. The
+    database is looked for in shared/data beside the repository; returns none if it is not there.
+    """
+    folders = (parent / "shared" / "data" / "gait_maturation" for parent in Path(__file__).parents)
+    folder = next((folder for folder in folders if folder.is_dir()), None)
+    stretches: list[Floats] = []
+    for path in sorted(folder.glob("[0-9]*.txt")) if folder else ():
+        periods = np.loadtxt(path)[:, 1]
+        for begin in range(0, len(periods) - strides + 1, strides):
+            stretch = periods[begin : begin + strides]
+            if np.all(np.abs(stretch / np.median(stretch) - 1) < 0.25):
+                stretches.append(stretch)
+    return stretches
+
+
 Noise = Callable[[np.random.Generator, int], Floats]
 Response = Callable[[float], float]  # lag of a pulse [s] -> change of the stride period [s]
 
@@ -93,32 +113,51 @@ def noisy_walk(
     counts: tuple[int, int, int] = (15, 50, 15),
 ) -> tuple[list[GaitEvent], list[int]]:
     """
-    Return the gait events and the pulse onsets of one experiment.
+    Return the gait events and the pulse onsets of one experiment, as ``perturbed`` does.
 
     Stride periods are ``unperturbed`` [s] plus noise with a coefficient of variation
-    ``variation``, plus the walker's response once there are pulses. The pulses are planned as the
-    experiment plans them: period ``offset`` [s] away from the measured mean of the baseline,
-    initial phase at random. Toe-offs scatter by 5 ms around STANCE.
+    ``variation``; ``counts`` are the strides of baseline, pulses and washout.
+    """
+    free = unperturbed * (1 + variation * noise(rng, sum(counts)))
+    return perturbed(rng, response, free, offset, unperturbed, counts[:2])
+
+
+def perturbed(
+    rng: np.random.Generator,
+    response: Response,
+    free: Floats,
+    offset: float = OFFSET,
+    unperturbed: float | None = None,
+    counts: tuple[int, int] = (15, 50),
+) -> tuple[list[GaitEvent], list[int]]:
+    """
+    Return the gait events and the pulse onsets of one experiment.
+
+    Stride periods are ``free`` [s], plus the walker's response once there are pulses. The pulses
+    are planned as the experiment plans them: period ``offset`` [s] away from the measured mean of
+    the baseline, initial phase at random. Toe-offs scatter by 5 ms around STANCE.
 
     Parameters
     ----------
     rng
         Source of all randomness.
-    response, noise, variation, offset, unperturbed
+    response, free, offset
         As above.
+    unperturbed
+        Mean stride period [s], from which toe-off is expected; that of ``free`` if None.
     counts
-        Strides of baseline, pulses and washout.
+        Strides of baseline and pulses.
 
     """
-    baseline, pulses, _ = counts
-    total = sum(counts)
-    free = unperturbed * (1 + variation * noise(rng, total))
-    jitter = 0.005 * rng.standard_normal(total)
+    baseline, pulses = counts
+    if unperturbed is None:
+        unperturbed = float(np.mean(free))
+    jitter = 0.005 * rng.standard_normal(len(free))
     measured = float(np.mean(free[:baseline]))
     first = float(np.sum(free[: baseline - 1])) + (1 + rng.uniform()) * measured
     onsets = [nanoseconds(first) + nanoseconds(n * (measured + offset)) for n in range(pulses)]
     strikes, toe_offs = [0.0], []
-    for k in range(total):
+    for k in range(len(free)):
         start, period = strikes[-1], float(free[k])
         if baseline <= k < baseline + pulses:
             # The pulse that belongs to this stride is the one nearest to its expected toe-off.

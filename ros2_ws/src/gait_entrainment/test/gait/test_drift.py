@@ -14,6 +14,7 @@ from monte_carlo import coverage
 from synthetic_gait import Noise, autoregressive, white
 
 from gait_entrainment.gait import drift_of
+from gait_entrainment.gait.drift import steadiness_of
 
 
 def test_hand_computed_example() -> None:
@@ -81,3 +82,38 @@ def test_too_little_to_tell(x: list[float], y: list[float]) -> None:
 )
 def test_coverage_of_the_interval(noise: Noise, low: float, high: float) -> None:
     assert low < coverage(noise, 2000) < high
+
+
+@pytest.mark.parametrize("n", [3, 20, 41])
+def test_spread_of_a_steady_drift_is_the_drift(n: int) -> None:
+    steadiness = steadiness_of(range(n), [0.3 - 0.02 * k for k in range(n)])
+    assert math.isclose(steadiness.spread, 0.02)
+    assert steadiness.scatter < 1e-12
+    assert steadiness.creeps
+
+
+def test_scatter_is_that_of_the_strides_whatever_the_drift() -> None:
+    rng = np.random.default_rng(1)
+    strides = 1.1 + 0.03 * rng.standard_normal(4000)
+    for period in (1.0, 1.1):
+        lags = np.cumsum(period - strides).tolist()
+        assert math.isclose(steadiness_of(range(4000), lags).scatter, 0.03, rel_tol=0.03)
+
+
+def test_scatter_does_not_look_across_a_missing_pulse() -> None:
+    lags = [0.0, 0.1, 0.0, 0.1, 5.0, 5.1, 5.0, 5.1]
+    whole = steadiness_of([1, 2, 3, 4, 9, 10, 11, 12], lags)
+    assert math.isclose(whole.scatter, math.sqrt(math.pi) / 2 * 0.2)
+
+
+def test_what_comes_to_rest_does_not_creep() -> None:
+    assert not steadiness_of(range(20), [0.5**k for k in range(20)]).creeps
+    assert steadiness_of(range(20), [1.1**k for k in range(20)]).creeps
+    assert not steadiness_of(range(20), [0.0] * 20).creeps
+
+
+def test_steadiness_of_too_few_or_unknown_lags_is_not_a_number() -> None:
+    for lags in ([0.1, 0.2], [0.1, math.nan, 0.3]):
+        steadiness = steadiness_of(range(len(lags)), lags)
+        assert math.isnan(steadiness.spread)
+        assert math.isnan(steadiness.scatter)

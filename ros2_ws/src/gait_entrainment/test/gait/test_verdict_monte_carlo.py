@@ -4,49 +4,50 @@
 """False-positive rate and power of the verdict, with bounds that a worse rule would break."""
 
 import pytest
-from monte_carlo import NOISES, Case, interval, run
-from synthetic_gait import (
-    Noise,
-    autoregressive,
-    follows_partly,
-    ignores,
-    locks,
-    long_range,
-    white,
-)
+from monte_carlo import NOISES, Case, interval, run, run_recorded
+from synthetic_gait import Noise, follows_partly, ignores, locks, recorded_strides, white
 
 from gait_entrainment.gait import Verdict
 
 TRIALS = 200
 
 
+def test_interval_of_a_rate() -> None:
+    assert interval(0, 100) == pytest.approx((0.0, 0.0362), abs=1e-4)  # Clopper and Pearson
+
+
 @pytest.mark.parametrize("noise", NOISES)
-def test_indifferent_walker_is_rarely_called_entrained(noise: Noise) -> None:
-    outcome = run(Case(ignores, noise, 0.02), TRIALS)
+@pytest.mark.parametrize("variation", [0.02, 0.03])
+def test_indifferent_walker_is_rarely_called_entrained(noise: Noise, variation: float) -> None:
+    outcome = run(Case(ignores, noise, variation), TRIALS)
     print(outcome)
-    assert interval(outcome.ever_entrained, TRIALS)[0] < 0.05
-    assert outcome.final[Verdict.ENTRAINED] <= 0.02 * TRIALS
-    assert outcome.final[Verdict.DRIFTING] > 0.6 * TRIALS
+    assert interval(outcome.ever_entrained, TRIALS)[0] < 0.025
+    assert interval(outcome.final[Verdict.ENTRAINED], TRIALS)[0] < 0.01
+    assert outcome.final[Verdict.DRIFTING] > 0.5 * TRIALS
 
 
 def test_slow_drift_is_rarely_called_entrained() -> None:
     outcome = run(Case(follows_partly, white, 0.02), TRIALS)
     print(outcome)
-    assert outcome.final[Verdict.ENTRAINED] <= 0.05 * TRIALS
+    assert outcome.final[Verdict.ENTRAINED] <= 0.08 * TRIALS
     assert outcome.ever_entrained <= 0.15 * TRIALS
 
 
-@pytest.mark.parametrize(
-    ("noise", "variation", "power"),
-    [
-        (white, 0.02, 0.7),
-        (white, 0.01, 0.98),
-        (autoregressive, 0.01, 0.7),
-        (long_range, 0.01, 0.8),
-    ],
-)
-def test_locked_walker_is_called_entrained(noise: Noise, variation: float, power: float) -> None:
+@pytest.mark.parametrize("noise", NOISES)
+@pytest.mark.parametrize("variation", [0.01, 0.03])
+def test_locked_walker_is_called_entrained(noise: Noise, variation: float) -> None:
     outcome = run(Case(locks, noise, variation), TRIALS)
     print(outcome)
-    assert outcome.final[Verdict.ENTRAINED] > power * TRIALS
+    assert outcome.final[Verdict.ENTRAINED] > 0.95 * TRIALS
     assert outcome.final[Verdict.DRIFTING] + outcome.final[Verdict.LOST] <= 0.02 * TRIALS
+
+
+@pytest.mark.parametrize("steady", [True, False])
+def test_recorded_strides(steady: bool) -> None:
+    if not recorded_strides():
+        pytest.skip("gait-maturation-db of PhysioNet is not in shared/data beside the repository")
+    indifferent = run_recorded(ignores, steady=steady)
+    assert indifferent.final[Verdict.ENTRAINED] <= 0.015 * indifferent.trials
+    # Above 2.5 %, one stretch in ten really slips by a stride.
+    locked = run_recorded(locks, steady=steady)
+    assert locked.final[Verdict.ENTRAINED] >= (0.99 if steady else 0.83) * locked.trials

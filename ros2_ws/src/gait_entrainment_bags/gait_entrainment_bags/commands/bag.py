@@ -5,6 +5,7 @@
 
 import argparse
 import json
+import sys
 from dataclasses import asdict
 from datetime import datetime, timezone
 from pathlib import Path
@@ -13,7 +14,7 @@ from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment_bags.checks import Severity, check
 from gait_entrainment_bags.reader import info, require_bag
 from gait_entrainment_bags.recovery import recover
-from gait_entrainment_bags.tables import FORMATS, export
+from gait_entrainment_bags.tables import FORMATS, ExportError, export
 
 DESCRIPTION = "Look into bags, check them, rescue them, make tables of them."
 EXAMPLES = """examples:
@@ -42,6 +43,8 @@ _RECOVER = """Write all that can be read into a new bag, and say what is missing
 
 examples:
   entrain bag recover bags/broken bags/rescued   into a new bag; the old one is left as it is
+
+Exit code 1 if there is nothing to rescue.
 """
 _EXPORT = """Write one table per topic, with units; needs pyarrow.
 
@@ -133,9 +136,10 @@ def _check(options: argparse.Namespace) -> int:
 def _recover(options: argparse.Namespace) -> int:
     recovery = recover(options.bag, options.out)
     count = sum(recovery.counts.values())
+    code = 0 if count else 1
     if options.json:
         print(json.dumps(asdict(recovery) | {"folder": str(options.out), "messages": count}))
-        return 0
+        return code
     print(f"{count} messages rescued into {options.out}")
     if recovery.last:
         print(f"the last one is of {_date(recovery.last)}")
@@ -143,17 +147,25 @@ def _recover(options: argparse.Namespace) -> int:
         print(f"missing: {loss}")
     if not recovery.losses:
         print("nothing is missing")
-    return 0
+    return code
 
 
 def _export(options: argparse.Namespace) -> int:
-    files = export(options.bag, options.out, options.format, options.topics)
+    refused: dict[str, str] = {}
+    try:
+        files = export(options.bag, options.out, options.format, options.topics)
+    except ExportError as error:
+        if not error.files:
+            raise
+        files, refused = error.files, error.refused
     if options.json:
         print(json.dumps({topic: str(file) for topic, file in files.items()}))
-        return 0
-    for topic, file in files.items():
-        print(f"{topic}: {file}")
-    return 0
+    else:
+        for topic, file in files.items():
+            print(f"{topic}: {file}")
+    for reason in refused.values():
+        print(f"entrain bag export: no table: {reason}", file=sys.stderr)
+    return 1 if refused else 0
 
 
 def _date(nanoseconds: int) -> str:

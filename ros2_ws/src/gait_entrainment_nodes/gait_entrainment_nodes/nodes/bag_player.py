@@ -29,6 +29,7 @@ from gait_entrainment_bags import (
     BagReader,
     DefinitionMissingError,
     Moment,
+    NothingToPlayError,
     Playback,
     TopicInfo,
     UnreadableBagError,
@@ -114,6 +115,8 @@ class BagPlayer(Participant):
                 paused=settings.start_paused,
                 clock_period=1 / settings.clock if settings.clock else 0.0,
             )
+        except NothingToPlayError:
+            raise  # no parameter is wrong
         except BagError as error:
             raise ValueError(str(error)) from None
         self._offer_topics()

@@ -16,7 +16,7 @@ from typing import Any
 
 from gait_entrainment.errors import EntrainmentError
 from gait_entrainment.experiment import Conductor, Part
-from gait_entrainment.messages import event_of, nanoseconds_of
+from gait_entrainment.messages import MessageError, event_of, nanoseconds_of
 from gait_entrainment.robot import PulseTrain
 from gait_entrainment_msgs import msg
 from gait_entrainment_nodes.messaging import topics
@@ -133,6 +133,8 @@ class Run:
         self._events += 1
         try:
             train = self.conductor.add_event(event_of(event))
+        except MessageError:
+            train = None  # not believed; the analyzer tells
         except EntrainmentError as error:
             self.fail(ExperimentError(str(error)))
             return

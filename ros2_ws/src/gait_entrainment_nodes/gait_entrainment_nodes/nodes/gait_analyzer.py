@@ -19,8 +19,9 @@ from std_srvs.srv import Trigger
 from gait_entrainment.conventions import Side
 from gait_entrainment.gait import VerdictSettings
 from gait_entrainment.gait.analyzer import Result
-from gait_entrainment.messages import nanoseconds_of
+from gait_entrainment.messages import MessageError, nanoseconds_of
 from gait_entrainment.settings import setting
+from gait_entrainment_msgs import msg
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.nodes.gait_analyzer_run import RESULTS, Run
 from gait_entrainment_nodes.nodes.loop import run_node
@@ -53,6 +54,7 @@ class GaitAnalyzerNode(Participant):
         for topic in RESULTS.values():
             self.offer(topic)
         self._latest_run = 0  # number of the latest run
+        self._first_event: msg.GaitEvent | None = None  # of another run than the one that goes on
         heard: list[tuple[topics.Topic, Any]] = [
             (topics.GAIT_EVENTS, Run.add_event),
             (topics.TORQUE_PROFILE, Run.add_profile),
@@ -65,24 +67,45 @@ class GaitAnalyzerNode(Participant):
         self.create_service(Trigger, "~/finish", self._on_finish)
 
     def run_of(self, message: Any) -> Run | None:
-        """Return the run of a message if it is analyzed; a newer run begins anew."""
-        if message.run > self._latest_run:
+        """
+        Return the run of a message if it is analyzed; a newer run begins anew.
+
+        While a run goes on, only the first torque profile of another one begins that: a message
+        with a wrong number must not end the analysis.
+        """
+        begins = isinstance(message, msg.TorqueProfile) and not message.revision
+        if message.run != self._latest_run and (
+            begins or (self.run is None and message.run > self._latest_run)
+        ):
             self._latest_run = message.run
             side, measured = self.settings.side, self.settings.onset == "measured"
             self.run = Run(message.run, side, self.verdict, measured=measured)
             self.note_state(DiagnosticStatus.OK, f"run {message.run} goes on")
-        return self.run if message.run == self._latest_run else None
+            first, self._first_event = self._first_event, None
+            if first is not None and first.run == message.run:
+                self._add(Run.add_event, self.run, first)
+        if message.run == self._latest_run:
+            return self.run
+        if isinstance(message, msg.GaitEvent) and not message.step:
+            self._first_event = message  # comes before the first torque profile
+        self._warn(message, "messages of another run are not analyzed", run=message.run)
+        return None
 
     def _add(self, add: Callable[[Run, Any], list[Result]], run: Run, message: Any) -> None:
         """Hand a message to the run; publish what it allows, and the rest once all is here."""
-        self._publish_results(run, add(run, message))
+        try:
+            self._publish_results(run, add(run, message))
+        except MessageError as error:
+            self._warn(message, f"a message cannot be and is dropped: {error}")
         if doubts := run.new_doubts():
-            what = "gait events are not as they should be"
-            stamp = nanoseconds_of(message.header.stamp)
-            self.diagnose(stamp, DiagnosticStatus.WARN, what, **doubts)
+            self._warn(message, "gait events are not as they should be", **doubts)
         if run.complete:
             assert run.end is not None
             self._finish(run, run.end)
+
+    def _warn(self, message: Any, what: str, **values: Any) -> None:
+        stamp = nanoseconds_of(message.header.stamp)
+        self.diagnose(stamp, DiagnosticStatus.WARN, what, **values)
 
     def _on_finish(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Finish a run whose end was not recorded, or of which events are missing."""

@@ -3,6 +3,7 @@
 
 """One run of the analyzer: events and onsets in, results out, without a node."""
 
+import math
 from dataclasses import asdict
 from typing import Any
 
@@ -11,6 +12,7 @@ from gait_entrainment.gait import Entrainment, GaitAnalyzer, PulsePhase, Stride,
 from gait_entrainment.gait.analyzer import Result
 from gait_entrainment.messages import (
     event_of,
+    hole_before,
     nanoseconds_of,
     profile_of,
     pulse_of,
@@ -51,6 +53,7 @@ class Run:
         self._closed = False  # nothing will be promised any more
         self._expected = 0  # events, once the end is known
         self._doubts: dict[str, int] = {}  # counts of suspicious events, as reported last
+        self._adjoins: float | None = None  # where the next profile must begin, see hole_before
 
     @property
     def complete(self) -> bool:
@@ -74,10 +77,14 @@ class Run:
         stop = stop_of(message)
         if stop is not None:
             self._analyzer.stop(stop)
+            self._adjoins = math.inf
             if self._measured is not None:
                 self._measured.stop(stop)
             return []
+        if hole := hole_before(message, self._adjoins):
+            self._analyzer.add_hole(*hole)
         profile = profile_of(message)
+        self._adjoins = profile.valid_until
         known = list(profile.onsets), profile.valid_until
         self.promised_until, self._closed = profile.valid_until, not profile.has_length
         if self._measured is not None:
@@ -108,8 +115,8 @@ class Run:
         return results + self._analyzer.finish()
 
     def new_doubts(self) -> dict[str, int]:
-        """Return counts of missing, doubled, late or contradictory events; {} if as before."""
-        doubts = asdict(self._analyzer.event_counts)
+        """Return counts of doubtful events, and of holes; {} if as before."""
+        doubts = asdict(self._analyzer.event_counts) | {"holes": len(self._analyzer.holes)}
         del doubts["accepted"]
         if not any(doubts.values()) or doubts == self._doubts:
             return {}

@@ -21,6 +21,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from gait_entrainment.errors import EntrainmentError, UsageError
+from gait_entrainment_bags import NothingToPlayError
 
 # The longest time [s] that the loop sleeps in the executor, so that a signal is soon obeyed.
 LONGEST_SLEEP = 0.1
@@ -57,7 +58,7 @@ def run_node(make_node: Callable[[], Any]) -> int:
             node.offer_ready()
         except (EntrainmentError, ParameterException, ValueError, RuntimeError) as error:
             print(f"{name}: {' '.join(str(error).split())}", file=sys.stderr)
-            return 2
+            return 1 if isinstance(error, NothingToPlayError) else 2
         executor = EventsExecutor()
         executor.add_node(node)
         try:
