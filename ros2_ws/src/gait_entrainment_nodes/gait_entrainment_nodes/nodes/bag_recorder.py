@@ -21,7 +21,7 @@ from operator import itemgetter
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
@@ -175,15 +175,7 @@ class BagRecorder(Participant):
         )
         reliable = all(o.reliability == ReliabilityPolicy.RELIABLE for o in offers)
         lasting = all(o.durability == DurabilityPolicy.TRANSIENT_LOCAL for o in offers)
-        qos = QoSProfile(
-            history=HistoryPolicy.KEEP_ALL,
-            reliability=(
-                ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
-            ),
-            durability=(
-                DurabilityPolicy.TRANSIENT_LOCAL if lasting else DurabilityPolicy.VOLATILE
-            ),
-        )
+        qos = topics.quality(reliable=reliable, lasting=lasting)
         record = self._writer_for(name, definition)
         if name != self._progress_topic:
             self._readers.append((RawReader(self, message_type, name, qos), record))
