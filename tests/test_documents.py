@@ -14,11 +14,9 @@ PAGE = (ROOT / "docs/architecture.md").read_text()
 QUALITIES = {
     "every message": topics.EVERY_MESSAGE,
     "latest state": topics.LATEST_STATE,
-    "diagnostics": topics.DIAGNOSTICS_QOS,
-    "drawing": topics.DRAWING,
-    "latest description": topics.LATEST_DESCRIPTION,
+    "viewed": topics.VIEWED,
+    "said once": topics.SAID_ONCE,
     "looking on": topics.LOOKING_ON,
-    "latched state": topics.LATCHED_STATE,
     "heartbeat": topics.HEARTBEAT,
 }
 

@@ -20,12 +20,15 @@ BELOW = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.13)}
 
 
 def new_figure(
-    *shape: int, size: tuple[float, float] = (7.2, 4.2), **options: Any
+    *shape: int,
+    size: tuple[float, float] = (7.2, 4.2),
+    layout: str | None = "constrained",
+    **options: Any,
 ) -> tuple[Any, Any]:
-    """Return a matplotlib figure and its axes, as `subplots` gives them."""
+    """Return a matplotlib figure, of this layout, and its axes as `subplots` gives them."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=size, layout="constrained")
+    figure = Figure(figsize=size, layout=layout)
     axes = figure.subplots(*shape, **options)
     for one in np.atleast_1d(axes).ravel():
         one.spines[["top", "right"]].set_visible(False)

@@ -14,7 +14,7 @@ from gait_entrainment.outcome import holes_of
 from gait_entrainment.robot.timing import distribution, lateness_ms
 from gait_entrainment_bags.recorded_run import RecordedRun, drawn_strides
 
-_SIZE = (7.2, 3.6)
+_WIDTH, _HEIGHT = 7.2, 3.6  # [inch]
 _DOTTED_LINE = {"color": BLUE, "marker": ".", "lw": 0.8}
 
 
@@ -31,8 +31,19 @@ def draw_figures(run: RecordedRun, folder: Path) -> list[Path]:
     return [folder / name for name in figures]
 
 
+def _new_figure(
+    height: float = _HEIGHT, *, right: float = 0.15, top: float = 0.4, bottom: float = 0.55
+) -> tuple[Any, Any]:
+    """Return a figure and its axes; fitting the margins [inch] would take as long as to draw."""
+    figure, axes = new_figure(size=(_WIDTH, height), layout=None)
+    figure.subplots_adjust(
+        left=0.8 / _WIDTH, right=1 - right / _WIDTH, bottom=bottom / height, top=1 - top / height
+    )
+    return figure, axes
+
+
 def _stride_period(run: RecordedRun) -> Any:
-    figure, axes = new_figure(size=_SIZE)
+    figure, axes = _new_figure()
     if given := [pulse.stride for pulse in run.analysis.pulses]:
         span = min(given) - 0.5, max(given) + 0.5
         axes.axvspan(*span, color=ORANGE, alpha=0.10, lw=0, label="pulses")
@@ -54,7 +65,7 @@ def _stride_period(run: RecordedRun) -> Any:
 
 
 def _phase_lag(run: RecordedRun) -> Any:
-    figure, axes = new_figure(size=_SIZE)
+    figure, axes = _new_figure()
     axes.axhline(0, color=GREY, ls="--", lw=1.2, label="toe-off: end of double stance")
     pulses = {pulse.number: pulse for pulse in run.analysis.pulses}
     points = [
@@ -86,7 +97,7 @@ def _shade_holes(axes: Any, run: RecordedRun) -> None:
 
 def _pulse_timing(run: RecordedRun) -> Any:
     """Draw which share of the pulses was sent, and was measured, by how late at most."""
-    figure, axes = new_figure(size=_SIZE)
+    figure, axes = _new_figure(_HEIGHT + 0.7, top=0.9, bottom=1.15)
     for kind, colour, style in (("sent", ORANGE, "--"), ("measured", BLUE, "-")):
         late = distribution(run.timings, kind, run.measured_period)
         if late is None:
@@ -109,14 +120,14 @@ def _pulse_timing(run: RecordedRun) -> Any:
         axes.secondary_xaxis("top", functions=scales).set_xlabel("[% of the unperturbed stride]")
     if axes.get_legend_handles_labels()[0]:
         axes.axvline(0, color=GREY, lw=1.2)  # so that the command is in view
-        figure.legend(loc="outside lower center", frameon=False)
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), frameon=False)
     return figure
 
 
 def _ankle_torque(run: RecordedRun) -> Any:
     """Draw one line of ankle torque per stride, from the other leg's heel strike on, as Fig. 7."""
     rows = drawn_strides(run.protocol, run.analysis)
-    figure, axes = new_figure(size=(7.2, 2 + 0.28 * len(rows)))
+    figure, axes = _new_figure(2 + 0.28 * len(rows), right=0.7)
     torques = run.torques
     peak = run.protocol.walker.peak_torque
     scale = 0.9 / peak

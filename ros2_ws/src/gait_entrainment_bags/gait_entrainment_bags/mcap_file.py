@@ -11,6 +11,7 @@ more than the decompression of the chunks that hold it, whereas the library make
 every message in them (14 microseconds each).
 """
 
+import math
 import os
 import zlib
 from collections import deque
@@ -186,8 +187,20 @@ class McapFile:
         with self._broken("chunk", chunk.offset):
             return decompress(content)
 
-    def messages(self, chunk: Chunk, rank: int, names: Mapping[int, str]) -> list[BagMessage]:
-        """Read messages of these topics (by channel) from a chunk; rank: its place in the bag."""
+    def messages(
+        self,
+        chunk: Chunk,
+        rank: int,
+        names: Mapping[int, str],
+        start: int = 0,
+        end: float = math.inf,
+    ) -> list[BagMessage]:
+        """
+        Read messages of these topics (by channel) from a chunk; rank: its place in the bag.
+
+        Those with log times outside of ``start`` up to ``end`` [ns] are left out where an index
+        tells them beforehand.
+        """
         place = rank * LARGEST_CHUNK
         with self._broken("chunk", chunk.offset):
             if chunk.index_offsets.keys() <= names.keys():  # all of it, or no index
@@ -202,6 +215,7 @@ class McapFile:
                 (offset, log_time)
                 for channel in names.keys() & chunk.index_offsets.keys()
                 for log_time, offset in self.message_index(chunk.index_offsets[channel], channel)
+                if start <= log_time < end
             )
             records = self.chunk_data(chunk) if entries else b""
             return [parse_indexed_message(records, *entry, place, names) for entry in entries]

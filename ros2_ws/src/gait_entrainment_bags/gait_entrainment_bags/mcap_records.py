@@ -31,6 +31,7 @@ from gait_entrainment_bags.metadata import TopicInfo, topic_of
 BROKEN = (McapError, ZstdError, struct.error, ValueError, OverflowError, RuntimeError, MemoryError)
 RECORD = struct.Struct("<BQ")  # opcode, length of the content
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
+_WHOLE_MESSAGE = struct.Struct("<BQHIQQ")  # the two together
 _CHUNK = struct.Struct("<QQQII")  # start, end, size, checksum, length of the compression's name
 _CHUNK_INDEX = struct.Struct("<QQQQI")  # start, end, offset, length, length of the offsets
 _INDEX_OFFSET = struct.Struct("<HQ")  # channel, offset of its message index
@@ -168,13 +169,14 @@ def parse_indexed_message(
     records: bytes, offset: int, log_time: int, place: int, names: Mapping[int, str]
 ) -> BagMessage:
     """Parse the message that an index says is at an offset."""
-    if offset + RECORD.size <= len(records):
-        opcode, length = RECORD.unpack_from(records, offset)
-        start = offset + RECORD.size
-        if opcode == Opcode.MESSAGE and start + length <= len(records):
-            message = parse_message(records, start, start + length, place, names)
-            if message is not None and message.log_time == log_time:
-                return message
+    if offset + _WHOLE_MESSAGE.size <= len(records):
+        fields = _WHOLE_MESSAGE.unpack_from(records, offset)
+        opcode, length, channel, _, found, publish_time = fields
+        start, stop = offset + RECORD.size, offset + RECORD.size + length
+        complete = _MESSAGE.size <= length and stop <= len(records)
+        if complete and opcode == Opcode.MESSAGE and found == log_time and channel in names:
+            data = records[offset + _WHOLE_MESSAGE.size : stop]
+            return BagMessage(found, place + start, names[channel], publish_time, data)
     raise ValueError("it does not match its message index")
 
 

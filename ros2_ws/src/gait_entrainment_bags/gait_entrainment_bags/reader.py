@@ -106,15 +106,14 @@ class BagReader(AbstractContextManager["BagReader"]):
         pending: list[BagMessage] = []  # sorted
         plan = self._plan(wanted, start, end)
         for number, (rank, file, chunk, names) in enumerate(plan):
-            found = file.messages(chunk, rank, names)
+            found = file.messages(chunk, rank, names, start, end)
             if any(message.log_time < chunk.start for message in found):
                 raise file.damage(chunk.offset, "the chunk does not match its index")
             given += len(found)
             pending += found
             pending.sort()
-            settled = len(pending)
-            if number + 1 < len(plan):
-                settled = bisect_left(pending, (plan[number + 1][2].start,))
+            following = plan[number + 1][2].start if number + 1 < len(plan) else math.inf
+            settled = bisect_left(pending, (following,))
             for message in pending[:settled]:
                 if start <= message.log_time < end:
                     yield message

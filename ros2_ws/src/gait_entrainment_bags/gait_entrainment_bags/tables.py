@@ -6,7 +6,7 @@
 import json
 import shutil
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from itertools import chain, islice
 from operator import attrgetter, itemgetter
@@ -34,7 +34,7 @@ STANDARD_UNITS = {
 }
 _INSTANTS = ("builtin_interfaces/Time", "builtin_interfaces/Duration")
 _ROWS_AT_ONCE = 65536
-_Getter = Callable[[Any], Any]
+_Get = Callable[[Any], Any]
 
 
 class ExportError(BagError):
@@ -52,8 +52,11 @@ class Column:
     name: str
     unit: str
     kind: str  # float64, int64, uint64, bool_ or string, as pyarrow names them
-    value: _Getter
+    value: _Get
     is_list: bool = False
+
+
+_TIMES = [Column(name, "ns", "uint64", attrgetter(name)) for name in ("log_time", "publish_time")]
 
 
 def export(
@@ -114,16 +117,21 @@ def _write_table(reader: BagReader, topic: TopicInfo, file: Path) -> None:
     decode = decoder_for(topic)
     messages = reader.messages([topic.name])
     first = next(messages)
-    rows = ((m.log_time, m.publish_time, decode(m.data)) for m in chain([first], messages))
+    messages = chain([first], messages)
     try:
         columns = columns_of(topic, decode(first.data))
-        schema = arrow.schema([_arrow_field(arrow, column, is_csv) for column in columns])
+        if is_csv:
+            columns = [_as_text(column) if column.is_list else column for column in columns]
+        schema = arrow.schema([_arrow_field(arrow, column, is_csv) for column in _TIMES + columns])
         with (csv.CSVWriter if is_csv else parquet.ParquetWriter)(file, schema) as writer:
-            while batch := list(islice(rows, _ROWS_AT_ONCE)):
+            while batch := list(islice(messages, _ROWS_AT_ONCE)):
+                decoded = [decode(message.data) for message in batch]
+                cells = [list(map(column.value, batch)) for column in _TIMES]
+                cells += [list(map(column.value, decoded)) for column in columns]
                 # A NaN is an empty cell in CSV, which is what `from_pandas` makes of it.
                 arrays = [
-                    arrow.array(_cells(column, batch, is_csv), field.type, from_pandas=is_csv)
-                    for column, field in zip(columns, schema, strict=True)
+                    arrow.array(column, field.type, from_pandas=is_csv)
+                    for column, field in zip(cells, schema, strict=True)
                 ]
                 writer.write_table(arrow.Table.from_arrays(arrays, schema=schema))
     except IndexError:  # the decoder gives fewer bytes than an array has where a message ends
@@ -148,14 +156,12 @@ def _arrow_field(arrow: Any, column: Column, is_csv: bool) -> Any:
         name = f"{name} [{column.unit}]"
     elif column.unit:
         metadata = {"unit": column.unit}
-    if column.is_list:
-        kind = arrow.string() if is_csv else arrow.list_(kind)
-    return arrow.field(name, kind, metadata=metadata)
+    return arrow.field(name, arrow.list_(kind) if column.is_list else kind, metadata=metadata)
 
 
-def _cells(column: Column, rows: list[Any], is_csv: bool) -> list[Any]:
-    values = map(column.value, rows)
-    return list(map(json.dumps, values) if is_csv and column.is_list else values)
+def _as_text(column: Column) -> Column:
+    """Turn a column of lists into one of JSON."""
+    return replace(column, kind="string", value=_then(column.value, json.dumps), is_list=False)
 
 
 def _import_pyarrow() -> list[Any]:
@@ -167,30 +173,26 @@ def _import_pyarrow() -> list[Any]:
 
 
 def columns_of(topic: TopicInfo, example: Any) -> list[Column]:
-    """Lay out the table of a topic: rows of log time, publish time, message (as the example)."""
+    """Lay out the columns of a topic, whose messages have elements of the example's names."""
     parts = schema_parts(topic.type, topic.schema_text)
-    return [
-        Column("log_time", "ns", "uint64", itemgetter(0)),
-        Column("publish_time", "ns", "uint64", itemgetter(1)),
-        *_columns(parts, next(iter(parts)), "", "", itemgetter(2), example),
-    ]
+    return list(_columns(parts, next(iter(parts)), "", "", None, example))
 
 
 def _columns(
-    parts: dict[str, str], type_name: str, prefix: str, outer_unit: str, get: _Getter, example: Any
+    parts: dict[str, str], type_name: str, prefix: str, outer: str, get: _Get | None, example: Any
 ) -> Iterator[Column]:
-    """Lay out the columns of the fields of a type, of which `get` takes a value from a row."""
+    """Lay out the columns of a type; `get` takes a value of it from a message (None: itself)."""
     fields = list(fields_of(parts[type_name], type_name.partition("/")[0]))
     names = _element_names(fields, example)
     for field in fields:
         path = prefix + field.name
-        unit = STANDARD_UNITS.get((type_name, field.name), field.unit) or outer_unit
+        unit = STANDARD_UNITS.get((type_name, field.name), field.unit) or outer
         value = _then(get, attrgetter(field.name))
         found = getattr(example, field.name)
         if field.length == -1:
             if names and field.type == "float64" and len(found) == len(names):
                 for number, name in enumerate(names):
-                    item = _named_item(get, value, names, number)
+                    item = _named_item(_then(get, attrgetter("name")), value, names, number)
                     yield Column(f"{path}.{name}", unit, "float64", item)
             elif not names or field.name != "name":
                 yield _column(field, path, unit, value)
@@ -217,7 +219,7 @@ def _element_names(fields: list[Field], example: Any) -> list[str]:
     return list(example.name) if by_name else []
 
 
-def _column(field: Field, path: str, unit: str, value: _Getter) -> Column:
+def _column(field: Field, path: str, unit: str, value: _Get) -> Column:
     """Lay out one column: of values, or of lists if the field is an array of any length."""
     is_list = field.length == -1
     if field.type in _INSTANTS:
@@ -230,14 +232,14 @@ def _column(field: Field, path: str, unit: str, value: _Getter) -> Column:
     return Column(path, unit, kind, _then(value, list) if is_list else value, is_list)
 
 
-def _then(get: _Getter, step: _Getter) -> _Getter:
-    return lambda row: step(get(row))
+def _then(get: _Get | None, step: _Get) -> _Get:
+    return step if get is None else lambda message: step(get(message))
 
 
-def _named_item(get: _Getter, value: _Getter, names: list[str], number: int) -> _Getter:
-    def item(row: Any) -> Any:
-        values = value(row)
-        if get(row).name != names or len(values) != len(names):
+def _named_item(get_names: _Get, value: _Get, names: list[str], number: int) -> _Get:
+    def item(message: Any) -> Any:
+        values = value(message)
+        if get_names(message) != names or len(values) != len(names):
             raise _ChangedNamesError
         return values[number]
 

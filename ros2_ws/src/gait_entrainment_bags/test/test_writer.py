@@ -6,11 +6,13 @@ import os
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 from mcap.reader import make_reader
+from mcap.writer import Writer
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.interfaces import QosDurability, QosHistory, QosReliability
 from rosbags.rosbag2 import Reader
@@ -28,6 +30,7 @@ from gait_entrainment_bags import (
     recover,
 )
 from gait_entrainment_bags import writer as writer_module
+from gait_entrainment_bags.chunk_writer import ChunkWriter
 
 ODD_QOS = QosProfile(
     history="unknown",
@@ -115,6 +118,26 @@ def test_mcap_library_decodes_by_the_text_in_the_bag(
         assert summary is not None
         assert summary.statistics is not None
         assert summary.statistics.chunk_count > 5
+
+
+@pytest.mark.parametrize("compression", ["zstd", "none"])
+def test_files_are_those_of_the_mcap_library_to_the_byte(
+    tmp_path: Path, compression: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written = []
+    for folder, kind in (("ours", ChunkWriter), ("theirs", Writer)):
+        monkeypatch.setattr(writer_module, "ChunkWriter", kind)
+        bag = tmp_path / folder / "bag"
+        bag.parent.mkdir()
+        with BagWriter(bag, ros_distro="jazzy", chunk_size=3000, compression=compression) as w:
+            for number in range(300):
+                name = f"/noise_{number // 100}"  # announced between messages
+                if number % 100 == 0:
+                    w.add_topic(replace(NOISE, name=name))
+                # Log times that go back, within a chunk and over its border.
+                w.write(name, bytes(number), 10**18 + number * 7 % 90, 10**18 + number)
+        written.append((bag / "bag_0.mcap").read_bytes())
+    assert written[0] == written[1]
 
 
 def test_folder_is_never_overwritten(tmp_path: Path) -> None:

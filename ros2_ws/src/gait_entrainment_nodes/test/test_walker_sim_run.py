@@ -4,6 +4,7 @@
 """One run of the walker: promises in time, late, missing, stopped; without a node."""
 
 import math
+import time
 
 import pytest
 
@@ -128,15 +129,16 @@ def test_walker_that_falls_and_one_that_is_shut_down_say_so():
 
 
 def test_in_real_time_nothing_comes_before_it_is_due(real_time, clock):
+    assert real_time.due() == 1.0
     real_time.promise(profile(0, SECOND), False)
     assert list(real_time.walk()) == []
-    assert real_time.due() == 1.0
+    assert real_time.due() == 0.999
     clock.now = SECOND + 15 * MILLISECOND
     stretch, report = real_time.walk()
     assert list(stretch.sample_times) == [0, 10 * MILLISECOND]
     assert report.grant == 0
-    # The next sample is due before the next report.
-    assert real_time.due() == 1.02
+    # The next sample is due with the next report.
+    assert real_time.due() == 1.019
     clock.now = SECOND + 20 * MILLISECOND
     stretch, report = real_time.walk()
     assert list(stretch.sample_times) == []  # torque at 20 ms belongs to what comes after
@@ -147,6 +149,37 @@ def test_in_real_time_nothing_comes_before_it_is_due(real_time, clock):
     timing = real_time.timing()
     assert timing.samples == 3
     assert timing.publish_late_worst == pytest.approx(0.015)
+
+
+def test_in_real_time_what_is_promised_is_walked_before_it_is_due(real_time, clock):
+    real_time.promise(profile(0, 15 * MILLISECOND, torque=5.0), False)
+    clock.now = SECOND - MILLISECOND
+    walk = real_time.walk()
+    assert list(next(walk).sample_times) == [0]
+    clock.now = SECOND + 100_000  # it has been sent
+    (report,) = walk
+    assert report.samples == 1
+    assert real_time.due() == pytest.approx(1.009)
+    clock.now = SECOND + 9 * MILLISECOND
+    (stretch,) = real_time.walk()
+    assert list(stretch.sample_times) == [10 * MILLISECOND]
+    # A stop counts from what has been walked on; nothing is promised for the next sample.
+    real_time.stop(9 * MILLISECOND)
+    assert real_time.due() == 1.02
+    clock.now = SECOND + 20 * MILLISECOND
+    list(real_time.walk())
+    timing = real_time.timing()
+    assert timing.publish_late_worst == pytest.approx(0.0001)
+    assert timing.starved == pytest.approx(0.005)
+
+
+def test_what_was_walked_early_waits_until_it_is_due():
+    begin = time.monotonic_ns()
+    run = RealTimeRun(3, walker(), START, due_at=begin + 20 * MILLISECOND)
+    run.promise(profile(0, SECOND), False)
+    run.walker.advance(1)
+    run.wait()
+    assert time.monotonic_ns() >= begin + 20 * MILLISECOND
 
 
 def test_stretch_without_a_promise_is_walked_without_torque_and_counted_once(real_time, clock):

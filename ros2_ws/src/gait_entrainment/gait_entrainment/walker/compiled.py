@@ -26,19 +26,19 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 def _load_numba() -> Any:
     """
-    Load numba without the package coverage, which would take a tenth of the start of a command.
+    Load numba without what the walker has no use for, which would slow the start of a command.
 
-    Numba uses coverage only while that measures, and then it is loaded already. A None among the
-    modules is how Python is told not to find one.
+    Numba uses coverage only while that measures, and scipy's BLAS only for products of matrices.
+    A None among the modules is how Python is told not to find one.
     """
-    idle = "coverage" not in sys.modules
-    if idle:
-        sys.modules["coverage"] = None  # type: ignore[assignment]
+    hidden = [name for name in ("coverage", "scipy.linalg") if name not in sys.modules]
+    sys.modules.update(dict.fromkeys(hidden))  # type: ignore[arg-type]
     try:
         import numba
+        import numba.np.arraymath  # what looks for BLAS; else it would be loaded at the first step
     finally:
-        if idle:
-            del sys.modules["coverage"]
+        for name in hidden:
+            del sys.modules[name]
     return numba
 
 

@@ -121,9 +121,7 @@ def _check(options: argparse.Namespace) -> int:
         findings = check(bag)
         broken |= any(finding.severity is Severity.ERROR for finding in findings)
         if options.json:
-            rules = [
-                asdict(finding) | {"severity": finding.severity.value} for finding in findings
-            ]
+            rules = [asdict(found) | {"severity": found.severity.value} for found in findings]
             print(json.dumps({"bag": str(bag), "findings": rules}))
             continue
         for finding in findings:

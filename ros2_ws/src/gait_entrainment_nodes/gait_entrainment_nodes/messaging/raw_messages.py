@@ -14,7 +14,7 @@ on a whole stretch of samples becomes one array of bytes.
 """
 
 import importlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from functools import cache, reduce
 from typing import Any
 
@@ -148,9 +148,9 @@ class MessageTemplate:
             }
         )
 
-    def fill(self, stamps: np.ndarray, *columns: np.ndarray) -> Iterator[bytes]:
+    def fill(self, stamps: np.ndarray, *columns: np.ndarray) -> list[bytes]:
         """
-        Yield one serialized message per sample.
+        Return one serialized message per sample.
 
         Parameters
         ----------
@@ -166,5 +166,4 @@ class MessageTemplate:
         for name, values in zip(self._fields, columns, strict=True):
             rows[name] = values
         content, size = table.tobytes(), table.shape[1]
-        for begin in range(0, len(content), size):
-            yield content[begin : begin + size]
+        return [content[begin : begin + size] for begin in range(0, len(content), size)]

@@ -24,54 +24,40 @@ from visualization_msgs.msg import MarkerArray
 from gait_entrainment import topic_names
 from gait_entrainment_msgs import msg
 
+
+def quality(
+    depth: int | None = None, *, reliable: bool = True, lasting: bool = False
+) -> QoSProfile:
+    """
+    Return a quality of service.
+
+    Of the messages so many are kept, or all; ``reliable`` ones are repeated until they arrive, and
+    ``lasting`` ones reach who joins late.
+    """
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_ALL if depth is None else HistoryPolicy.KEEP_LAST,
+        depth=depth or 0,
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if lasting else DurabilityPolicy.VOLATILE,
+    )
+
+
 # Nothing may be lost: a writer waits for its slowest reader instead of overwriting.
-EVERY_MESSAGE = QoSProfile(
-    history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE, depth=0
-)
+EVERY_MESSAGE = quality()
 # In real time nobody is waited for: what a reader has not taken for so many messages, 2 s of
 # samples at 1 kHz, is lost to it, and the recorder tells a loss by the counts.
-EVERY_MESSAGE_IN_REAL_TIME = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.RELIABLE, depth=2_048
-)
+EVERY_MESSAGE_IN_REAL_TIME = quality(2048)
 # The latest state matters, also to who joins late. The writer keeps more than that, so that a
 # recorder which is briefly behind misses nothing.
-LATEST_STATE = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST,
-    depth=1000,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
-# What rqt and the aggregator expect of /diagnostics.
-DIAGNOSTICS_QOS = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST, depth=100, reliability=ReliabilityPolicy.RELIABLE
-)
-# What tf2, robot_state_publisher and RViz expect of what is drawn. Nobody waits for a viewer.
-DRAWING = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST, depth=100, reliability=ReliabilityPolicy.RELIABLE
-)
-LATEST_DESCRIPTION = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST,
-    depth=1,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
+LATEST_STATE = quality(1000, lasting=True)
+# What rqt expects of /diagnostics, tf2 and RViz of what is drawn. Nobody waits for a viewer.
+VIEWED = quality(100)
+# What was said before somebody joined counts too: a description, a button that was pressed.
+SAID_ONCE = quality(1, lasting=True)
 # For who only looks on: the writer never waits for it. It holds a stretch of a lock-step run.
-LOOKING_ON = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST, depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT
-)
-
-
-# A button that was pressed before somebody joined counts too.
-LATCHED_STATE = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST,
-    depth=1,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
+LOOKING_ON = quality(1000, reliable=False)
 # Only the latest sign of life counts, and nobody waits for anybody.
-HEARTBEAT = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST, depth=1, reliability=ReliabilityPolicy.BEST_EFFORT
-)
+HEARTBEAT = quality(1, reliable=False)
 
 
 class Topic(NamedTuple):
@@ -95,7 +81,7 @@ PULSES = Topic(topic_names.PULSES, msg.TorquePulse)
 ROBOT_STATE = Topic(topic_names.ROBOT_STATE, msg.AnkleRobotState)
 ROBOT_SETUP = Topic(topic_names.ROBOT_SETUP, msg.AnkleRobotSetup, LATEST_STATE)
 TROUBLE = Topic(topic_names.TROUBLE, msg.Trouble)
-EMERGENCY_STOP = Topic(topic_names.EMERGENCY_STOP, Bool, LATCHED_STATE)
+EMERGENCY_STOP = Topic(topic_names.EMERGENCY_STOP, Bool, SAID_ONCE)
 
 OPERATOR_HEARTBEAT = Topic(topic_names.OPERATOR_HEARTBEAT, Empty, HEARTBEAT)
 
@@ -108,9 +94,9 @@ ENTRAINMENT = Topic(topic_names.ENTRAINMENT, msg.Entrainment, LATEST_STATE)
 
 RECORDER_PROGRESS = Topic(topic_names.RECORDER_PROGRESS, msg.Progress)
 PUBLISHED_COUNTS = Topic(topic_names.PUBLISHED_COUNTS, msg.PublishedCounts)
-DIAGNOSTICS = Topic(topic_names.DIAGNOSTICS, DiagnosticArray, DIAGNOSTICS_QOS)
+DIAGNOSTICS = Topic(topic_names.DIAGNOSTICS, DiagnosticArray, VIEWED)
 
 # tf2 has one topic for a whole system; instances differ in their frames.
-TF = Topic(topic_names.TF, TFMessage, DRAWING)
-ROBOT_DESCRIPTION = Topic(topic_names.ROBOT_DESCRIPTION, String, LATEST_DESCRIPTION)
-MARKERS = Topic(topic_names.MARKERS, MarkerArray, DRAWING)
+TF = Topic(topic_names.TF, TFMessage, VIEWED)
+ROBOT_DESCRIPTION = Topic(topic_names.ROBOT_DESCRIPTION, String, SAID_ONCE)
+MARKERS = Topic(topic_names.MARKERS, MarkerArray, VIEWED)

@@ -18,7 +18,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import HistoryPolicy, QoSProfile
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment.messages import nanoseconds_of
@@ -349,12 +349,8 @@ def _offer(topic: TopicInfo) -> QoSProfile:
     best_effort = topic.qos_profiles and all(
         qos.reliability == "best_effort" for qos in topic.qos_profiles
     )
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST if lasting or best_effort else HistoryPolicy.KEEP_ALL,
-        depth=KEPT,
-        reliability=ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if lasting else DurabilityPolicy.VOLATILE,
-    )
+    kept = KEPT if lasting or best_effort else None
+    return topics.quality(kept, reliable=not best_effort, lasting=lasting)
 
 
 def main() -> int:

@@ -4,10 +4,10 @@
 """
 bag_recorder: records topics into an MCAP bag that rosbag2 opens, and says what it missed.
 
-Messages are taken and written as bytes, never decoded. In lock-step it sends the walker's
-progress back once everything that it covers is written. At the end of a run it compares its
-counts with those of the publishers. If the disk is full the recording ends, closed and readable;
-the run goes on unless the record is required.
+Messages are taken and written as bytes, many at a time, never decoded. In lock-step it sends the
+walker's progress back once everything that it covers is written. At the end of a run it compares
+its counts with those of the publishers. If the disk is full the recording ends, closed and
+readable; the run goes on unless the record is required.
 """
 
 import json
@@ -17,10 +17,11 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
@@ -40,9 +41,14 @@ from gait_entrainment_nodes.messaging.raw_messages import message_class
 from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.parameters import texts
 from gait_entrainment_nodes.nodes.participant import Participant
+from gait_entrainment_nodes.nodes.rclpy_internals import RawReader
 
 # How often new topics are looked for and data is brought to the file [s].
 CARE_PERIOD = 0.2
+# How often messages are taken [s]; and while one that a progress covers is still on its way.
+TAKE_PERIOD, COVERED_TAKE_PERIOD = 0.01, 0.001
+# How many of a topic are taken at once, so that no topic waits long for another.
+MOST_AT_ONCE = 1000
 # How long to wait, after the end of a run, for messages and counts still on their way [s].
 CLOSING_TIMEOUT = 5.0
 # A message that comes behind one with a later stamp is logged with it, so that a player keeps the
@@ -93,6 +99,9 @@ class BagRecorder(Participant):
         self._progress_topic = name(topics.WALKER_PROGRESS.name)
         self._counts_topic = name(topics.PUBLISHED_COUNTS.name)
         self._own_topic = name(topics.RECORDER_PROGRESS.name)
+        self._clock_topic = name(topics.CLOCK.name)
+        self._simulated = bool(self.get_parameter("use_sim_time").value)
+        self._heard_clock = 0  # the latest time on that topic [ns]
         sampled = (topics.JOINT_STATES, topics.ANKLE_TORQUE, *topics.GROUND_REACTION)
         # What a progress message covers, and its field that says how much.
         self._covered = {name(topics.GAIT_EVENTS.name): "events"}
@@ -111,7 +120,8 @@ class BagRecorder(Participant):
         self._progress: Progress | None = None  # not acknowledged yet
         self._published: dict[str, dict[str, int]] = {}  # by node: final count by topic
         self._final_at: float | None = None  # when the end of the run was heard of, steady time
-        self._care_at = time.monotonic()
+        self._care_at = self._take_at = time.monotonic()
+        self._readers: list[tuple[RawReader, Callable[[bytes, int], None]]] = []
 
     def _make_bag(self) -> BagWriter:
         """Return the bag to write; raises ValueError if there cannot be one."""
@@ -165,21 +175,34 @@ class BagRecorder(Participant):
         )
         reliable = all(o.reliability == ReliabilityPolicy.RELIABLE for o in offers)
         lasting = all(o.durability == DurabilityPolicy.TRANSIENT_LOCAL for o in offers)
-        self.create_subscription(
-            message_type,
-            name,
-            self._writer_for(name, definition),
-            QoSProfile(
-                history=HistoryPolicy.KEEP_ALL,
-                reliability=(
-                    ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
-                ),
-                durability=(
-                    DurabilityPolicy.TRANSIENT_LOCAL if lasting else DurabilityPolicy.VOLATILE
-                ),
-            ),
-            raw=True,
-        )
+        qos = topics.quality(reliable=reliable, lasting=lasting)
+        record = self._writer_for(name, definition)
+        if name != self._progress_topic:
+            self._readers.append((RawReader(self, message_type, name, qos), record))
+            return
+
+        def record_progress(data: bytes) -> None:
+            received = time.time_ns()
+            self._take_messages()  # what it covers was sent before it
+            record(data, received)
+            self._take_messages()
+
+        self.create_subscription(message_type, name, record_progress, qos, raw=True)
+
+    def _take_messages(self) -> None:
+        """Record what has come, in the order in which it came."""
+        taken, full = [], False
+        for reader, record in self._readers:
+            found = reader.take(MOST_AT_ONCE)
+            full |= len(found) == MOST_AT_ONCE
+            taken += [(received, record, data) for received, data in found]
+        taken.sort(key=itemgetter(0))
+        for received, record, data in taken:
+            record(data, received)
+        if self._progress is not None:
+            self._acknowledge_progress()
+        period = TAKE_PERIOD if self._progress is None else COVERED_TAKE_PERIOD
+        self._take_at = time.monotonic() + (0.0 if full else period)
 
     def _note_offers(self, name: str) -> None:
         """
@@ -201,26 +224,26 @@ class BagRecorder(Participant):
                 "the recording of this topic began as reliable"
             )
 
-    def _writer_for(self, name: str, definition: Definition) -> Callable[[bytes], None]:
-        """Return the callback that writes the messages of one topic."""
+    def _writer_for(self, name: str, definition: Definition) -> Callable[[bytes, int], None]:
+        """Return what writes a message of one topic, and when it was received [ns]."""
         stamped = definition.type not in _BY_WALL_CLOCK and _first_field(
             definition.schema_text
         ).startswith(_STAMPED)
-        write, wall_clock, unpack = self._bag.write, time.time_ns, _STAMP.unpack_from
-        latest = self._latest
+        write, unpack, latest = self._bag.write, _STAMP.unpack_from, self._latest
         then = {
             self._progress_topic: self._on_progress,
             self._counts_topic: self._on_counts,
         }.get(name)
 
-        def record(data: bytes) -> None:
-            received = wall_clock()
+        def record(data: bytes, received: int) -> None:
             logged = 0
             if stamped:
                 sec, nanosec = unpack(data, 4)
                 logged = sec * NANOSECONDS_PER_SECOND + nanosec
+            if name == self._clock_topic:
+                self._heard_clock = logged
             if logged <= 0:
-                logged = self.get_clock().now().nanoseconds
+                logged = self._ros_time(received)
             if logged <= 0 or self._early:
                 self._record_early(logged, name, data, received)
             if logged > 0 and not self._broken_off:
@@ -234,10 +257,15 @@ class BagRecorder(Participant):
                     self._break_off(error)
             if then is not None:
                 then(data)
-            if self._progress is not None:
-                self._acknowledge_progress()
 
         return record
+
+    def _ros_time(self, received: int) -> int:
+        """Return the ROS time [ns] at which a message was received; it is taken later."""
+        if not self._simulated:
+            return received
+        recorded = self._clock_topic in self._bag.counts
+        return self._heard_clock if recorded else self.get_clock().now().nanoseconds
 
     def _record_early(self, logged: int, name: str, data: bytes, received: int) -> None:
         """Keep a message from before ROS time began, or record those once it has begun."""
@@ -306,11 +334,14 @@ class BagRecorder(Participant):
         }
 
     def next_deadline(self) -> float:
-        """Return when to look after topics and the file."""
-        return self._care_at
+        """Return when to take messages, or to look after topics and the file."""
+        return min(self._take_at, self._care_at)
 
     def on_deadline(self) -> None:
-        """Look after topics and the file, and end once everything is there."""
+        """Record what has come; now and then look after topics, the file and the end."""
+        self._take_messages()
+        if time.monotonic() < self._care_at:
+            return
         closing = self._final_at is not None and bool(self._expected)
         self._care_at = time.monotonic() + (0.01 if closing else CARE_PERIOD)
         self._care()
@@ -343,6 +374,9 @@ class BagRecorder(Participant):
 
     def on_stop(self) -> None:
         """Close the bag, with what was lost written into it, and say how much was written."""
+        self._take_messages()
+        for reader, _ in self._readers:
+            reader.destroy()
         if self._early and not self._broken_off:
             # ROS time never began: the wall clock is the only one there is.
             self._record_early(max(self._latest.values(), default=self._early[0][2]), "", b"", 0)

@@ -39,7 +39,7 @@ class WalkerRun:
         self._walker = Walker(parameters, first_heel_strike)
         self._sampled = sample_rate is not None
         self._period = NANOSECONDS_PER_SECOND / sample_rate if sample_rate else None
-        self._promised = 0
+        self.promised = 0  # torque is promised up to this instant [ns]
         self.reached = 0  # everything up to this instant has been walked [ns]
         self.events = 0  # gait events so far
         self.samples = 0  # samples so far
@@ -65,8 +65,8 @@ class WalkerRun:
         """
         if not profile.has_length:
             return 0
-        profile.check(self._promised)
-        self._promised = profile.valid_until
+        profile.check(self.promised)
+        self.promised = profile.valid_until
         late = max(min(self.reached, profile.valid_until) - profile.times[0], 0)
         self.late += late
         if profile.valid_until > self.reached:
@@ -82,7 +82,7 @@ class WalkerRun:
         """Walk up to an instant [ns]; with ``last`` the run is over then."""
         begin = self.reached
         transitions = self._walker.advance(until)
-        self.starved += max(until - max(begin, self._promised), 0)
+        self.starved += max(until - max(begin, self.promised), 0)
         ending = self._walker.ending
         self.reached = until if ending is None else min(nanoseconds(ending.time), until)
         self.ended = last or ending is not None

@@ -152,8 +152,11 @@ class WalkerSim(Participant):
         assert run is not None
         for walked in run.walk():
             if isinstance(walked, Stretch):
+                samples = self._serialized(run, walked)
+                run.wait()
                 self._send_events(run, walked)
-                self._send_samples(run, walked)
+                for publisher, messages in zip(self._sampled, samples, strict=False):
+                    publisher.publish_all(messages)
             elif isinstance(walked, Starved):
                 what = (
                     "no torque profile in time: from here to the next one it is walked without "
@@ -182,23 +185,20 @@ class WalkerSim(Participant):
                 )
             )
 
-    def _send_samples(self, run: Run, stretch: Stretch) -> None:
+    def _serialized(self, run: Run, stretch: Stretch) -> list[list[bytes]]:
+        """Return the messages of the samples of a stretch, by topic; empty if it has none."""
         samples = stretch.samples
         if samples is None:
-            return
+            return []
         stamps = stretch.sample_times + run.start
-        # From (x, z) to (x, y, z), by foot.
-        forces = np.moveaxis(np.insert(samples.ground_reaction, 1, 0.0, axis=-1), 1, 0)
         joints = (samples.position, samples.velocity, samples.effort)
         torques = (samples.intrinsic_torque, samples.delivered_torque, samples.effective_torque)
-        messages = (
-            self._joints.fill(stamps, *joints),
-            self._torques.fill(stamps, *torques),
-            *(self._force.fill(stamps, of_foot) for of_foot in forces),
-        )
-        # The forces are left out if nobody wants them.
-        for publisher, filled in zip(self._sampled, messages, strict=False):
-            publisher.publish_all(filled)
+        messages = [self._joints.fill(stamps, *joints), self._torques.fill(stamps, *torques)]
+        if self.settings.ground_reaction:
+            # From (x, z) to (x, y, z), by foot.
+            forces = np.moveaxis(np.insert(samples.ground_reaction, 1, 0.0, axis=-1), 1, 0)
+            messages += [self._force.fill(stamps, of_foot) for of_foot in forces]
+        return messages
 
     def _send_progress(self, run: Run, progress: msg.Progress) -> None:
         """Publish progress, and at the end of a run how it went."""

@@ -5,8 +5,8 @@
 One run of the simulated walker: takes promises, yields what is to be published, without a node.
 
 It never computes past the last promise of the perturbator. In lock-step every promised stretch is
-walked at once; in real time as the wall clock goes on, and a stretch for which no promise came in
-time is walked without torque and counted.
+walked at once; in real time as the wall clock goes on, a moment ahead of it where torque is
+promised. A stretch for which no promise came in time is walked without torque and counted.
 """
 
 import time
@@ -27,6 +27,9 @@ from gait_entrainment_nodes.nodes.walker_run import Stretch, WalkerRun
 UNACKNOWLEDGED_GRANTS = 2
 # Real time: how often progress is reported and promises are asked for [ns].
 PROGRESS_PERIOD = 20_000_000
+# Real time: so long before it is due what is promised is walked and made ready to be sent [ns]. A
+# stop that comes meanwhile ends the torque at the end of what has been walked.
+HEAD_START = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,9 @@ class Run:
     def walk(self) -> Iterator[Stretch | Starved | Progress]:
         """Walk as far as is allowed now; what is yielded is published before the next is made."""
         raise NotImplementedError
+
+    def wait(self) -> None:
+        """Wait until the stretch that was yielded may be published."""
 
     def promise(self, profile: TorqueProfile, last: bool) -> int:
         """
@@ -168,21 +174,38 @@ class RealTimeRun(Run):
         # If the last promise comes late, its end is already past.
         self._end = max(until, self.walker.reached) if last else None
 
+    @property
+    def _next(self) -> int:
+        """When a sample, a report or the end of the run is due next [ns since its start]."""
+        due = min(self.walker.next_sample, self._next_progress)
+        return due if self._end is None else min(due, self._end)
+
+    @property
+    def _ready(self) -> int:
+        """When the walk up to that may begin [ns since the start of the run]."""
+        return self._next - (HEAD_START if self.walker.promised > self._next else 0)
+
     def due(self) -> float | None:
         """See `Run`."""
-        due = min(self.walker.next_sample, self._next_progress)
-        if self._end is not None:
-            due = min(due, self._end)
-        return (self._due_at + due) / NANOSECONDS_PER_SECOND
+        return (self._due_at + self._ready) / NANOSECONDS_PER_SECOND
+
+    def wait(self) -> None:
+        """See `Run`."""
+        early = self._due_at + self.walker.reached - self._clock()
+        time.sleep(max(early, 0) / NANOSECONDS_PER_SECOND)
 
     def walk(self) -> Iterator[Stretch | Starved | Progress]:
         """See `Run`."""
         now = self._clock() - self._due_at
-        if now < 0:
+        if now < self._ready:
             return
         last = self._end is not None and now >= self._end
         starved = self.walker.starved
-        stretch = self.walker.advance(now if self._end is None else min(now, self._end), last=last)
+        # A sample is part of the stretch that goes on behind it.
+        until = now if now >= self._next else self._next + 1
+        stretch = self.walker.advance(
+            until if self._end is None else min(until, self._end), last=last
+        )
         yield stretch
         sent = self._clock() - self._due_at
         for instant in stretch.sample_times:
@@ -192,6 +215,7 @@ class RealTimeRun(Run):
             self.starved_stretches += 1
             self.reproducible = False
             yield Starved(self.walker.starved - starved)
-        if now >= self._next_progress or self.walker.ended:
-            self._next_progress = now - now % PROGRESS_PERIOD + PROGRESS_PERIOD
+        if self.walker.reached >= self._next_progress or self.walker.ended:
+            reached = self.walker.reached
+            self._next_progress = reached - reached % PROGRESS_PERIOD + PROGRESS_PERIOD
             yield self.progress()
