@@ -5,14 +5,13 @@
 
 import math
 import shutil
+import statistics
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-
-import numpy as np
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment.messages import nanoseconds_of
@@ -130,15 +129,16 @@ def _loop(robot: GuardedRobot) -> Point:
     _watch(robot, lambda: False, _WATCHED, stamps)
     if robot.faults:
         return Point("loop", False, "; ".join(f"{f.name}: {f.meaning}" for f in robot.faults))
-    gaps = np.array([b - a for a, b in pairwise(stamps)]) / NANOSECONDS_PER_SECOND
-    if not len(gaps):
+    period = 1 / robot.capabilities.state_rate
+    late = [(b - a) / NANOSECONDS_PER_SECOND - period for a, b in pairwise(stamps)]
+    if len(late) < 2:
         return Point("loop", False, "the device gave no reading")
-    late = gaps - 1 / robot.capabilities.state_rate
-    p50, p99, worst = 1e3 * np.quantile(late, (0.5, 0.99, 1.0))
+    percentiles = statistics.quantiles(late, n=100)
+    p50, p99, worst = (1e3 * value for value in (percentiles[49], percentiles[98], max(late)))
     found = f"commands late by {p50:.2f} ms (median), {p99:.2f} ms (99 %), {worst:.2f} ms (worst)"
     if refused := robot.scheduling_refused:
         found += f"; the system does not permit {refused}: docs/safety.md"
-    return Point("loop", bool(late.max() < _LATE), found)
+    return Point("loop", max(late) < _LATE, found)
 
 
 def _stop(robot: GuardedRobot, patience: float) -> Point:

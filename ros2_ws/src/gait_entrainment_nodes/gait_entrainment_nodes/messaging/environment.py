@@ -23,12 +23,13 @@ def dds_variables(*, real_time: bool) -> dict[str, str]:
     Return the environment variables that choose discovery and the Fast DDS profiles.
 
     They stay as the user has set them. The files say what the profiles are for; those of real
-    time are for one host, so a wider range of discovery keeps the others.
+    time are for one host, so whoever looks for peers on others keeps the common ones.
     """
     reach, file = "ROS_AUTOMATIC_DISCOVERY_RANGE", "FASTRTPS_DEFAULT_PROFILES_FILE"
     ours = str(shared_file(PACKAGE, "config/fastdds.xml"))
     chosen = {reach: os.environ.get(reach, "LOCALHOST"), file: os.environ.get(file, ours)}
-    if real_time and chosen == {reach: "LOCALHOST", file: ours}:
+    alone = chosen[reach] == "LOCALHOST" and not os.environ.get("ROS_STATIC_PEERS")
+    if real_time and alone and chosen[file] == ours:
         ours = str(shared_file(PACKAGE, "config/fastdds_real_time.xml"))
         return {reach: "SYSTEM_DEFAULT", file: ours}
     return chosen
