@@ -63,17 +63,7 @@ class GaitLimits:
 
 
 class GaitWatch:
-    """
-    Knows the person's own stride; says which strides can be, and when the gait has stopped.
-
-    Parameters
-    ----------
-    side
-        The leg whose strides are taken.
-    limits
-        What a stride can be.
-
-    """
+    """Knows the strides of a person's leg; says which can be, and when the gait has stopped."""
 
     def __init__(self, side: Side, limits: GaitLimits) -> None:
         self.side, self.limits = side, limits
