@@ -181,7 +181,7 @@ class GaitAnalyzer:
     def _numbered(self, onset: int) -> bool:
         """Number a pulse; return whether lags and verdicts begin anew with it."""
         latest, first = self._numbers.latest, self._numbers.number == 0
-        missing = self._numbers.place(onset)
+        missing = self._numbers.place(onset, self._unperturbed.mean)
         if missing == 0 or first:
             return False
         hole = Hole(latest, onset, f"{missing} pulse(s)") if missing else None

@@ -63,9 +63,9 @@ class PulseNumbers:
     """
     Numbers the pulses of a run; tells trains apart, and how many pulses of one are missing.
 
-    The period of a train is known once two intervals in a row agree, within a quarter, more than
-    any robot jitters. Then an interval of several periods has pulses missing in it; any other that
-    does not agree is the pause before another train.
+    The period of a train is known once an interval agrees with the one before or with the
+    unperturbed stride, within a quarter, more than any robot jitters. Then an interval of several
+    periods has pulses missing in it; any other is the pause before another train.
     """
 
     def __init__(self) -> None:
@@ -74,18 +74,22 @@ class PulseNumbers:
         self._periods = 0  # between the two
         self._steady = False  # whether the period is known
 
-    def place(self, onset: int) -> int | None:
-        """Take the next onset [ns]; return how many lack before it, None if a train begins."""
+    def place(self, onset: int, stride: float) -> int | None:
+        """
+        Take the next onset [ns]; return how many lack before it, None if a train begins.
+
+        ``stride`` is the unperturbed period [s], NaN if it is not known.
+        """
         steps = 1.0 if self.number else 0.0
         if self._periods:
             steps = (onset - self.latest) * self._periods / (self.latest - self._first)
-        whole = round(steps)
+        whole, interval = round(steps), (onset - self.latest) / NANOSECONDS_PER_SECOND
         self.latest = onset
         if not 1 <= whole <= (whole if self._steady else 1) or abs(steps - whole) > 0.25:
             self._first, self._periods, self._steady = onset, 0, False
             self.number += 1
             return None
-        self._steady = self._periods > 0
+        self._steady = self._periods > 0 or abs(interval - stride) < 0.25 * stride
         self._periods += whole
         self.number += whole
         return whole - 1
