@@ -55,9 +55,6 @@ def outcome_of(run: Run) -> dict[str, Any]:
     entrained = verdict is Verdict.ENTRAINED
     placed = [p for p in analysis.pulses if p.toe_off is not None]  # the others have no lag
     lags = [p.phase_lag for p in placed[-FINAL_PULSES:]]
-    plan = protocol.pulses  # NaN, which fits, if no train was planned
-    train_room = (plan.count + protocol.washout - plan.initial_phase) * run.measured_period
-    train_room -= (plan.count - 1) * run.pulse_period
     parameters = asdict(protocol)
     parameters["side"] = protocol.side.name.lower()
     parameters["pulses"]["torque"] = protocol.pulse_torque
@@ -74,7 +71,6 @@ def outcome_of(run: Run) -> dict[str, Any]:
                 }
                 for pulse in analysis.pulses
             ],
-            "train_fits": not train_room < plan.width,
             "verdict": verdict.name.lower(),
             "reason": reason.name.lower() if reason else None,
             "entrained": entrained,
@@ -114,8 +110,8 @@ def summary(outcome: dict[str, Any]) -> str:
     lines = [f"strides          {len(strides)}, pulses placed in them: {len(pulses)}"]
     if len(pulses) != planned:
         lines[0] += f" of {planned}"
-    if not outcome["train_fits"]:
-        lines[0] += "; the train is longer than the strides of the run: add washout strides"
+        if not outcome["holes"]:
+            lines[0] += "; the train is longer than the run: add washout strides"
     if strides:
         measured = "not measured" if unperturbed is None else f"{unperturbed:.4f} s"
         lines.append(f"stride period    {measured} unperturbed, {strides[-1]:.4f} s last")

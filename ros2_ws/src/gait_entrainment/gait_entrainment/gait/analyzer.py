@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from gait_entrainment.conventions import Side
+from gait_entrainment.gait.plausibility import GaitLimits
 from gait_entrainment.gait.pulse_phase import (
     LagFollower,
     PulseNumbers,
@@ -26,6 +27,8 @@ from gait_entrainment.gait.strides import (
 from gait_entrainment.gait.verdict import Entrainment, EntrainmentTest, VerdictSettings
 
 Result = Stride | PulsePhase | Entrainment
+# Whose strides they are is not known here: ten times smaller or larger than a person's.
+_ANYBODY = GaitLimits(stride_least=0.03, stride_most=50.0)
 
 
 @dataclass(slots=True)
@@ -61,7 +64,7 @@ class GaitAnalyzer:
     """
 
     def __init__(self, side: Side, settings: VerdictSettings | None = None) -> None:
-        self._tracker = StrideTracker(side)
+        self._tracker = StrideTracker(side, _ANYBODY)
         self._test = EntrainmentTest(settings or VerdictSettings())
         self._lags = LagFollower()
         self._unperturbed = UnperturbedPeriod()
@@ -150,8 +153,8 @@ class GaitAnalyzer:
         number = 0 if before is None else before.number
         if stride.number != number + 1:
             start = stride.start if before is None else before.end
-            missing = f"{stride.number - number - 1} stride(s)"
-            self._begin_anew(Hole(start, stride.start, missing))
+            lost = f"{stride.number - number - 1} stride(s)"
+            self._begin_anew(Hole(start, stride.start, lost))
             before = None
         if after is not None and after.number != stride.number + 1:
             after = None
@@ -159,7 +162,11 @@ class GaitAnalyzer:
         pulses: list[PulsePhase] = []
         judged = 0  # the first of them that neither a hole nor another train comes after
         for onset in onsets:
-            if self._numbered(onset):
+            latest = self._numbers.latest
+            missing = self._numbers.place(onset, unperturbed.mean)
+            if missing != 0:
+                hole = Hole(latest, onset, f"{missing} pulse(s)") if missing else None
+                self._begin_anew(hole, another_train=missing is None)
                 judged = len(pulses)
             if onset < stride.start:
                 self.pulse_counts.outside_strides += 1
@@ -177,16 +184,6 @@ class GaitAnalyzer:
             return list(pulses)
         entrainment = self._test.add(stride, pulses[judged:], unperturbed)
         return [*pulses, entrainment] if entrainment else list(pulses)
-
-    def _numbered(self, onset: int) -> bool:
-        """Number a pulse; return whether lags and verdicts begin anew with it."""
-        latest, first = self._numbers.latest, self._numbers.number == 0
-        missing = self._numbers.place(onset, self._unperturbed.mean)
-        if missing == 0 or first:
-            return False
-        hole = Hole(latest, onset, f"{missing} pulse(s)") if missing else None
-        self._begin_anew(hole, another_train=missing is None)
-        return True
 
     def _begin_anew(self, hole: Hole | None, *, another_train: bool = False) -> None:
         """Follow lags and form verdicts anew: after a hole, known already if None, or a train."""

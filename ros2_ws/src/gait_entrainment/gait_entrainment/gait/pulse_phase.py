@@ -27,10 +27,9 @@ class PulsePhase:
 
 def depends_on_next_toe_off(onset: int, stride: Stride) -> bool:
     """
-    Whether a toe-off of the next stride could be nearer to an onset than that of its own stride.
+    Whether the next stride's toe-off could be nearer to an onset than that of its own stride.
 
-    The next toe-off comes after the closing heel strike, so an onset that is at least as near to
-    its own toe-off as to that strike needs no look ahead.
+    It comes after the closing heel strike, so an onset nearer to its own needs no look ahead.
     """
     return stride.toe_off is not None and onset - stride.toe_off > stride.end - onset
 
@@ -75,11 +74,7 @@ class PulseNumbers:
         self._steady = False  # whether the period is known
 
     def place(self, onset: int, stride: float) -> int | None:
-        """
-        Take the next onset [ns]; return how many lack before it, None if a train begins.
-
-        ``stride`` is the unperturbed period [s], NaN if it is not known.
-        """
+        """Take an onset [ns]; return how many lack before it, None if another train begins."""
         steps = 1.0 if self.number else 0.0
         if self._periods:
             steps = (onset - self.latest) * self._periods / (self.latest - self._first)
@@ -88,7 +83,7 @@ class PulseNumbers:
         if not 1 <= whole <= (whole if self._steady else 1) or abs(steps - whole) > 0.25:
             self._first, self._periods, self._steady = onset, 0, False
             self.number += 1
-            return None
+            return None if self.number > 1 else 0
         self._steady = self._periods > 0 or abs(interval - stride) < 0.25 * stride
         self._periods += whole
         self.number += whole

@@ -24,8 +24,7 @@ class GaitEvent:
 
     Step numbers identify events, whatever order they arrive in: heel strike n closes step n, and
     the toe-off of step n is the one that begins its swing, between heel strikes n - 1 and n. Both
-    are of the leg that swings. A run starts with heel strike 0. A source that cannot number its
-    steps in this way is out of scope: without numbers a missing event looks like a long step.
+    are of the leg that swings. A run starts with heel strike 0. A source must number its steps so.
     """
 
     stamp: int  # instant of the event [ns since the start of the run]
@@ -145,15 +144,11 @@ class StrideTracker:
         """Drop an event, unless a stride of dropped ones fits together: then go on with those."""
         if self._rival is None or self._rival._fate(event) != "accepted":
             self._rival = StrideTracker(self.side, self.watch.limits)
-        rival, counts = self._rival, self.counts
-        stride = rival.add(event) if event.place >= 0 else None
-        if rival.counts.accepted > PLACES:
-            seen = max(self.stride_in_progress - 1, 0)
-            counts.missing += max(rival.counts.missing - self._latest_place - 1, 0)
-            counts.missed_strides += max(rival.counts.missed_strides - seen, 0)
-            self.__dict__.update(rival.__dict__, counts=counts)
-            return stride
-        return None
+        stride = self._rival.add(event) if event.place >= 0 else None
+        if self._rival.counts.accepted <= PLACES:
+            return None
+        self.__dict__.update(self._rival.__dict__, counts=self.counts)
+        return stride
 
     def _first_step_if(self, event: GaitEvent) -> int:
         """Return the step of the leg's first heel strike, 0 or 1, that the event implies."""
