@@ -59,14 +59,13 @@ def profile_of(message: Any, start: int = 0) -> TorqueProfile:
     )
 
 
-def hole_before(message: Any, promised: float | None, start: int = 0) -> tuple[int, int] | None:
+def hole_before(message: Any, promised: float | None) -> tuple[int, int] | None:
     """
-    Return the span [ns] of which no torque profile is here, before a TorqueProfile message.
+    Return the span [ns since 1970] before a TorqueProfile message of which no profile is here.
 
-    ``promised`` [ns] is how far the profile before it went: None for the first one, infinity after
-    a stop, which voids what was promised. Returns None if the profiles adjoin.
+    ``promised`` is where the one before ends: None before the first, infinity after a stop.
     """
-    begin = nanoseconds_of(message.times[0]) - start
+    begin = nanoseconds_of(message.times[0])
     if promised is None:
         return (0, begin) if message.revision else None
     return (int(promised), begin) if begin > promised else None
@@ -103,7 +102,7 @@ def result_values(result: Result, side: Side) -> dict[str, Any]:
             "step_periods": result.step_periods,
         }
     # A message has the fields of the result, under the same names, except for these.
-    own = {"onset", "stamp", "effective_pulses"}
+    own = {"onset", "stamp"}
     values = {f.name: getattr(result, f.name) for f in fields(result) if f.name not in own}
     values["side"] = side
     if isinstance(result, PulsePhase):

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind
-from gait_entrainment.gait import Analysis, Entrainment, GaitEvent, Hole, Reason, Verdict
+from gait_entrainment.gait import Analysis, GaitEvent, Hole, Reason, Verdict
 from gait_entrainment.protocol import Protocol
 from gait_entrainment.robot import PulseTiming
 from gait_entrainment.robot.timing import distribution
@@ -29,8 +29,6 @@ _MEANINGS = {
     "baseline_unknown": "fewer than two complete strides before the first pulse to compare with",
     "not_one_to_one": "only pulses at about one a stride are analyzed",
 }
-# Holes that are listed to a person; the others are counted.
-_HOLES_LISTED = 3
 
 
 @dataclass(frozen=True)
@@ -73,36 +71,25 @@ def outcome_of(run: Run) -> dict[str, Any]:
                 }
                 for pulse in analysis.pulses
             ],
-            "train_fits": _train_fits(run),
             "verdict": verdict.name.lower(),
             "reason": reason.name.lower() if reason else None,
             "entrained": entrained,
             "entrained_since_stride": last.entrained_since_stride if last and entrained else None,
             "final_phase_lag": statistics.median(lags) if lags else math.nan,
             "double_stance": _double_stance(run.events, placed[-1].toe_off if placed else None),
-            "stretches": _stretches(analysis.entrainments),
+            "stretches": [
+                {"last_stride": e.stride, "verdict": e.verdict.name.lower()}
+                for e in {e.stretch: e for e in analysis.entrainments}.values()
+            ],
             "holes": [
-                {
-                    "start": max(hole.start - start, 0) / NANOSECONDS_PER_SECOND,
-                    "end": (hole.end - start) / NANOSECONDS_PER_SECOND,
-                    "missing": hole.missing,
-                }
-                for hole in holes_of(run)
+                {"start": max(h.start - start, 0) / 1e9, "missing": h.missing}
+                for h in holes_of(run)
             ],
             "gait_events": asdict(analysis.event_counts),
             "parameters": parameters,
         }
     )
     return outcome
-
-
-def _train_fits(run: Run) -> bool:
-    """Whether the strides of the run have room for the train, at the unperturbed period."""
-    protocol = run.protocol
-    plan = protocol.pulses
-    strides = plan.count + protocol.washout - plan.initial_phase
-    room = strides * run.measured_period - (plan.count - 1) * run.pulse_period
-    return not room < plan.width  # true also where no train was planned
 
 
 def holes_of(run: Run) -> list[Hole]:
@@ -114,30 +101,17 @@ def holes_of(run: Run) -> list[Hole]:
     return holes
 
 
-def _stretches(entrainments: Sequence[Entrainment]) -> list[dict[str, Any]]:
-    """Return the verdict at the end of each stretch of one train without a hole."""
-    stretches: dict[int, dict[str, Any]] = {}
-    for entrainment in entrainments:
-        first = stretches.get(entrainment.stretch, {}).get("first_stride", entrainment.stride)
-        stretches[entrainment.stretch] = {
-            "first_stride": first,
-            "last_stride": entrainment.stride,
-            "verdict": entrainment.verdict.name.lower(),
-        }
-    return list(stretches.values())
-
-
 def summary(outcome: dict[str, Any]) -> str:
     """Return the outcome in a few lines."""
     parameters = outcome["parameters"]
     strides, pulses = outcome["stride_period"], outcome["pulses"]
     unperturbed, period = outcome["unperturbed_stride_period"], outcome["perturbation_period"]
     planned = parameters["pulses"]["count"]
-    all_strides = parameters["baseline"] + planned + parameters["washout"]
-    counted = _of(len(strides), all_strides), _of(len(pulses), planned)
-    lines = [f"strides          {counted[0]}, pulses placed in them: {counted[1]}"]
-    if not outcome["train_fits"]:
-        lines[0] += "; the train is longer than the strides of the run: add washout strides"
+    lines = [f"strides          {len(strides)}, pulses placed in them: {len(pulses)}"]
+    if len(pulses) != planned:
+        lines[0] += f" of {planned}"
+        if not outcome["holes"]:
+            lines[0] += "; the train is longer than the run: add washout strides"
     if strides:
         measured = "not measured" if unperturbed is None else f"{unperturbed:.4f} s"
         lines.append(f"stride period    {measured} unperturbed, {strides[-1]:.4f} s last")
@@ -153,30 +127,18 @@ def summary(outcome: dict[str, Any]) -> str:
     else:
         verdict += f": {_MEANINGS[outcome['reason'] or verdict]}"
     lines.append(f"verdict          {verdict}")
-    if len(outcome["stretches"]) > 1:
-        lines += [
-            f"                 {s['verdict']} in strides {s['first_stride']} to {s['last_stride']}"
-            for s in outcome["stretches"]
-        ]
-    if holes := outcome["holes"]:
-        listed = [f"{h['missing']} at {h['start']:.1f} s" for h in holes[:_HOLES_LISTED]]
-        if len(holes) > _HOLES_LISTED:
-            listed.append(f"{len(holes) - _HOLES_LISTED} more")
-        lines.append(f"holes            {', '.join(listed)}: not in the record")
-    if doubts := [
-        f"{number} {fate.replace('_', ' ')}"
-        for fate, number in outcome["gait_events"].items()
-        if number and fate != "accepted"
-    ]:
-        lines.append(f"gait events      {', '.join(doubts)}")
+    for stretch in outcome["stretches"][:-1]:
+        lines.append(f"  until stride {stretch['last_stride']:<3} {stretch['verdict']}")
+    if holes := [f"{hole['missing']} at {hole['start']:.1f} s" for hole in outcome["holes"]]:
+        more = f", {len(holes) - 3} more" if len(holes) > 3 else ""
+        lines.append(f"holes            {', '.join(holes[:3])}{more}: not in the record")
+    doubts = [f"{n} {fate}" for fate, n in [*outcome["gait_events"].items()][1:] if n]
+    if doubts:
+        lines.append(f"gait events      {', '.join(doubts).replace('_', ' ')}")
     lag, double_stance = outcome["final_phase_lag"], outcome["double_stance"]
     if lag is not None and outcome["entrained"]:
         lines.append(f"final phase lag  {lag * 1e3:+.1f} ms: {_place(lag, double_stance)}")
     return "\n".join(lines)
-
-
-def _of(found: int, planned: int) -> str:
-    return str(found) if found == planned else f"{found} of {planned}"
 
 
 def _place(lag: float, double_stance: float | None) -> str:

@@ -9,8 +9,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from mcap.reader import make_reader
 from mcap.writer import Writer
 
+from gait_entrainment.gait import Verdict
 from gait_entrainment_bags import (
     BagExistsError,
     BagReader,
@@ -23,6 +25,9 @@ from gait_entrainment_bags import (
 )
 from gait_entrainment_bags.mcap_file import McapFile
 from gait_entrainment_bags.mcap_records import Chunk
+from gait_entrainment_bags.recorded_run import read_run, recorded_outcome
+
+PAPER_EXAMPLE = Path(__file__).parents[4] / "bags" / "paper_example"
 
 NOISE = TopicInfo("/noise", "p/msg/Noise", "uint8[] bytes\n", "RIHS01_" + "1" * 64)
 
@@ -226,3 +231,72 @@ def test_qos_and_hash_survive(tmp_path: Path, topic: Callable[..., TopicInfo]) -
     recover(tmp_path / "walk", tmp_path / "rescued")
     with BagReader(tmp_path / "rescued") as reader:
         assert reader.topics == {"/clock": before}
+
+
+def write_foreign(path: Path) -> None:
+    """Write a file with a JSON topic, one without a definition, and a binary definition."""
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start("", "test")
+        for topic, encoding, schema in (
+            ("/json", "json", ("Cadence", "jsonschema", b'{"type": "object"}')),
+            ("/plain", "json", None),
+            ("/binary", "protobuf", ("a.B", "protobuf", bytes(range(256)))),
+            ("/ros", "cdr", ("p/msg/Good", "ros2msg", b"uint8 x\n")),
+        ):
+            number = writer.register_schema(*schema) if schema else 0
+            channel = writer.register_channel(topic, encoding, number)
+            writer.add_message(channel, 5, b"{}", 5)
+        writer.finish()
+
+
+def test_encodings_and_definitions_stay_as_they_are(tmp_path: Path) -> None:
+    write_foreign(tmp_path / "foreign.mcap")
+    rescued = recover(tmp_path / "foreign.mcap", tmp_path / "rescued")
+    assert rescued.losses == ()
+    (file,) = rescued.folder.glob("*.mcap")
+    found = []
+    for path in (tmp_path / "foreign.mcap", file):
+        with path.open("rb") as stream:
+            summary = make_reader(stream).get_summary()
+        assert summary is not None
+        schemas = {s.id: (s.name, s.encoding, s.data) for s in summary.schemas.values()}
+        found.append(
+            {
+                c.topic: (c.message_encoding, schemas.get(c.schema_id))
+                for c in summary.channels.values()
+            }
+        )
+    assert found[0] == found[1]
+
+
+def without(bag: Path, out: Path, begin: float, end: float) -> Path:
+    """Copy a bag without what was logged from one time to another [s since its start]."""
+    with BagReader(bag) as reader, BagWriter(out, ros_distro="") as writer:
+        writer.custom_data |= reader.custom_data
+        for topic in reader.topics.values():
+            writer.add_topic(topic)
+        for message in reader.messages():
+            if not begin <= (message.log_time - reader.start) / 1e9 < end:
+                writer.write(message.topic, message.data, message.log_time, message.publish_time)
+    return out
+
+
+@pytest.mark.parametrize(
+    ("begin", "end", "missing"),
+    [
+        (80.0, 82.0, "4 gait events"),
+        (0.0, 40.0, "torque profiles"),
+        (100.0, 1000.0, "the end of run"),
+    ],
+)
+def test_what_the_run_lacks_is_told(
+    tmp_path: Path, begin: float, end: float, missing: str
+) -> None:
+    cut = without(PAPER_EXAMPLE, tmp_path / "cut", begin, end)
+    rescued = recover(cut, tmp_path / "rescued")
+    assert missing in "; ".join(rescued.losses)
+    assert [finding.rule for finding in check(cut)] == ["record"]
+    run = read_run(cut)
+    assert recorded_outcome(run, cut)["holes"]
+    assert run.analysis.entrainments[-1].verdict not in (Verdict.LOST, Verdict.DRIFTING)

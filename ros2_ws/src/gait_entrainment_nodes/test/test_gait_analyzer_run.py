@@ -3,9 +3,11 @@
 
 """One run of the analyzer: when it is complete, and what it says of doubtful events."""
 
+import pytest
+
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.gait import PulsePhase, Stride, VerdictSettings
-from gait_entrainment.messages import nanoseconds_of
+from gait_entrainment.messages import MessageError, nanoseconds_of
 from gait_entrainment_msgs.msg import AnkleRobotState, GaitEvent, Progress, TorqueProfile
 from gait_entrainment_nodes.messaging.stamps import header, to_time
 from gait_entrainment_nodes.nodes.gait_analyzer_run import RESULTS, Run
@@ -109,3 +111,28 @@ def test_stop_voids_what_was_promised():
     results = [result for event in gait(4) for result in analyzed.add_event(event)]
     results += analyzed.finish(9 * SECOND)
     assert [r.onset for r in results if isinstance(r, PulsePhase)] == [3 * SECOND]
+
+
+def test_profiles_that_do_not_adjoin_are_a_hole_and_are_told():
+    analyzed = run()
+    analyzed.add_profile(promise(0, 2 * SECOND))
+    analyzed.add_profile(promise(4 * SECOND, 6 * SECOND))
+    assert analyzed.new_doubts()["holes"] == 1
+    assert analyzed.new_doubts() == {}
+    analyzed.add_profile(TorqueProfile(header=header(5 * SECOND), stop=True))
+    analyzed.add_profile(promise(8 * SECOND, 9 * SECOND))  # after a stop nothing is owed
+    assert analyzed.new_doubts() == {}
+
+
+def test_joining_late_is_a_hole():
+    analyzed = run()
+    late = promise(6 * SECOND, 8 * SECOND)
+    late.revision = 3
+    analyzed.add_profile(late)
+    assert analyzed.new_doubts()["holes"] == 1
+
+
+def test_an_event_of_an_unknown_kind_or_side_is_an_error_of_one_line():
+    for values in ({"kind": 7}, {"side": 2}):
+        with pytest.raises(MessageError, match=f"^{next(iter(values))}: "):
+            run().add_event(GaitEvent(header=header(0), **values))

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from gait_entrainment.conventions import Side
+from gait_entrainment.gait.plausibility import GaitLimits
 from gait_entrainment.gait.pulse_phase import (
     LagFollower,
     PulseNumbers,
@@ -26,6 +27,8 @@ from gait_entrainment.gait.strides import (
 from gait_entrainment.gait.verdict import Entrainment, EntrainmentTest, VerdictSettings
 
 Result = Stride | PulsePhase | Entrainment
+# Whose strides they are is not known here: ten times smaller or larger than a person's.
+_ANYBODY = GaitLimits(stride_least=0.03, stride_most=50.0)
 
 
 @dataclass(slots=True)
@@ -55,18 +58,13 @@ class GaitAnalyzer:
     Two inputs, in any interleaving: gait events, and promises about pulses. A stride comes out
     with the heel strike that closes it. Its pulses come out, with the verdict at that stride,
     once the promises reach that heel strike; if a pulse may be nearer to the next toe-off than
-    to its own, once the next stride is closed too. So the sequence of strides depends on the
-    events alone, and the sequences of pulse phases and of verdicts on the events and the onsets,
-    never on how events and promises interleave. (A stop is not bound by this: it happens when it
-    happens.)
-
-    Pulses outside every complete stride are counted in ``pulse_counts``, not published; they keep
-    their number. What the record lacks is in ``holes``: lags are followed, and verdicts formed,
-    from the latest hole or the beginning of the latest train on.
+    to its own, once the next stride is closed too. So results depend on the events and the onsets,
+    never on how events and promises interleave, except for a stop, which happens when it happens.
+    Lags are followed, and verdicts formed, since the latest of ``holes`` or of the trains began.
     """
 
     def __init__(self, side: Side, settings: VerdictSettings | None = None) -> None:
-        self._tracker = StrideTracker(side)
+        self._tracker = StrideTracker(side, _ANYBODY)
         self._test = EntrainmentTest(settings or VerdictSettings())
         self._lags = LagFollower()
         self._unperturbed = UnperturbedPeriod()
@@ -155,8 +153,8 @@ class GaitAnalyzer:
         number = 0 if before is None else before.number
         if stride.number != number + 1:
             start = stride.start if before is None else before.end
-            missing = _count(stride.number - number - 1, "stride")
-            self._begin_anew(Hole(start, stride.start, missing))
+            lost = f"{stride.number - number - 1} stride(s)"
+            self._begin_anew(Hole(start, stride.start, lost))
             before = None
         if after is not None and after.number != stride.number + 1:
             after = None
@@ -164,13 +162,17 @@ class GaitAnalyzer:
         pulses: list[PulsePhase] = []
         judged = 0  # the first of them that neither a hole nor another train comes after
         for onset in onsets:
-            if self._numbered(onset):
+            latest = self._numbers.latest
+            missing = self._numbers.place(onset, unperturbed.mean)
+            if missing != 0:
+                hole = Hole(latest, onset, f"{missing} pulse(s)") if missing else None
+                self._begin_anew(hole, another_train=missing is None)
                 judged = len(pulses)
             if onset < stride.start:
                 self.pulse_counts.outside_strides += 1
                 continue
-            place = self._numbers.number, onset, stride, before, after, unperturbed.mean
-            pulse = self._lags.place(*place)
+            placed = self._numbers.number, onset, stride, before, after, unperturbed.mean
+            pulse = self._lags.place(*placed)
             self.pulse_counts.placed += 1
             self.pulse_counts.without_lag += pulse.toe_off is None
             pulses.append(pulse)
@@ -183,28 +185,11 @@ class GaitAnalyzer:
         entrainment = self._test.add(stride, pulses[judged:], unperturbed)
         return [*pulses, entrainment] if entrainment else list(pulses)
 
-    def _numbered(self, onset: int) -> bool:
-        """Number a pulse; return whether lags and verdicts begin anew with it."""
-        latest, first = self._numbers.latest, self._numbers.number == 0
-        missing = self._numbers.place(onset)
-        if missing == 0 or first:
-            return False
-        if missing is None:
-            self._begin_anew(None, another_train=True)
-        else:
-            self._begin_anew(Hole(latest, onset, _count(missing, "pulse")))
-        return True
-
     def _begin_anew(self, hole: Hole | None, *, another_train: bool = False) -> None:
         """Follow lags and form verdicts anew: after a hole, known already if None, or a train."""
-        if hole is not None:
-            self.holes.append(hole)
+        self.holes += [hole] if hole else []
         self._lags = LagFollower()
         self._test.restart(hole=not another_train)
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 @dataclass(frozen=True)

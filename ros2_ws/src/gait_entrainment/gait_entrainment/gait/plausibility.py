@@ -4,9 +4,8 @@
 """
 Which gait events can be believed, and whether somebody walks at all.
 
-An event comes from a sensor, and a sensor counts twice, misses, or is knocked. Torque follows from
-what is believed here, so the rule is the same in the node, in a simulation and in an analysis: the
-stride tracker asks it about every event.
+A sensor counts twice, misses, or is knocked, and torque follows from what is believed here: the
+stride tracker asks about every event, in a node, in a simulation and in an analysis.
 """
 
 import math
@@ -35,18 +34,9 @@ class GaitLimits:
 
     stride_least: float = setting(0.3, "shortest stride", "s", (1e-6, 1e6))
     stride_most: float = setting(5.0, "longest stride", "s", (1e-6, 1e6))
-    stride_change: float = setting(
-        0.4, "largest departure of a stride from the person's own median", "1", (0.01, 1.0)
-    )
-    silence: float = setting(
-        1.5, "strides without a heel strike after which nobody walks", "1", (1.05, 10.0)
-    )
-    baseline_spread: float = setting(
-        0.15,
-        "largest standard deviation of the baseline's strides, as a share of their mean",
-        "1",
-        (0.001, 1.0),
-    )
+    stride_change: float = setting(0.4, "departure from the person's median", "1", (0.01, 1.0))
+    silence: float = setting(1.5, "strides without a strike that end a gait", "1", (1.05, 10.0))
+    baseline_spread: float = setting(0.15, "deviation of baseline strides", "1", (0.001, 1.0))
 
     def __post_init__(self) -> None:
         """Check every field."""
@@ -63,17 +53,7 @@ class GaitLimits:
 
 
 class GaitWatch:
-    """
-    Knows the person's own stride; says which strides can be, and when the gait has stopped.
-
-    Parameters
-    ----------
-    side
-        The leg whose strides are taken.
-    limits
-        What a stride can be.
-
-    """
+    """Knows the strides of a person's leg; says which can be, and when the gait has stopped."""
 
     def __init__(self, side: Side, limits: GaitLimits) -> None:
         self.side, self.limits = side, limits

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment.gait.strides import Stride
 
+_Other = Stride | None  # a neighbour, None if it is missing
+
 
 @dataclass(frozen=True, slots=True)
 class PulsePhase:
@@ -25,16 +27,15 @@ class PulsePhase:
 
 def depends_on_next_toe_off(onset: int, stride: Stride) -> bool:
     """
-    Whether a toe-off of the next stride could be nearer to an onset than that of its own stride.
+    Whether the next stride's toe-off could be nearer to an onset than that of its own stride.
 
-    The next toe-off comes after the closing heel strike, so an onset that is at least as near to
-    its own toe-off as to that strike needs no look ahead.
+    It comes after the closing heel strike, so an onset nearer to its own needs no look ahead.
     """
     return stride.toe_off is not None and onset - stride.toe_off > stride.end - onset
 
 
 def nearest_toe_off(
-    onset: int, stride: Stride, before: Stride | None, after: Stride | None
+    onset: int, stride: Stride, before: _Other, after: _Other
 ) -> tuple[int, int] | None:
     """
     Return the stamp [ns] of the toe-off nearest to an onset [ns], and the stride that it is in.
@@ -59,38 +60,33 @@ def nearest_toe_off(
 
 class PulseNumbers:
     """
-    Numbers the pulses of a run; tells trains apart, and knows how many are missing between.
+    Numbers the pulses of a run; tells trains apart, and how many pulses of one are missing.
 
-    The period of a train is known once two intervals in a row agree. From then on an interval of
-    several periods is a train with pulses missing, any other interval the pause before another
-    train. Intervals agree within a quarter of a period, more than any robot jitters.
+    The period of a train is known once an interval agrees with the one before or with the
+    unperturbed stride, within a quarter, more than any robot jitters. Then an interval of several
+    periods has pulses missing in it; any other is the pause before another train.
     """
-
-    TOLERANCE = 0.25  # of a period
 
     def __init__(self) -> None:
         self.number = 0  # of the latest pulse
-        self._first = self.latest = 0  # onsets of the train's first and latest pulse [ns]
-        self._periods = 0  # from the first to the latest
-        self._steady = False  # the period is known
+        self.latest = self._first = 0  # onset of the latest pulse, of the first of its train [ns]
+        self._periods = 0  # between the two
+        self._steady = False  # whether the period is known
 
-    def place(self, onset: int) -> int | None:
-        """Take the next onset [ns]; return how many pulses lack before it, None in a new train."""
-        steps = 1.0
+    def place(self, onset: int, stride: float) -> int | None:
+        """Take an onset [ns]; return how many lack before it, None if another train begins."""
+        steps = 1.0 if self.number else 0.0
         if self._periods:
             steps = (onset - self.latest) * self._periods / (self.latest - self._first)
-        whole = round(steps)
-        self._steady &= self._periods > 0
-        agrees = whole == 1 or (self._steady and whole > 1)
-        if not self.number or not agrees or abs(steps - whole) > self.TOLERANCE:
-            self.number += 1
-            self._first = self.latest = onset
-            self._periods, self._steady = 0, False
-            return None
-        self._steady = self._periods > 0
-        self.number += whole
-        self._periods += whole
+        whole, interval = round(steps), (onset - self.latest) / NANOSECONDS_PER_SECOND
         self.latest = onset
+        if not 1 <= whole <= (whole if self._steady else 1) or abs(steps - whole) > 0.25:
+            self._first, self._periods, self._steady = onset, 0, False
+            self.number += 1
+            return None if self.number > 1 else 0
+        self._steady = self._periods > 0 or abs(interval - stride) < 0.25 * stride
+        self._periods += whole
+        self.number += whole
         return whole - 1
 
 
@@ -108,15 +104,9 @@ class LagFollower:
         self._first: tuple[int, int] | None = None  # stride of the toe-off, number of the pulse
 
     def place(
-        self,
-        number: int,
-        onset: int,
-        stride: Stride,
-        before: Stride | None,
-        after: Stride | None,
-        unperturbed_period: float,
+        self, number: int, onset: int, stride: Stride, before: _Other, after: _Other, period: float
     ) -> PulsePhase:
-        """Place one pulse; arguments as in ``nearest_toe_off``, the period in seconds."""
+        """Place one pulse; as in ``nearest_toe_off``, and the unperturbed period [s]."""
         phase = (onset - stride.start) / (stride.end - stride.start)
         nearest = nearest_toe_off(onset, stride, before, after)
         if nearest is None:
@@ -127,5 +117,5 @@ class LagFollower:
             self._first = toe_off_stride, number
         ahead = (toe_off_stride - self._first[0]) - (number - self._first[1])
         # Without a wrap the lag stands as it is, even if T is unknown (NaN).
-        unwrapped = lag + ahead * unperturbed_period if ahead else lag
+        unwrapped = lag + ahead * period if ahead else lag
         return PulsePhase(number, onset, stride.number, phase, lag, unwrapped, toe_off)

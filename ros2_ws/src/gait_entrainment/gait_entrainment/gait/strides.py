@@ -24,8 +24,7 @@ class GaitEvent:
 
     Step numbers identify events, whatever order they arrive in: heel strike n closes step n, and
     the toe-off of step n is the one that begins its swing, between heel strikes n - 1 and n. Both
-    are of the leg that swings. A run starts with heel strike 0. A source that cannot number its
-    steps in this way is out of scope: without numbers a missing event looks like a long step.
+    are of the leg that swings. A run starts with heel strike 0. A source must number its steps so.
     """
 
     stamp: int  # instant of the event [ns since the start of the run]
@@ -75,13 +74,11 @@ class StrideTracker:
     Closes the strides of one leg as its heel strikes come in.
 
     An event is placed by its step number, so that a missing event changes no other stride's
-    number. Out of order is fine as long as nothing that depends on the event has been decided: an
-    event that is earlier in the gait than the leg's latest heel strike is late, since that strike
-    has closed one stride and given up those that still lacked a bound. The side of step 0 is
-    taken from the first event. If two events contradict each other, the first to come is believed,
-    and an event is believed only if the strides since the ones before can have taken so long. So
-    that one wrong event cannot silence all that follow, a stride of events that fit each other
-    but not what was believed, without one that fits, is believed from then on.
+    number. Out of order is fine until the leg's next heel strike, which closes one stride and
+    gives up those that still lack a bound. The side of step 0 is taken from the first event. If
+    two events contradict each other, the first to come is believed; and each only if the strides
+    since those before can have taken so long. A stride of events that fit together, but not what
+    was believed, is believed from then on: no single wrong event silences all that follow.
     """
 
     def __init__(self, side: Side, limits: GaitLimits | None = None) -> None:
@@ -102,10 +99,8 @@ class StrideTracker:
         """Take one event; return the stride that it closes, if it closes one."""
         fate = self._fate(event)
         setattr(self.counts, fate, getattr(self.counts, fate) + 1)
-        if fate in ("contradictory", "implausible"):
-            return self._doubt(event)
         if fate != "accepted":
-            return None
+            return self._doubt(event) if fate in ("contradictory", "implausible") else None
         self._rival = None
         place = event.place
         if place > self._latest_place:
@@ -139,27 +134,20 @@ class StrideTracker:
         return "accepted" if self._believes(place, stamp) else "implausible"
 
     def _believes(self, place: int, stamp: int) -> bool:
-        """Whether the strides since the latest event at least one stride before can be."""
-        since = max((p for p in self._stamps if p <= place - PLACES), default=None)
-        if since is None:  # the run has just begun
-            since = min(self._stamps, default=place)
+        """Whether the strides since the latest event a stride or more before can be."""
+        earlier = [p for p in self._stamps if p <= place - PLACES] or list(self._stamps)[:1]
+        since = max(earlier, default=place)
         elapsed = stamp - self._stamps.get(since, stamp)
         return self.watch.believes((place - since) / PLACES, elapsed)
 
     def _doubt(self, event: GaitEvent) -> Stride | None:
         """Drop an event, unless a stride of dropped ones fits together: then go on with those."""
-        rival = self._rival
-        if rival is None or rival._fate(event) != "accepted":
-            rival = StrideTracker(self.side, self.watch.limits)
-        stride = rival.add(event) if rival._fate(event) == "accepted" else None
-        self._rival = rival
-        if rival.counts.accepted <= PLACES:
+        if self._rival is None or self._rival._fate(event) != "accepted":
+            self._rival = StrideTracker(self.side, self.watch.limits)
+        stride = self._rival.add(event) if event.place >= 0 else None
+        if self._rival.counts.accepted <= PLACES:
             return None
-        counts = self.counts
-        counts.missing += max(rival.counts.missing - self._latest_place - 1, 0)
-        seen = max(self.stride_in_progress - 1, 0)
-        counts.missed_strides += max(rival.counts.missed_strides - seen, 0)
-        self.__dict__.update(rival.__dict__, counts=counts)
+        self.__dict__.update(self._rival.__dict__, counts=self.counts)
         return stride
 
     def _first_step_if(self, event: GaitEvent) -> int:
@@ -177,13 +165,9 @@ class StrideTracker:
             self.counts.missed_strides += max(closed - max(started - 1, 0), 0)
             return None
         self.watch.add(event.stamp, (event.stamp - start) / NANOSECONDS_PER_SECOND)
-        middle = self._stamps.get(event.place - 2)
-        step_periods = (math.nan, math.nan)
-        if middle is not None:
-            step_periods = (
-                (middle - start) / NANOSECONDS_PER_SECOND,
-                (event.stamp - middle) / NANOSECONDS_PER_SECOND,
-            )
+        middle = self._stamps.get(event.place - 2, math.nan)
+        steps = middle - start, event.stamp - middle
+        step_periods = (steps[0] / NANOSECONDS_PER_SECOND, steps[1] / NANOSECONDS_PER_SECOND)
         toe_off = self._stamps.get(event.place - 1)
         return Stride(closed, self.side, start, event.stamp, toe_off, step_periods)
 

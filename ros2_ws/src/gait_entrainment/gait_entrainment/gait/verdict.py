@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
-from gait_entrainment.gait.drift import Drift, Steadiness, drift_of, steadiness_of
+from gait_entrainment.gait.drift import Drift, drift_of
 from gait_entrainment.gait.pulse_phase import PulsePhase
 from gait_entrainment.gait.strides import Stride, UnperturbedPeriod
 from gait_entrainment.settings import check_settings, setting
@@ -52,90 +52,39 @@ class Reason(enum.IntEnum):
 
 @dataclass(frozen=True)
 class VerdictSettings:
-    """Every number in the verdict; raises SettingError for one that is out of range."""
+    """
+    Every number in the verdict; raises SettingError for one that is out of range.
+
+    D is the difference between pulse period and unperturbed period; a spread of the lag is told as
+    the steady drift per stride that would cause it.
+    """
 
     window: int = setting(20, "fewest pulses judged at a time", "1", (5, 1000))
     longest_window: int = setting(40, "most pulses judged at a time", "1", (5, 1000))
-    judged_from: int = setting(
-        25, "pulses from which on a window that is not full yet is judged", "1", (5, 1000)
-    )
+    judged_from: int = setting(25, "pulses that make do for a longer window", "1", (5, 1000))
     window_deviations: float = setting(
-        100.0,
-        "drift of an indifferent gait over the window, in standard deviations of the baseline's "
-        "stride period; the window is as long as that takes, within its bounds",
-        "1",
-        (1.0, 10_000.0),
+        100.0, "drift by D over the window, in deviations of the baseline", "1", (1.0, 1e4)
     )
-    spread_margin: float = setting(
-        0.35,
-        "largest spread of an entrained lag, as the steady drift per stride that would spread it "
-        "as much, as a fraction of the difference between pulse period and unperturbed period",
-        "1",
-        (0.01, 1.0),
-    )
-    scatter_margin: float = setting(
-        0.32, "the same as a fraction of the lag's scatter from pulse to pulse", "1", (0.01, 1.0)
-    )
-    quiet_margin: float = setting(
-        0.12,
-        "spread that is small whatever the scatter, as a fraction of the difference of periods",
-        "1",
-        (0.001, 1.0),
-    )
-    confidence: float = setting(
-        0.95, "two-sided confidence level of the drift's interval", "1", (0.5, 0.9999)
-    )
-    drift_margin: float = setting(
-        0.25,
-        "drift per stride above which a gait drifts, as a fraction of the difference between "
-        "pulse period and unperturbed period",
-        "1",
-        (0.01, 1.0),
-    )
+    spread_margin: float = setting(0.35, "spread of an entrained lag, by D", "1", (0.01, 1.0))
+    scatter_margin: float = setting(0.32, "the same, by the lag's scatter", "1", (0.01, 1.0))
+    quiet_margin: float = setting(0.12, "spread that is always small, by D", "1", (0.001, 1.0))
+    drift_margin: float = setting(0.25, "slope of a lag that drifts, by D", "1", (0.01, 1.0))
     period_margin: float = setting(
-        0.25,
-        "largest difference between mean stride period and pulse period of an "
-        "entrained gait, as a fraction of the difference between pulse period and "
-        "unperturbed period",
-        "1",
-        (0.01, 1.0),
+        0.25, "mean stride period of an entrained gait minus pulse period, by D", "1", (0.01, 1.0)
     )
-    successive: int = setting(
-        5,
-        "successive strides with pulses that must pass before the gait is called entrained",
-        "1",
-        (1, 1000),
-    )
-    largest_autocorrelation: float = setting(
-        0.9, "upper bound of the lag-1 autocorrelation of the residuals", "1", (0.0, 0.99)
-    )
-    smallest_difference: float = setting(
-        0.002,
-        "smallest testable difference between pulse period and unperturbed period",
-        "s",
-        (0.0, 1.0),
-    )
+    successive: int = setting(5, "successive strides that must pass", "1", (1, 1000))
+    smallest_difference: float = setting(0.002, "smallest testable D", "s", (0.0, 1.0))
     smallest_difference_errors: float = setting(
         2.0, "the same in standard errors of the unperturbed period", "1", (0.0, 100.0)
     )
     largest_difference: float = setting(
-        0.25,
-        "largest difference between pulse period and unperturbed period at which there is one "
-        "pulse a stride, as a fraction of the latter",
-        "1",
-        (0.01, 0.5),
+        0.25, "largest D at one pulse a stride, by the unperturbed period", "1", (0.01, 0.5)
     )
     stretch_tolerance: float = setting(
-        0.010,
-        "distance from the final lag within which a stride counts as entrained",
-        "s",
-        (0.0, 1.0),
+        0.010, "distance from the final lag of an entrained stride", "s", (0.0, 1.0)
     )
     stretch_tolerance_deviations: float = setting(
-        2.0,
-        "the same in standard deviations of the lag over the window, if that is more",
-        "1",
-        (0.0, 10.0),
+        2.0, "the same in standard deviations of the lag, if that is more", "1", (0.0, 10.0)
     )
 
     def __post_init__(self) -> None:
@@ -158,9 +107,7 @@ class Entrainment:
     pulse_period: float  # mean period of the onsets in the window [s]; NaN with one
     mean_period: float  # mean stride period over the window [s]
     drift: float  # slope of the unwrapped lag [s per stride]; NaN with fewer than three pulses
-    drift_interval: float  # half width of its confidence interval [s per stride]
-    autocorrelation: float  # lag 1, of the residuals, in [0, largest_autocorrelation]
-    effective_pulses: float  # pulses in the window, discounted for autocorrelation
+    drift_interval: float  # half width of its 95 % interval [s per stride]
     window: int  # pulses that the verdict takes
     spread: float  # of the lag, as the steady drift that would spread it as much [s per stride]
     scatter: float  # of the lag from pulse to pulse [s]; NaN with fewer than three pulses
@@ -239,20 +186,15 @@ class EntrainmentTest:
         size = self._size(difference, unperturbed.deviation)
         window = [pulse for pulse, _ in self._window][-size:]
         lags = [pulse.unwrapped_lag for pulse in window]
-        drift = drift_of(
-            [pulse.stride + pulse.phase for pulse in window],
-            lags,
-            self._settings.confidence,
-            self._settings.largest_autocorrelation,
-        )
-        steadiness = steadiness_of([pulse.number for pulse in window], lags)
+        positions = [pulse.stride + pulse.phase for pulse in window]
+        drift = drift_of(positions, [pulse.number for pulse in window], lags)
         oldest = self._window[-len(window)][1]
         mean_period = _mean_period(oldest.start, stride.end, stride.number - oldest.number + 1)
         reason = self._untestable(difference, unperturbed)
         if reason is Reason.NONE or len(window) < 2:
             near = abs(mean_period - pulse_period) < self._settings.period_margin * difference
             full = len(window) >= min(size, self._settings.judged_from)
-            verdict, reason = self._judge(drift, steadiness, difference, near=near, full=full)
+            verdict, reason = self._judge(drift, difference, near=near, full=full)
         else:
             self._passed, verdict = 0, Verdict.UNTESTABLE
         if verdict != self._verdict:
@@ -271,21 +213,15 @@ class EntrainmentTest:
             mean_period=mean_period,
             drift=drift.slope,
             drift_interval=drift.half_width,
-            autocorrelation=drift.autocorrelation,
-            effective_pulses=drift.effective_pulses,
             window=size,
-            spread=steadiness.spread,
-            scatter=steadiness.scatter,
+            spread=drift.spread,
+            scatter=drift.scatter,
             phase_locking_value=_phase_locking_value(window),
             entrained_since_stride=self._first_near(lags) if entrained else None,
         )
 
     def _size(self, difference: float, deviation: float) -> int:
-        """
-        Return how many pulses to judge; difference of periods and deviation of strides in s.
-
-        The noisier the gait, the longer it takes to tell drift from wandering.
-        """
+        """Return how many pulses tell drift from wandering; difference and deviation in s."""
         settings, longest = self._settings, self._window.maxlen or 0
         if not deviation * settings.window_deviations < longest * difference:
             return settings.window if math.isnan(deviation) else longest
@@ -304,28 +240,23 @@ class EntrainmentTest:
         return Reason.TOO_CLOSE
 
     def _judge(
-        self, drift: Drift, steadiness: Steadiness, difference: float, *, near: bool, full: bool
+        self, drift: Drift, difference: float, *, near: bool, full: bool
     ) -> tuple[Verdict, Reason]:
-        """
-        Return what can be claimed now, and why no more.
-
-        ``difference`` is that of pulse period and unperturbed period [s]; the mean stride period
-        is ``near`` the pulse period; the window is ``full``.
-        """
+        """Return what can be claimed of a window if the mean stride is near the pulse period."""
         settings = self._settings
         if not full:
             self._passed = 0
             return Verdict.UNDECIDED, Reason.HOLE if self._after_hole else Reason.FEW_PULSES
-        scattered = settings.scatter_margin * steadiness.scatter
+        scattered = settings.scatter_margin * drift.scatter
         largest = max(scattered, settings.quiet_margin * difference)
-        stays = near and steadiness.spread < min(largest, settings.spread_margin * difference)
-        self._passed = self._passed + 1 if stays and not steadiness.creeps else 0
+        stays = near and drift.spread < min(largest, settings.spread_margin * difference)
+        self._passed = self._passed + 1 if stays and not drift.creeps else 0
         if self._passed >= settings.successive:
             self._was_entrained = True
             return Verdict.ENTRAINED, Reason.NONE
         if abs(drift.slope) - drift.half_width > settings.drift_margin * difference:
             return Verdict.LOST if self._was_entrained else Verdict.DRIFTING, Reason.NONE
-        creeping = stays and steadiness.creeps
+        creeping = stays and drift.creeps
         return Verdict.UNDECIDED, Reason.CREEPING if creeping else Reason.UNCLEAR
 
     def _first_near(self, lags: Sequence[float]) -> int:

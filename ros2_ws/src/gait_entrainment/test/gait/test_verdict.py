@@ -219,10 +219,7 @@ def reference(analysis: Analysis, rule: VerdictSettings) -> list[tuple[Verdict, 
         scatter = np.sqrt(np.pi) / 2 * np.mean(np.abs(np.diff(u, 2)))
         creeps = spread > scatter and abs(u[-1] - u[n // 2]) > abs(u[n // 2] - u[0]) / 2
         line = scipy.stats.linregress(x, u)
-        e = u - line.intercept - line.slope * x
-        r = float(np.clip(np.sum(e[1:] * e[:-1]) / np.sum(e**2), 0.0, 0.9))
-        half = scipy.stats.t.ppf(0.975, n * (1 - r) / (1 + r)) * line.stderr
-        half *= np.sqrt((1 + r) / (1 - r))
+        half = 1.96 * scatter * np.sqrt(6 / (5 * n))
         mean = np.mean(
             [s.period for s in analysis.strides if window[0].stride <= s.number <= stride]
         )

@@ -123,3 +123,26 @@ def test_every_action_has_help_with_examples(capsys, action):
         main(["bag", action, "--help"])
     assert ended.value.code == 0
     assert "examples:" in capsys.readouterr().out
+
+
+def test_a_topic_that_cannot_be_decoded_does_not_stop_the_others(capsys, tmp_path):
+    with BagWriter(tmp_path / "mixed", ros_distro="") as writer:
+        writer.add_topic(TopicInfo("/bad", "p/msg/Bad", "int32 x y z\n"))
+        writer.add_topic(CLOCK)
+        for topic in ("/bad", "/a"):
+            writer.write(topic, struct.pack("<4BiI", 0, 1, 0, 0, 1, 0), 10**9, 0)
+    code, out, err = entrain(capsys, "export", tmp_path / "mixed", tmp_path / "tables", "--json")
+    assert code == 1
+    assert json.loads(out) == {"/a": str(tmp_path / "tables" / "a.csv")}
+    assert "no table: /bad: " in err
+    assert [path.name for path in (tmp_path / "tables").iterdir()] == ["a.csv"]
+    json.loads(entrain(capsys, "check", tmp_path / "mixed", "--json")[1])
+
+
+@pytest.mark.parametrize("form", [(), ("--json",)])
+def test_nothing_rescued_is_no_success(capsys, tmp_path, form):
+    with BagWriter(tmp_path / "empty", ros_distro="") as writer:
+        writer.add_topic(CLOCK)
+    code, out, _ = entrain(capsys, "recover", tmp_path / "empty", tmp_path / "rescued", *form)
+    assert code == 1
+    assert "0 messages" in out or json.loads(out)["messages"] == 0
