@@ -54,8 +54,10 @@ class AkMotorOnCan(CanMotor):
 
     def enable(self) -> None:
         """Enter motor mode at zero torque."""
-        # The motor holds its last command, also across modes: zero before and after.
-        self._command(0.0)
+        # The motor holds its last command, also across modes: zero before and after. A reply does
+        # not say to what: the one to zero must not be taken for one to a frame that got lost.
+        self._ask(lambda: self._command(0.0), self._reply)
+        self.forget()
         self._ask(lambda: self._tell(ak_mit.ENTER), self._reply)
         self._require_zero_torque(f"is it {self._options.motor}?")
 

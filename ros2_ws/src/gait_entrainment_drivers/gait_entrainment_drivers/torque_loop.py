@@ -58,6 +58,7 @@ _IDLE_PERIOD = 0.02
 # Below the kernel's own threads, above everything of a user.
 _PRIORITY = 50
 _MCL_CURRENT_AND_FUTURE = 3
+_PR_SET_PDEATHSIG = 1
 
 
 class TorqueLoop:
@@ -271,6 +272,8 @@ def main() -> int:
     """Serve the parent at the other end of the socket whose descriptor is given."""
     for number in (signal.SIGINT, signal.SIGHUP, signal.SIGTSTP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)  # the parent obeys them, and then says so here
+    # A loop that is frozen when its parent dies goes on, and sees that.
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGCONT)
     link = Link(socket.socket(fileno=int(sys.argv[1])))
     device_type, options = link.first()
     loop = TorqueLoop(link, device_type(options), options)

@@ -237,6 +237,22 @@ def test_what_a_killed_host_leaves_behind(with_its_loop, timeout, torque, tmp_pa
     assert read_trace(trace)[-1][2] == pytest.approx(torque, abs=0.1)
 
 
+def test_a_loop_that_was_frozen_goes_on_to_zero_when_its_host_is_killed(tmp_path):
+    trace = tmp_path / "trace"
+    freeze = "time.sleep(0.3); frozen = robot._robot.frozen(); frozen.__enter__(); print('frozen')"
+    with emulator(trace=trace) as driver:
+        host = subprocess.Popen(
+            [sys.executable, "-u", "-c", _HOST.format(end=freeze), f"{driver},host_silence=3"],
+            stdout=subprocess.PIPE,
+        )
+        with host.stdout:
+            assert host.stdout.readline() == b"frozen\n"
+        assert read_trace(trace)[-1][1] == pytest.approx(8.0, abs=0.01)
+        host.kill()
+        host.wait(10)
+        until(lambda: abs(read_trace(trace)[-1][1]) < 0.01)
+
+
 @pytest.mark.parametrize(
     "end",
     [

@@ -209,6 +209,22 @@ def test_ak_motors_get_zero_before_each_change_of_mode():
         assert wire.sent[wire.sent.index(change) - 1] == zero
 
 
+def test_an_ak_motor_that_missed_the_change_of_mode_is_told_again(monkeypatch):
+    robot, wire = ak()
+    tell, missed = robot._tell, []
+
+    def lose_the_first(data):
+        if data == ENTER and not missed:
+            missed.append(data)
+        else:
+            tell(data)
+
+    monkeypatch.setattr(robot, "_tell", lose_the_first)
+    robot.enable()
+    assert missed
+    assert wire.motor.enabled
+
+
 @pytest.mark.parametrize("make", [ak, odrive])
 def test_frames_that_are_no_data_frames_of_the_motor_are_no_answer(make):
     robot, wire = make()
