@@ -3,7 +3,10 @@
 
 """Real time: the same walk as in lock-step, every sample sent with its exact stamp."""
 
+import contextlib
 import json
+import multiprocessing
+import os
 
 import pytest
 from harness import QUICK, entrain_run, protocol_of, stamp_of
@@ -21,7 +24,24 @@ OPTIONS = (*QUICK, "--baseline=3", "--pulses=30", "--washout=1", "--initial-phas
 def real_time_run(tmp_path_factory):
     bag = tmp_path_factory.mktemp("real_time") / "bag"
     with entrain_run(bag, "--real-time", "--json", f"--sample-rate={RATE}", *OPTIONS) as run:
+        for node in run.find_nodes().values():
+            assert os.sched_getscheduler(node) == permitted_policy()
         return bag, run.outcome()
+
+
+def permitted_policy():
+    """Return the policy by which a process may be scheduled that asks for more than others."""
+    policy = multiprocessing.get_context("fork").Value("i", os.SCHED_OTHER)
+
+    def ask():
+        with contextlib.suppress(PermissionError):
+            os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(10))
+        policy.value = os.sched_getscheduler(0)
+
+    child = multiprocessing.get_context("fork").Process(target=ask)
+    child.start()
+    child.join()
+    return policy.value
 
 
 def timing_of(bag):

@@ -98,8 +98,13 @@ def run_experiment(
 def load_report(figures: bool) -> None:
     """Load in a thread what the end of a run needs."""
     modules = (REPORT, *DRAWING) if figures else (REPORT,)
-    loaded = map(importlib.import_module, modules)
-    threading.Thread(target=list, args=[loaded], daemon=True).start()
+
+    def load() -> None:
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))  # this thread has time
+        for module in modules:
+            importlib.import_module(module)
+
+    threading.Thread(target=load, daemon=True).start()
 
 
 def kept(bag: Path) -> str:
