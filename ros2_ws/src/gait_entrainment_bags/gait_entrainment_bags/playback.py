@@ -65,7 +65,8 @@ class Playback:
             raise NothingToPlayError(f"{bag.path}: holds no message to play on {chosen}")
         _require_positive("rate", rate)
         _require_positive("duration", duration, " s")
-        if not 0 <= start_offset * NANOSECONDS_PER_SECOND <= bag.duration:
+        offset = round(start_offset * NANOSECONDS_PER_SECOND)
+        if not 0 <= offset <= bag.duration:
             raise BagError(
                 f"start_offset: {start_offset:g} s; allowed: 0 to "
                 f"{bag.duration / NANOSECONDS_PER_SECOND:g} s"
@@ -73,7 +74,7 @@ class Playback:
         self.rate = rate
         self.paused = paused
         # The first instant to play, and the one to stop before [ns].
-        self.start = bag.start + round(start_offset * NANOSECONDS_PER_SECOND)
+        self.start = bag.start + offset
         lasting = min(duration * NANOSECONDS_PER_SECOND, bag.duration + 1)
         self.end = min(self.start + round(lasting), bag.end + 1)
         self._bag = bag
