@@ -49,8 +49,10 @@ fi
 # The walker is compiled at its first use and then kept: let that be now.
 walker=$({
     cat .venv/complete
-    cd ros2_ws/src/gait_entrainment/gait_entrainment
-    find geometry.py walker -name '*.py' -print0 | sort -z | xargs -0 cat
+    cd ros2_ws/src
+    find gait_entrainment/gait_entrainment/{geometry.py,walker} \
+        gait_entrainment_studies/gait_entrainment_studies/walks.py -name '*.py' -print0 |
+        sort -z | xargs -0 cat
 } | sha256sum)
 if [ "$(cat ros2_ws/install/compiled 2> /dev/null)" != "$walker" ]; then
     echo "build: compiling the walker ..."

@@ -28,7 +28,7 @@ COMMANDS = {
         *("entrain", "run", "--no-figures"),
         *("--baseline=2", "--pulses=1", "--washout=1"),
     ),
-    "entrain run, default protocol": ("entrain", "run", "--no-figures"),
+    "entrain run, default protocol, figures": ("entrain", "run"),
 }
 
 
@@ -49,4 +49,4 @@ def test_startup(tmp_path):
     print(f"\nmedian of {ROUNDS}, least and greatest [s]")
     for name, (_, *measured) in times.items():
         median, least, most = statistics.median(measured), min(measured), max(measured)
-        print(f"{name:36} {median:6.3f}  {least:.3f} to {most:.3f}")
+        print(f"{name:40} {median:6.3f}  {least:.3f} to {most:.3f}")

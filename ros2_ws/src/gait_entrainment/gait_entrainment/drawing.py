@@ -4,7 +4,7 @@
 """Figures of the questions asked of the model: one size, one look, PNG and SVG."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -22,7 +22,7 @@ BELOW = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.13)}
 def new_figure(
     *shape: int,
     size: tuple[float, float] = (7.2, 4.2),
-    layout: str | None = "constrained",
+    layout: Literal["constrained"] | None = "constrained",
     **options: Any,
 ) -> tuple[Any, Any]:
     """Return a matplotlib figure, of this layout, and its axes as `subplots` gives them."""

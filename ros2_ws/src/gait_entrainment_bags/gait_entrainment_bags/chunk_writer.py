@@ -13,12 +13,25 @@ import struct
 from typing import Any
 
 from mcap.opcode import Opcode
-from mcap.records import MessageIndex
 from mcap.writer import Writer
 
 _HEAD = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
 _FIELDS = _HEAD.size - 9  # bytes of the fields, which follow opcode and length
 _MESSAGE = int(Opcode.MESSAGE)
+
+
+class _Index:
+    """The message index of a channel in a chunk."""
+
+    def __init__(self, channel: int) -> None:
+        self._channel = channel
+        self.entries: list[int] = []  # log time and offset of each message in turn
+
+    def write(self, records: Any) -> None:
+        """Write it as a record."""
+        count = len(self.entries)
+        head = Opcode.MESSAGE_INDEX, 6 + 8 * count, self._channel, 8 * count
+        records.write(struct.pack(f"<BQHI{count}Q", *head, *self.entries))
 
 
 class ChunkWriter(Writer):
@@ -35,9 +48,9 @@ class ChunkWriter(Writer):
         chunk = self._Writer__chunk_builder
         index = chunk.message_indices.get(channel_id)
         if index is None:
-            index = chunk.message_indices[channel_id] = MessageIndex(channel_id, [])
+            index = chunk.message_indices[channel_id] = _Index(channel_id)
         write, offset = chunk.record_writer.write, chunk.record_writer.count
-        index.records.append((log_time, offset))
+        index.entries += (log_time, offset)
         length = _FIELDS + len(data)
         write(_HEAD.pack(_MESSAGE, length, channel_id, sequence, log_time, publish_time) + data)
         if offset + _HEAD.size + len(data) > self._Writer__chunk_size:
@@ -46,7 +59,7 @@ class ChunkWriter(Writer):
     def _Writer__finalize_chunk(self) -> None:  # noqa: N802
         chunk, statistics = self._Writer__chunk_builder, self._Writer__statistics
         indices = chunk.message_indices
-        times = [log_time for index in indices.values() for log_time, _ in index.records]
+        times = [log_time for index in indices.values() for log_time in index.entries[::2]]
         if times:
             first, last = chunk.message_start_time, chunk.message_end_time = min(times), max(times)
             if statistics.message_count:
@@ -56,5 +69,5 @@ class ChunkWriter(Writer):
             chunk.num_messages = len(times)
             statistics.message_count += len(times)
             for channel, index in indices.items():
-                statistics.channel_message_counts[channel] += len(index.records)
+                statistics.channel_message_counts[channel] += len(index.entries) // 2
         super()._Writer__finalize_chunk()  # type: ignore[misc]

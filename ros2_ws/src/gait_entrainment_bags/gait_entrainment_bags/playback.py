@@ -65,19 +65,25 @@ class Playback:
             raise NothingToPlayError(f"{bag.path}: holds no message to play on {chosen}")
         _require_positive("rate", rate)
         _require_positive("duration", duration, " s")
+        offset = round(start_offset * NANOSECONDS_PER_SECOND)
+        if not 0 <= offset <= bag.duration:
+            raise BagError(
+                f"start_offset: {start_offset:g} s; allowed: 0 to "
+                f"{bag.duration / NANOSECONDS_PER_SECOND:g} s"
+            )
         self.rate = rate
         self.paused = paused
-        self.ended = False
-        self.start = self.end = 0  # first instant to play, and the one to stop before [ns]
+        # The first instant to play, and the one to stop before [ns].
+        self.start = bag.start + offset
+        lasting = min(duration * NANOSECONDS_PER_SECOND, bag.duration + 1)
+        self.end = min(self.start + round(lasting), bag.end + 1)
         self._bag = bag
         self._loop = loop
         self._tick_period = round(clock_period * NANOSECONDS_PER_SECOND)
         # The instant `_origin` of the bag is due at `_origin_at` on the steady clock.
         self._origin = self._origin_at = 0
-        self._moments = self._moments_from(0)
-        self._next: Moment | None = None
-        lasting = min(duration * NANOSECONDS_PER_SECOND, bag.duration + 1)
-        self.play(round(start_offset * NANOSECONDS_PER_SECOND), round(lasting), 0)
+        self._moments = self._moments_from(self.start)
+        self._go_to(self.start)
 
     def begin(self, now: int) -> None:
         """Let the first instant be due now (steady time [ns])."""
@@ -130,22 +136,8 @@ class Playback:
         self._origin_at = now
         self._go_to(instant)
 
-    def play(self, start_offset: int, duration: int, now: int) -> None:
-        """Play a duration [ns; 0: all] from an offset [ns]; raises BagError outside of the bag."""
-        if not 0 <= start_offset <= self._bag.duration:
-            raise BagError(
-                f"start_offset: {start_offset / NANOSECONDS_PER_SECOND:g} s; allowed: 0 to "
-                f"{self._bag.duration / NANOSECONDS_PER_SECOND:g} s"
-            )
-        self.start = self._bag.start + start_offset
-        self.end = self._bag.end + 1
-        if duration > 0:
-            self.end = min(self.end, self.start + duration)
-        self._origin_at = now
-        self._go_to(self.start)
-
     def stop(self) -> None:
-        """Play no more; `seek` and `play` begin anew."""
+        """Play no more; `seek` begins anew."""
         self.ended = True
         self._moments.close()
 
@@ -159,7 +151,7 @@ class Playback:
         self._moments.close()
         self._origin = instant
         self._moments = self._moments_from(instant)
-        self._next = next(self._moments, None)
+        self._next: Moment | None = next(self._moments, None)
         self.ended = self._next is None
 
     def _advance(self, due: int) -> Moment | None:

@@ -129,9 +129,6 @@ def test_offset_and_duration_choose_a_stretch(bag):
     assert [instant for _, instant in played(playing, 20 * SECOND)] == [
         n * SECOND for n in (3, 4, 5, 6)
     ]
-    playing.play(8 * SECOND, 0, 100)
-    assert playing.due() == 100
-    assert len(played(playing, 20 * SECOND, begin=100)) == 2
 
 
 def test_a_loop_returns_to_its_start_without_drift(bag):

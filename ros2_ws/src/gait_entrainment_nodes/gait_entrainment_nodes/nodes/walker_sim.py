@@ -195,8 +195,8 @@ class WalkerSim(Participant):
         torques = (samples.intrinsic_torque, samples.delivered_torque, samples.effective_torque)
         messages = [self._joints.fill(stamps, *joints), self._torques.fill(stamps, *torques)]
         if self.settings.ground_reaction:
-            # From (x, z) to (x, y, z), by foot.
-            forces = np.moveaxis(np.insert(samples.ground_reaction, 1, 0.0, axis=-1), 1, 0)
+            forces = np.zeros((2, len(stamps), 3))  # (x, y, z) by foot, from (x, z)
+            forces[..., ::2] = samples.ground_reaction.swapaxes(0, 1)
             messages += [self._force.fill(stamps, of_foot) for of_foot in forces]
         return messages
 

@@ -39,7 +39,7 @@ class Starved:
     length: int
 
 
-class Run:
+class _Account:
     """
     What both kinds of run share: the account of one run.
 
@@ -58,33 +58,13 @@ class Run:
         """How far everything has been walked [ns since 1970]."""
         return self.start + self.walker.reached
 
-    def due(self) -> float | None:
-        """Return the steady time [s] at which ``walk`` has something to yield, None if not yet."""
-        raise NotImplementedError
-
-    def walk(self) -> Iterator[Stretch | Starved | Progress]:
-        """Walk as far as is allowed now; what is yielded is published before the next is made."""
-        raise NotImplementedError
-
-    def wait(self) -> None:
-        """Wait until the stretch that was yielded may be published."""
-
-    def promise(self, profile: TorqueProfile, last: bool) -> int:
-        """
-        Take a promise, the last of which ends the run; return how much of it came too late [ns].
-
-        Raises ValueError if the promise before it is missing.
-        """
+    def _accept(self, profile: TorqueProfile) -> int:
+        """Take a promise; return how much of it came too late [ns], and count that."""
         late = self.walker.accept(profile)
         if late:
             self.late_stretches += 1
             self.reproducible = False
-        self._allow(profile.valid_until, last)
         return late
-
-    def _allow(self, until: int, last: bool) -> None:
-        """Allow the walk up to an instant, which is its last stretch or not."""
-        raise NotImplementedError
 
     def stop(self, instant: int) -> None:
         """End all torque at an instant, or now if that is over."""
@@ -129,7 +109,7 @@ class Run:
         )
 
 
-class LockStepRun(Run):
+class LockStepRun(_Account):
     """Walks every promised stretch at once, ``acknowledged``: as far as a recorder keeps up."""
 
     def __init__(self, *of_run: Any, acknowledged: bool) -> None:
@@ -138,27 +118,37 @@ class LockStepRun(Run):
         self._acknowledged = 0  # how many grants the recorder has acknowledged
         self._promised: deque[tuple[int, bool]] = deque()  # (until, last), not walked yet
 
-    def _allow(self, until: int, last: bool) -> None:
-        self._promised.append((until, last))
+    def promise(self, profile: TorqueProfile, last: bool) -> int:
+        """
+        Take a promise, the last of which ends the run; return how much of it came too late [ns].
+
+        Raises ValueError if the promise before it is missing.
+        """
+        late = self._accept(profile)
+        self._promised.append((profile.valid_until, last))
+        return late
 
     def acknowledge(self, progress: Progress) -> None:
         """Take the recorder's word that it holds everything up to a grant."""
         self._acknowledged = progress.grant + 1
 
     def due(self) -> float | None:
-        """See `Run`."""
+        """Return 0 if ``walk`` has something to yield, None if not yet."""
         ahead = self._waits and self.grant - self._acknowledged >= UNACKNOWLEDGED_GRANTS
         return 0.0 if self._promised and not (ahead or self.walker.ended) else None
 
-    def walk(self) -> Iterator[Stretch | Starved | Progress]:
-        """See `Run`."""
+    def wait(self) -> None:
+        """Do not wait: what was yielded is published at once."""
+
+    def walk(self) -> Iterator[Stretch | Progress]:
+        """Walk as far as is allowed; what is yielded is published before the next is made."""
         while self.due() is not None:
             until, last = self._promised.popleft()
             yield self.walker.advance(until, last=last)
             yield self.progress()
 
 
-class RealTimeRun(Run):
+class RealTimeRun(_Account):
     """Walks as time goes on: instant 0 is due at ``due_at`` [ns] of the steady ``clock``."""
 
     def __init__(
@@ -170,9 +160,12 @@ class RealTimeRun(Run):
         self._starving = False  # the stretch walked last had no promise
         self._next_progress = 0
 
-    def _allow(self, until: int, last: bool) -> None:
+    def promise(self, profile: TorqueProfile, last: bool) -> int:
+        """See `LockStepRun`."""
+        late = self._accept(profile)
         # If the last promise comes late, its end is already past.
-        self._end = max(until, self.walker.reached) if last else None
+        self._end = max(profile.valid_until, self.walker.reached) if last else None
+        return late
 
     @property
     def _next(self) -> int:
@@ -185,17 +178,17 @@ class RealTimeRun(Run):
         """When the walk up to that may begin [ns since the start of the run]."""
         return self._next - (HEAD_START if self.walker.promised > self._next else 0)
 
-    def due(self) -> float | None:
-        """See `Run`."""
+    def due(self) -> float:
+        """Return the steady time [s] at which ``walk`` has something to yield."""
         return (self._due_at + self._ready) / NANOSECONDS_PER_SECOND
 
     def wait(self) -> None:
-        """See `Run`."""
+        """Wait until the stretch that was yielded may be published."""
         early = self._due_at + self.walker.reached - self._clock()
         time.sleep(max(early, 0) / NANOSECONDS_PER_SECOND)
 
     def walk(self) -> Iterator[Stretch | Starved | Progress]:
-        """See `Run`."""
+        """Walk as far as is allowed now; what is yielded is published before the next is made."""
         now = self._clock() - self._due_at
         if now < self._ready:
             return
@@ -219,3 +212,6 @@ class RealTimeRun(Run):
             reached = self.walker.reached
             self._next_progress = reached - reached % PROGRESS_PERIOD + PROGRESS_PERIOD
             yield self.progress()
+
+
+Run = LockStepRun | RealTimeRun
