@@ -70,6 +70,7 @@ def outcome_of(run: Run) -> dict[str, Any]:
                     "phase_lag": pulse.phase_lag,
                 }
                 for pulse in analysis.pulses
+                if pulse.stride <= protocol.strides
             ],
             "verdict": verdict.name.lower(),
             "reason": reason.name.lower() if reason else None,

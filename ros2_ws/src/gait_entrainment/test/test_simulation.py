@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.gait import Verdict, analyze
 from gait_entrainment.outcome import outcome_of
+from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.protocol import Protocol, PulsePlan
 from gait_entrainment.robot import LimitError
 from gait_entrainment.simulation import simulate
@@ -160,3 +161,12 @@ def test_a_pulse_without_its_toe_off_has_no_say_in_the_final_lag(default):
     outcome = outcome_of(replace(default, events=events, analysis=analysis))
     assert outcome["final_phase_lag"] == pytest.approx(whole["final_phase_lag"], abs=1e-6)
     assert outcome["double_stance"] == pytest.approx(whole["double_stance"], abs=1e-6)
+
+
+@pytest.mark.parametrize("leg_length", [0.8, 0.92, 1.0, 1.1])
+def test_first_pulse_lies_in_the_stride_after_the_baseline(leg_length):
+    walker = WalkerParameters(leg_length=leg_length, foot_length=0.2 * leg_length)
+    protocol = Protocol(baseline=4, washout=1, pulses=PulsePlan(count=2), walker=walker)
+    first = simulate(protocol).analysis.pulses[0]
+    assert first.stride == 5
+    assert first.phase < 1e-8

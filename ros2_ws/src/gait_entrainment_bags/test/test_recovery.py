@@ -286,6 +286,7 @@ def without(bag: Path, out: Path, begin: float, end: float) -> Path:
     ("begin", "end", "missing"),
     [
         (80.0, 82.0, "4 gait events"),
+        (80.0, 82.0, "/joint_states: "),
         (0.0, 40.0, "torque profiles"),
         (100.0, 1000.0, "the end of run"),
     ],

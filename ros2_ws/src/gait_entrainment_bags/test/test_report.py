@@ -3,6 +3,7 @@
 
 """Outcome and figures of a run, checked against the simulation that they tell of."""
 
+import dataclasses
 import json
 import math
 import struct
@@ -96,3 +97,23 @@ def test_a_run_without_pulses_or_strides_can_be_drawn_too(tmp_path):
         real_time_factor=math.nan,
     )
     assert len(draw_figures(run, tmp_path)) == 4
+
+
+def test_holes_are_told_in_json_and_to_people(simulation):
+    onsets = simulation.onsets[:30] + simulation.onsets[31:]
+    events = [e for e in simulation.events if e.step < 120]
+    analysis = analyze(events, onsets, Side.RIGHT)
+    told = outcome_of(dataclasses.replace(simulation, analysis=analysis))
+    assert [hole["missing"] for hole in told["holes"]] == ["1 pulse(s)", "the last 21 strides"]
+    assert told["holes"][0]["start"] == pytest.approx((onsets[29] - events[0].stamp) / 1e9)
+    assert len(told["stretches"]) == 2
+    text = summary(told)
+    assert "1 pulse(s) at " in text
+    assert "until stride" in text
+    assert "the train is longer" not in text
+
+
+def test_a_train_that_is_longer_than_the_run_is_told():
+    plan = PulsePlan(count=10, period_offset=0.3, torque_fraction=0.0)
+    told = summary(outcome_of(simulate(Protocol(baseline=3, washout=0, pulses=plan))))
+    assert "pulses placed in them: 9 of 10; the train is longer than the run" in told
