@@ -25,7 +25,12 @@ def lateness_of_sleeping():
         due = begin + k / RATE
         time.sleep(max(due - time.monotonic(), 0))
         late.append(time.monotonic() - due)
-    late.sort()
+    return quantiles(late)
+
+
+def quantiles(late):
+    """Return the median, the 99 % quantile and the worst of latenesses [s], in ms."""
+    late = sorted(late)
     return {
         "p50": 1e3 * late[len(late) // 2],
         "p99": 1e3 * late[len(late) * 99 // 100],

@@ -213,7 +213,9 @@ def test_fall_is_reported_with_its_bag(tmp_path):
 # Node, arguments, what the one line must name.
 WRONG_PARAMETERS = [
     ("walker_sim", ["-p", "mass:=-1.0"], ["mass", "-1.0", "above 0 and at most 10000 kg"]),
-    ("walker_sim", ["-p", "mass:=80"], ["mass", "80", "80.0"]),
+    ("walker_sim", ["-p", "mass:=-80"], ["mass", "-80", "above 0 and at most 10000 kg"]),
+    # A whole number does for a real one: what is refused is the other.
+    ("walker_sim", ["-p", "mass:=80", "-p", "sample_rate:=2000"], ["sample_rate", "2000"]),
     ("walker_sim", ["-p", "mass:=heavy"], ["mass", "heavy", "above 0 and at most 10000 kg"]),
     ("walker_sim", ["-p", "mass:=0.0"], ["mass", "0.0", "above 0"]),
     ("walker_sim", ["-p", "mass:=.nan"], ["mass", "nan"]),

@@ -7,6 +7,7 @@ Protocol files: YAML in, a validated Protocol out, with the line of whatever is 
 PyYAML's node graph keeps the line of every key, which its loaded dictionaries do not.
 """
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -137,7 +138,20 @@ def _walk(node: yaml.Node, name: str, prefix: str) -> Iterator[tuple[str, _Entry
                 raise ProtocolError(
                     f"{where}: {key}: {value_node.value[:40]!r} cannot be read as a value"
                 ) from None
+            _require_plain_number(where, key, value_node, value)
             yield key, _Entry(value, where)
+
+
+def _require_plain_number(where: str, key: str, node: yaml.ScalarNode, value: object) -> None:
+    """Raise ProtocolError for what YAML 1.1 takes for a number and people do not, or vice versa."""
+    number = FIELDS[key].kind in (int, float)
+    if number and node.style in ("'", '"'):
+        raise ProtocolError(f"{where}: {key}: {node.value!r} is a text: leave out the quotes")
+    other_base = ":" in node.value or re.match(r"[-+]?0[0-9_box]", node.value)
+    if number and isinstance(value, int) and other_base:
+        raise ProtocolError(
+            f"{where}: {key}: {node.value} is {value} in YAML; write it as a decimal number"
+        )
 
 
 def _build(entries: Mapping[str, _Entry]) -> Protocol:

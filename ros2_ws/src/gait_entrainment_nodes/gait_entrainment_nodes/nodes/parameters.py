@@ -88,11 +88,13 @@ def refuse_unknown_parameters(node: Node) -> None:
 def _declare(
     node: Node, name: str, default: Any, descriptor: ParameterDescriptor, told: Setting
 ) -> None:
+    given = given_parameters(node).get(name, default)
+    # A whole number does for a real one everywhere, but not to ROS.
+    whole = told.kind is float and isinstance(given, int) and not isinstance(given, bool)
+    if whole:
+        default = told.check(name, given)
     try:
-        node.declare_parameter(name, default, descriptor)
+        node.declare_parameter(name, default, descriptor, ignore_override=whole)
     except (InvalidParameterValueException, InvalidParameterTypeException):
-        given = given_parameters(node)[name]
         told.check(name, given)
-        # Whole numbers do for real ones everywhere but in ROS.
-        number = f"a number with a decimal point, such as {float(given)!r}"
-        raise SettingError(f"{name}: {given!r}; allowed: {number}") from None
+        raise
