@@ -281,6 +281,31 @@ def test_a_folder_that_is_there_is_not_touched(tmp_path: Path) -> None:
     assert {file: file.read_bytes() for file in (tmp_path / "bag").iterdir()} == before
 
 
+@pytest.mark.parametrize("named", [False, True], ids=["by themselves", "all the same"])
+def test_runs_that_start_together_leave_each_others_bags_alone(
+    tmp_path: Path, named: bool
+) -> None:
+    command = ["entrain", "run", "--json", "--no-figures", "--sample-rate=0", "--baseline=2"]
+    command += ["--pulses=1", "--washout=0", *(["--out=mine"] if named else [])]
+    runs = [
+        subprocess.Popen(
+            command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        for _ in range(3)
+    ]
+    told = [run.communicate(timeout=PATIENCE) for run in runs]
+    codes = sorted(run.returncode for run in runs)
+    assert codes == ([0, 2, 2] if named else [0, 0, 0]), told
+    bags = list(tmp_path.iterdir()) if named else list((tmp_path / "bags").iterdir())
+    assert len(bags) == codes.count(0)
+    for bag in bags:
+        with BagReader(bag) as reader:
+            assert reader.message_count == sum(1 for _ in reader.messages()) > 0
+        assert check(bag) == []
+    refused = [problems for _, problems in told if problems]
+    assert all("already there; a bag is never overwritten" in text for text in refused)
+
+
 def test_what_was_lost_is_counted_and_written_down(tmp_path: Path) -> None:
     with recorder(tmp_path) as (process, listener):
         publisher(listener, "left").publish(joints(0, SECOND))

@@ -56,10 +56,12 @@ def noting(note: Callable[[str], object]) -> Iterator[None]:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder that is not there yet; raises BagExistsError or BagWriteError."""
+    """Make a folder, or take an empty one; raises BagExistsError or BagWriteError."""
     try:
         folder.mkdir(parents=True)
     except FileExistsError:
+        if folder.is_dir() and not any(folder.iterdir()):
+            return
         raise BagExistsError(
             f"{folder}: is already there; choose another folder, nothing is overwritten"
         ) from None

@@ -4,8 +4,11 @@
 """The options from which the parameters of the nodes follow, checked before anything starts."""
 
 import argparse
+import itertools
 import os
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from gait_entrainment.commands.outcome_options import add_onset_option
@@ -99,6 +102,31 @@ def check_output(bag: Path) -> None:
         raise UsageError(
             f"--out: {parent} cannot be written to: {error.strerror}; choose another folder"
         ) from None
+
+
+@contextmanager
+def claimed_folder(bag: Path, *, exactly: bool) -> Iterator[Path]:
+    """
+    Make the folder of a bag, which is this run's from then on; take it away if it stays empty.
+
+    Unless it has to be ``exactly`` this one, a number is appended while another run has it.
+    Raises UsageError if it is there already.
+    """
+    for number in itertools.count(1):
+        folder = bag if number == 1 else bag.with_name(f"{bag.name}_{number}")
+        try:
+            folder.mkdir(parents=True)
+            break
+        except FileExistsError:
+            if exactly:
+                raise UsageError(
+                    f"--out: {bag} is already there; a bag is never overwritten"
+                ) from None
+    try:
+        yield folder
+    finally:
+        with suppress(OSError):  # it is not empty
+            folder.rmdir()
 
 
 def is_utf8(path: Path) -> bool:

@@ -143,7 +143,7 @@ def _walk(node: yaml.Node, name: str, prefix: str) -> Iterator[tuple[str, _Entry
 
 
 def _require_plain_number(where: str, key: str, node: yaml.ScalarNode, value: object) -> None:
-    """Raise ProtocolError for what YAML 1.1 takes for a number and people do not, or vice versa."""
+    """Raise ProtocolError for what YAML 1.1 takes for another number than people do, or a text."""
     number = FIELDS[key].kind in (int, float)
     if number and node.style in ("'", '"'):
         raise ProtocolError(f"{where}: {key}: {node.value!r} is a text: leave out the quotes")

@@ -21,7 +21,12 @@ from gait_entrainment_bringup.node_list import (
     STOP_ORDER,
     parameter_arguments,
 )
-from gait_entrainment_bringup.run_options import add_run_options, checked_run, chosen_parameters
+from gait_entrainment_bringup.run_options import (
+    add_run_options,
+    checked_run,
+    chosen_parameters,
+    claimed_folder,
+)
 from gait_entrainment_bringup.signals import stop_on_signals
 from gait_entrainment_bringup.supervisor import supervised
 from gait_entrainment_nodes.messaging.domain import claimed_domain
@@ -63,8 +68,9 @@ def run(options: argparse.Namespace) -> int:
     protocol, bag = checked_run(options)
     if options.elsewhere and "ROS_DOMAIN_ID" not in os.environ:
         raise UsageError("--elsewhere: set ROS_DOMAIN_ID, to the same number on every host")
-    with claimed_domain() as domain:
-        run_experiment(protocol, bag, domain, options)
+    exactly = options.out is not None
+    with claimed_domain() as domain, claimed_folder(bag, exactly=exactly) as folder:
+        run_experiment(protocol, folder, domain, options)
     return 0
 
 
@@ -113,7 +119,7 @@ def kept(bag: Path) -> str:
 
     A recorder that was killed could not close the bag; what reached the file is rescued.
     """
-    if not bag.exists():
+    if not any(bag.iterdir()):
         return ""
     try:
         BagReader(bag).close()
