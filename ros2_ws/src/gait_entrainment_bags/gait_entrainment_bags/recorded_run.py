@@ -33,6 +33,7 @@ from gait_entrainment_bags.decoding import decoder_for
 from gait_entrainment_bags.errors import BagError
 from gait_entrainment_bags.mcap_records import BagMessage
 from gait_entrainment_bags.reader import BagReader
+from gait_entrainment_bags.recovery import RECOVERY_KEY
 from gait_entrainment_bags.writer import ENDED_EARLY
 
 # Strides of which the ankle torque is read: more would not be told apart in a figure.
@@ -134,12 +135,17 @@ def read_run(
 
 
 def _lost(bag: BagReader) -> int | None:
-    """Return how many messages the recorder missed; None if it does not say."""
+    """Return how many messages of what was published are not here; None if nothing tells."""
+    published: dict[str, int] = {}
+    names = [n for n, topic in bag.topics.items() if topic.type.endswith("/PublishedCounts")]
+    for _, message in bag.decoded(names) if names else ():
+        published |= dict(zip(message.topics, message.counts, strict=True))
+    lost = sum(max(n - bag.counts.get(name, n), 0) for name, n in published.items())
     told = bag.custom_data.get("messages_lost")
-    if told is None:
-        return None
+    if told is None or (RECOVERY_KEY in bag.custom_data and not published):
+        return lost or None
     try:
-        return sum(map(int, json.loads(told).values()))
+        return max(lost, sum(map(int, json.loads(told).values())))
     except (ValueError, TypeError, AttributeError):
         raise BagError(
             f"{bag.path}: its messages_lost is {told!r}; allowed: a JSON object of counts by topic"

@@ -299,5 +299,8 @@ def test_what_the_run_lacks_is_told(
     assert missing in "; ".join(rescued.losses)
     assert [finding.rule for finding in check(cut)] == ["record"]
     run = read_run(cut)
-    assert recorded_outcome(run, cut)["holes"]
+    told = recorded_outcome(run, cut)
+    assert told["holes"]
+    assert told["lost"] != 0 or end > 200, "the counts at the end of the run tell"
+    assert recorded_outcome(read_run(rescued.folder), cut)["lost"] != 0
     assert run.analysis.entrainments[-1].verdict not in (Verdict.LOST, Verdict.DRIFTING)

@@ -14,11 +14,9 @@ class Drift:
     How a lag moves; all NaN, and nothing creeps, with fewer than three successive pulses.
 
     The lag of an indifferent walker is a sum over strides: its spread grows with the number of
-    pulses, by drift and by wandering, and the more so the longer the memory of the strides. That
-    of a locked walker does not. The scatter is alike for both: that of second differences, in
-    which the drift cancels, and which for an indifferent walker are those of successive strides.
-    Their ratio is von Neumann's (1941), as a test of a random walk that of Sargan and Bhargava
-    (1983), one difference higher, so that noise with a long memory counts as wandering.
+    pulses, by drift and by wandering. That of a locked one does not. The scatter is alike: that of
+    second differences, in which the drift cancels. Spread over scatter is von Neumann's ratio
+    (1941), a test of a random walk by Sargan and Bhargava (1983), taken one difference higher.
     """
 
     slope: float  # of a least-squares line [s per stride]

@@ -34,7 +34,7 @@ class GaitLimits:
 
     stride_least: float = setting(0.3, "shortest stride", "s", (1e-6, 1e6))
     stride_most: float = setting(5.0, "longest stride", "s", (1e-6, 1e6))
-    stride_change: float = setting(0.4, "departure from the person's median", "1", (0.01, 1.0))
+    stride_change: float = setting(0.4, "change from the own median", "1", (0.01, 1.0))
     silence: float = setting(1.5, "strides without a strike that end a gait", "1", (1.05, 10.0))
     baseline_spread: float = setting(0.15, "deviation of baseline strides", "1", (0.001, 1.0))
 
@@ -70,8 +70,8 @@ class GaitWatch:
         limits, median, seconds = self.limits, self.median, elapsed / NANOSECONDS_PER_SECOND
         least, most = limits.stride_least, limits.stride_most
         if not math.isnan(median):
-            least = max(least, (1 - limits.stride_change) * median)
-            most = min(most, (1 + limits.stride_change) * median)
+            factor = max(1 - limits.stride_change, 1e-9)
+            least, most = max(least, factor * median), min(most, median / factor)
         # Of less than a stride only the end is bounded: its parts are anybody's own.
         return (strides < 1 or least * strides <= seconds) and seconds <= most * max(strides, 1)
 

@@ -94,10 +94,9 @@ class LagFollower:
     """
     Follows the phase lag across its wraps.
 
-    Pulse n is compared with the toe-off n strides after that of the first pulse. That toe-off
-    may lie in the future, so its distance from the nearest one is counted in unperturbed strides
-    T: unwrapped lag = lag + (m - n) T if m strides and n pulses have passed since the first lag.
-    It presumes one train with one pulse a stride (1:1 entrainment) and a record without holes.
+    Pulse n is compared with the toe-off n strides after that of the first pulse. That may lie in
+    the future, so the strides T between are counted: unwrapped lag = lag + (m - n) T after m
+    strides and n pulses. Presumes one train, with one pulse a stride, and no hole.
     """
 
     def __init__(self) -> None:

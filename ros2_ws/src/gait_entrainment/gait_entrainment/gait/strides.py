@@ -91,9 +91,7 @@ class StrideTracker:
         self._stamps: dict[int, int] = {}  # remembered events: place -> stamp
         self._latest_place = -1
         self._strike_place = -1
-        self._rival: StrideTracker | None = (
-            None  # of the latest events, dropped, that fit together
-        )
+        self._rival: StrideTracker | None = None  # of dropped events that fit together
 
     def add(self, event: GaitEvent) -> Stride | None:
         """Take one event; return the stride that it closes, if it closes one."""
@@ -166,8 +164,8 @@ class StrideTracker:
             return None
         self.watch.add(event.stamp, (event.stamp - start) / NANOSECONDS_PER_SECOND)
         middle = self._stamps.get(event.place - 2, math.nan)
-        steps = middle - start, event.stamp - middle
-        step_periods = (steps[0] / NANOSECONDS_PER_SECOND, steps[1] / NANOSECONDS_PER_SECOND)
+        first, second = middle - start, event.stamp - middle
+        step_periods = first / NANOSECONDS_PER_SECOND, second / NANOSECONDS_PER_SECOND
         toe_off = self._stamps.get(event.place - 1)
         return Stride(closed, self.side, start, event.stamp, toe_off, step_periods)
 

@@ -51,8 +51,8 @@ def test_strides_that_cannot_be_are_not_believed(periods, believed):
         (10, 4.0, False),  # a step far ahead
         (1.25, 3600.0, False),  # a stamp far ahead
         (0.25, 0.01, True),
-        (0.25, 1.5, True),
-        (0.25, 1.6, False),
+        (0.25, 1.8, True),
+        (0.25, 1.9, False),
     ],
 )
 def test_of_several_strides_or_a_part_of_one_the_mean_counts(strides, seconds, believed):

@@ -130,14 +130,14 @@ class Run:
         """Take one gait event; request the pulses when it is time."""
         if self.conductor is None:
             return
-        self._events += 1
         try:
             train = self.conductor.add_event(event_of(event))
         except MessageError:
-            train = None  # not believed; the analyzer tells
+            return  # no event: the analyzer tells
         except EntrainmentError as error:
             self.fail(ExperimentError(str(error)))
             return
+        self._events += 1
         if train is not None:
             self._planning, self._planning_at = True, self._clock()
             self._request(train)

@@ -69,8 +69,9 @@ class Run:
 
     def add_event(self, event: msg.GaitEvent) -> list[Result]:
         """Take one gait event."""
+        taken = event_of(event)
         self._events += 1
-        return self._analyzer.add_event(event_of(event))
+        return self._analyzer.add_event(taken)
 
     def add_profile(self, message: msg.TorqueProfile) -> list[Result]:
         """Take the onsets that are promised, or a stop: the instant from which torque is zero."""
