@@ -24,7 +24,8 @@ OPTIONS = (*QUICK, "--baseline=3", "--pulses=30", "--washout=1", "--initial-phas
 def real_time_run(tmp_path_factory):
     bag = tmp_path_factory.mktemp("real_time") / "bag"
     with entrain_run(bag, "--real-time", "--json", f"--sample-rate={RATE}", *OPTIONS) as run:
-        for node in run.find_nodes().values():
+        run.wait_for_stride(1)
+        for node in run.nodes.values():
             assert os.sched_getscheduler(node) == permitted_policy()
         return bag, run.outcome()
 

@@ -15,6 +15,7 @@ from gait_entrainment_bringup.supervisor import Supervisor
 from gait_entrainment_bringup.watch import Watch
 from gait_entrainment_msgs.action import RunProtocol
 from gait_entrainment_nodes.messaging.client import Client
+from gait_entrainment_nodes.messaging.environment import come_before_others
 from gait_entrainment_nodes.messaging.errors import NodeError
 from gait_entrainment_nodes.messaging.topics import PULSE_PHASES, STRIDES
 
@@ -33,12 +34,14 @@ def conduct(
     on_start: Callable[[], None],
     *,
     quiet: bool,
+    real_time: bool,
     silence: float = SILENCE_TIMEOUT,
 ) -> None:
     """
     Conduct a protocol through the experiment node to its end, and watch the processes meanwhile.
 
-    ``on_start`` is called once the experiment has accepted it. Nodes that nobody else watches may
+    ``on_start`` is called once the experiment has accepted it. In ``real_time`` this process comes
+    before others. Nodes that nobody else watches may
     be silent for ``silence`` [s].
 
     Raises
@@ -70,6 +73,8 @@ def conduct(
             operator()
 
         client.each_round = look
+        if real_time:
+            come_before_others()
         client.wait_to_be_known("experiment", APPEARANCE_TIMEOUT)
         goal = RunProtocol.Goal(protocol=write_protocol(protocol))
         handle = client.send_goal(RunProtocol, ACTION, goal, on_feedback=on_feedback)

@@ -27,9 +27,6 @@ PATIENCE = 1.5
 # How long the recorder may take to close the bag after the experiment or replay has ended [s].
 CLOSING_TIMEOUT = 15.0
 LOG_LINES = 8
-# In real time this process and its nodes come before others, if the system permits: below the
-# loop that times the torque. Niceness would not do: it counts within a session only.
-PRIORITY = 10
 METHOD = "fork"  # of starting the nodes of a command
 
 
@@ -135,9 +132,6 @@ def supervised(
     once everything has stopped, and the end of the log of the node to blame.
     """
     environment = set_environment(domain, real_time=real_time)
-    if real_time:
-        with suppress(OSError):  # not permitted: then it takes its turn like others
-            os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(PRIORITY))
     load()
     with tempfile.TemporaryDirectory(prefix="entrain_") as folder:
         supervisor = Supervisor(Path(folder), environment, METHOD)

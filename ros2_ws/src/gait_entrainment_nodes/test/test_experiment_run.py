@@ -10,7 +10,7 @@ from gait_entrainment.experiment import Conductor, Part
 from gait_entrainment.messages import nanoseconds_of
 from gait_entrainment.protocol import Protocol, PulsePlan
 from gait_entrainment_msgs.msg import GaitEvent, Progress, TorqueProfile, Trouble
-from gait_entrainment_nodes.messaging.stamps import header
+from gait_entrainment_nodes.messaging.stamps import header, to_time
 from gait_entrainment_nodes.messaging.topics import EXPERIMENT_STATE, HORIZON
 from gait_entrainment_nodes.nodes.experiment_run import ExperimentError, Run
 
@@ -22,14 +22,14 @@ PROTOCOL = Protocol(baseline=2, pulses=PulsePlan(count=1), washout=1)
 class Bench:
     """Walker and perturbator around a run, on a clock of their own."""
 
-    def __init__(self, recorded=False):
+    def __init__(self, **kind):
         self.now = 100.0
         self.published, self.trains = [], []
         self.run = Run(
             7,
             lambda topic, message: self.published.append((topic, message)),
             self.trains.append,
-            recorded=recorded,
+            **({"recorded": False} | kind),
             clock=lambda: self.now,
         )
         self.events = self.grant = 0
@@ -60,7 +60,11 @@ class Bench:
         self.run.take_progress(message)
 
     def promise(self, **values):
-        self.run.take_profile(TorqueProfile(run=7, **values))
+        """Let the perturbator answer, up to the horizon if it is not said how far."""
+        profile = TorqueProfile(run=7, valid_until=to_time(self.run.promised_until))
+        for name, value in values.items():
+            setattr(profile, name, value)
+        self.run.take_profile(profile)
 
     def after(self, seconds):
         """Let time pass, and see what becomes of the run."""
@@ -164,6 +168,23 @@ def test_recorder_is_named_if_it_is_what_the_walker_waits_for():
     bench.promise()
     assert bench.after(TIMEOUT) is None
     assert blamed(bench.after(0.1)) == ("bag_recorder has been silent for 3 s", "bag_recorder")
+
+
+def test_in_real_time_each_owes_what_it_does_by_itself():
+    bench = Bench(real_time=True)
+    bench.begin()
+    # A robot tells its torque piece by piece, behind the horizon; the walker says nothing.
+    for piece in range(1, 4):
+        bench.promise(valid_until=to_time(10 * SECOND + piece * SECOND // 10))
+        assert bench.after(1.0) is None
+    assert blamed(bench.after(0.1)) == ("walker_sim has been silent for 3 s", "walker_sim")
+    bench = Bench(real_time=True)
+    bench.begin()
+    bench.promise(valid_until=to_time(10 * SECOND + 1))
+    for k in range(3):  # the walk goes on, and the robot tells no more
+        bench.report(10 * SECOND + k)
+        assert bench.after(1.0) is None
+    assert blamed(bench.after(0.1)) == ("perturbator has been silent for 3 s", "perturbator")
 
 
 def test_silence_counts_anew_after_this_process_was_held_up(bench):

@@ -93,7 +93,8 @@ def run_experiment(
         real = not find_driver(protocol.driver).simulated
         silence = {"silence": PERSON_SILENCE} if real else {}
         load = partial(load_report, figures)
-        conduct(supervisor, protocol, load, quiet=options.json, **silence)
+        how = {"quiet": options.json, "real_time": options.real_time}
+        conduct(supervisor, protocol, load, **how, **silence)
         supervisor.wait_for_record()
         # No torque is left and the record is closed: in which order the rest ends does not matter.
         supervisor.request_stop(NODES)

@@ -6,11 +6,14 @@
 import getpass
 import os
 import socket
+from contextlib import suppress
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
 
 PACKAGE = "gait_entrainment_nodes"
+# Below the loop that times the torque.
+_PRIORITY = 10
 
 
 def shared_file(package: str, name: str) -> Path:
@@ -42,6 +45,19 @@ def set_environment(domain: int, *, real_time: bool = False) -> dict[str, str]:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ["ROS_DOMAIN_ID"] = str(domain)
     return dict(os.environ)
+
+
+def come_before_others() -> None:
+    """
+    Have all threads of this process scheduled before those of others, if the system permits.
+
+    For a process that waits most of the time: one that computes without end would use up what the
+    system leaves to such processes, and hold up the loop that times the torque with it. Niceness
+    would not do: it counts within a session only.
+    """
+    with suppress(OSError):  # not permitted: then it takes its turn like others
+        for thread in Path("/proc/self/task").iterdir():
+            os.sched_setscheduler(int(thread.name), os.SCHED_RR, os.sched_param(_PRIORITY))
 
 
 def user_and_host() -> str:

@@ -153,7 +153,12 @@ class Experiment(Participant):
         self._runs += 1
         recorded = RECORDER in self._participants.names
         run = self.run = Run(
-            self._runs, self.publish, self._request, recorded=recorded, held_up=self._held_up
+            self._runs,
+            self.publish,
+            self._request,
+            recorded=recorded,
+            real_time=not self.get_parameter("use_sim_time").value,
+            held_up=self._held_up,
         )
         self.note_state(DiagnosticStatus.OK, f"run {run.number} goes on")
         result = RunProtocol.Result(run=run.number, outcome=RunProtocol.Result.FAILED)

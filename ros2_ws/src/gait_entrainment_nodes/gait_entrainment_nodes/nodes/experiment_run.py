@@ -11,9 +11,10 @@ requested it promises nothing.
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment.errors import EntrainmentError
 from gait_entrainment.experiment import Conductor, Part
 from gait_entrainment.messages import MessageError, event_of, nanoseconds_of
@@ -40,7 +41,8 @@ class Run:
     One run, from when its participants are brought together to the walker's last word.
 
     ``request`` asks the perturbator for pulses; ``take_answer`` is then told its answer. If the
-    run is ``recorded``, the walker waits for the recorder. ``held_up`` says by whom a node that is
+    run is ``recorded``, the walker waits for the recorder. In ``real_time`` nobody waits for
+    anybody, and each owes what it does by itself. ``held_up`` says by whom a node that is
     silent is held up, if that is known. ``clock`` is steady time [s].
     """
 
@@ -51,6 +53,7 @@ class Run:
         request: Callable[[PulseTrain], None],
         *,
         recorded: bool,
+        real_time: bool = False,
         held_up: Callable[[str], str] = lambda _: "",
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -65,11 +68,12 @@ class Run:
         self.stopped_at: float | None = None  # it ended or refused torque, steady time [s]
         self.closing = self.closed = False  # the closing horizon was sent, was answered
         self._publish, self._request = publish, request
-        self._recorded, self._held_up, self._clock = recorded, held_up, clock
+        self._recorded, self._real_time = recorded, real_time
+        self._held_up, self._clock = held_up, clock
         self._events = 0
         self._progress: msg.Progress | None = None  # received, not answered yet
         self._grant = self._recorded_grant = -1
-        self._horizons = self._profiles = 0  # sent, and received in answer
+        self._covered_until = 0  # by profiles [ns since 1970]
         self._planning = False  # pulses were requested and not accepted yet
         self._shown: tuple[Part, int] | None = None
         self.forgive()
@@ -86,6 +90,8 @@ class Run:
             self.fail(self.trouble_error())
         else:
             self._promise(conductor, start)
+            # In real time the walk begins a little later than the walker's answer.
+            self._progress_at += max(start - time.time_ns(), 0) / NANOSECONDS_PER_SECOND
 
     def fail(self, error: ExperimentError) -> None:
         """End the run, if it is not over."""
@@ -164,7 +170,7 @@ class Run:
         if profile.stop:
             self._note_stop()
         else:
-            self._profiles += 1
+            self._covered_until = nanoseconds_of(profile.valid_until)
             self._profile_at = self._clock()
             self.closed = self.closing
 
@@ -224,13 +230,12 @@ class Run:
 
     def _send_horizon(self, until: int, last: bool) -> None:
         """Publish a horizon, which is owed an answer from now on."""
+        if self._covered_until >= self.promised_until:  # nothing was owed until now
+            self._profile_at = self._clock()
         self.promised_until = until
         known, until_time = header(self.known_until), to_time(until)
         horizon = msg.Horizon(header=known, run=self.number, until=until_time, last=last)
         self._publish(topics.HORIZON, horizon)
-        if self._horizons == self._profiles:
-            self._profile_at = self._clock()
-        self._horizons += 1
 
     # Who is silent
 
@@ -247,7 +252,7 @@ class Run:
         if stopped_at is not None and (self.trouble or now > stopped_at + REASON_TIMEOUT):
             self.fail(self.trouble_error())
             return
-        asked_at, silent = self._debt()
+        asked_at, silent = min(self._debts()) if self._real_time else next(self._debts())
         if asked_at < now - silence_timeout:
             what = f"{silent} has been silent"
             if silent == WALKER and self._progress is not None:
@@ -256,16 +261,20 @@ class Run:
             why = self._held_up(silent)
             self.fail(ExperimentError(f"{what} for {silence_timeout:g} s{why}", silent))
 
-    def _debt(self) -> tuple[float, str]:
-        """Return since when an answer has been owed, on steady time [s], and by whom."""
+    def _debts(self) -> Iterator[tuple[float, str]]:
+        """
+        Yield since when something has been owed, on steady time [s], and by whom.
+
+        In lock-step each but the first waits for the one before, and rightly so.
+        """
         if self._planning:
-            return self._planning_at, PERTURBATOR
-        if self._horizons > self._profiles:
-            return self._profile_at, PERTURBATOR
+            yield self._planning_at, PERTURBATOR
+        if self._covered_until < self.promised_until:
+            yield self._profile_at, PERTURBATOR
         if self._recorded and self._recorded_grant < self._grant:
-            # In lock-step the walker waits for the recorder, rightly.
-            return self._recorded_at, RECORDER
-        return max(self._progress_at, self._profile_at), WALKER
+            yield self._recorded_at, RECORDER
+        since = self._progress_at
+        yield since if self._real_time else max(since, self._profile_at), WALKER
 
     # What the perturbator has to say
 

@@ -23,6 +23,7 @@ from rclpy.utilities import remove_ros_args
 
 from gait_entrainment.errors import EntrainmentError, UsageError
 from gait_entrainment_bags import NothingToPlayError
+from gait_entrainment_nodes.messaging.environment import come_before_others
 
 # The longest time [s] that the loop sleeps in the executor, so that a signal is soon obeyed.
 LONGEST_SLEEP = 0.1
@@ -57,6 +58,8 @@ def run_node(make_node: Callable[[], Any]) -> int:
             _join_ros()
             node = make_node()
             node.offer_ready()
+            if not node.get_parameter("use_sim_time").value:
+                come_before_others()
         except (EntrainmentError, ParameterException, ValueError, RuntimeError) as error:
             print(f"{name}: {' '.join(str(error).split())}", file=sys.stderr)
             return 1 if isinstance(error, NothingToPlayError) else 2
