@@ -153,7 +153,7 @@ def trial(action: str, motor: str, draw: random.Random, folder: Path) -> tuple[f
         before < 0.5 * HEIGHT <= after for (_, _, before), (_, _, after) in pairwise(rows)
     )
     last = max(pushing, default=since)
-    return (last - since) / 1e6, further, said[-1] if said else ""
+    return (last - since) / 1e6, further, said[0] if said else ""
 
 
 def main() -> int:

@@ -91,7 +91,8 @@ class Run:
         else:
             self._promise(conductor, start)
             # In real time the walk begins a little later than the walker's answer.
-            self._progress_at += max(start - time.time_ns(), 0) / NANOSECONDS_PER_SECOND
+            later = max(start - time.time_ns(), 0) / NANOSECONDS_PER_SECOND
+            self._progress_at = self._clock() + later
 
     def fail(self, error: ExperimentError) -> None:
         """End the run, if it is not over."""
