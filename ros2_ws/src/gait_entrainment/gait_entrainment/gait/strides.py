@@ -4,6 +4,7 @@
 """Gait events and the strides of one leg; events may be missing, doubled or out of order."""
 
 import math
+import statistics
 from dataclasses import dataclass
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
@@ -174,20 +175,23 @@ class UnperturbedPeriod:
     """Mean period of the complete strides before the first pulse, in exact integer arithmetic."""
 
     def __init__(self) -> None:
-        self._count = self._sum = self._squares = 0
+        self._periods: list[int] = []  # [ns]
         self.mean = math.nan  # [s]
         self.deviation = math.nan  # standard deviation of the strides [s]; NaN with one
         self.standard_error = math.nan  # of the mean [s]; NaN with one stride
 
     def add(self, stride: Stride) -> None:
         """Take one stride."""
-        period = stride.end - stride.start
-        self._count += 1
-        self._sum += period
-        self._squares += period * period
-        n, total = self._count, self._sum
-        self.mean = total / (n * NANOSECONDS_PER_SECOND)
+        self._periods.append(stride.end - stride.start)
+
+    def settle(self, limits: GaitLimits) -> None:
+        """Set the figures, from the strides that their median allows: a pause is none of them."""
+        own = statistics.median(self._periods or [0]) * (1 - limits.stride_change)
+        kept = [p for p in self._periods if own <= p <= own / (1 - limits.stride_change) ** 2]
+        n, total = len(kept), sum(kept)
+        if n > 0:
+            self.mean = total / (n * NANOSECONDS_PER_SECOND)
         if n > 1:
-            variance = (n * self._squares - total * total) / (n * n * (n - 1))
+            variance = (n * sum(p * p for p in kept) - total * total) / (n * n * (n - 1))
             self.standard_error = math.sqrt(variance) / NANOSECONDS_PER_SECOND
             self.deviation = self.standard_error * math.sqrt(n)

@@ -161,3 +161,11 @@ def test_a_toe_off_alone_missing_is_no_hole() -> None:
     assert not analysis.holes
     assert analysis.entrainments[-1].verdict == Verdict.ENTRAINED
     assert isinstance(analysis.pulses[-1], PulsePhase)
+
+
+@pytest.mark.parametrize("stride", range(1, BASELINE - 1))
+def test_a_pause_in_the_baseline_does_not_touch_the_unperturbed_period(stride: int) -> None:
+    begin, pause = stride * T + T // 4, 7000 * MS
+    events = [e if e.stamp < begin else moved(e, stamp=e.stamp + pause) for e in EVENTS]
+    last = judged(events, [o + pause for o in ONSETS]).entrainments[-1]
+    assert (last.verdict, last.unperturbed_period) == (Verdict.ENTRAINED, 2.0)
