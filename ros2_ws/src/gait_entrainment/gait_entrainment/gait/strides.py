@@ -12,6 +12,8 @@ from gait_entrainment.gait.plausibility import GaitLimits, GaitWatch
 
 # Heel strike and toe-off of each leg.
 PLACES = 4
+# Three strides: by then torque has ended, as if nobody walked.
+CONVINCING_PLACES = 3 * PLACES
 
 # How many places of the gait are remembered, four strides: enough to tell an event that comes
 # twice from one that comes late, and a bound on memory if a leg's strikes stop coming.
@@ -78,8 +80,8 @@ class StrideTracker:
     number. Out of order is fine until the leg's next heel strike, which closes one stride and
     gives up those that still lack a bound. The side of step 0 is taken from the first event. If
     two events contradict each other, the first to come is believed; and each only if the strides
-    since those before can have taken so long. A stride of events that fit together, but not what
-    was believed, is believed from then on: no single wrong event silences all that follow.
+    since those before can have taken so long. Three strides of events that fit together, but not
+    what was believed, are believed from then on: no single wrong event silences all that follow.
     """
 
     def __init__(self, side: Side, limits: GaitLimits | None = None) -> None:
@@ -140,11 +142,11 @@ class StrideTracker:
         return self.watch.believes((place - since) / PLACES, elapsed)
 
     def _doubt(self, event: GaitEvent) -> Stride | None:
-        """Drop an event, unless a stride of dropped ones fits together: then go on with those."""
+        """Drop an event, unless three strides of such fit together: then go on with those."""
         if self._rival is None or self._rival._fate(event) != "accepted":
             self._rival = StrideTracker(self.side, self.watch.limits)
         stride = self._rival.add(event) if event.place >= 0 else None
-        if self._rival.counts.accepted <= PLACES:
+        if self._rival.counts.accepted <= CONVINCING_PLACES:
             return None
         self.__dict__.update(self._rival.__dict__, counts=self.counts)
         return stride
