@@ -149,6 +149,9 @@ class StrideTracker:
         if self._rival.counts.accepted <= CONVINCING_PLACES:
             return None
         self.__dict__.update(self._rival.__dict__, counts=self.counts)
+        counts = self.counts  # those of places that were wrong are void
+        counts.missing = max(self._latest_place + 1 - counts.accepted, 0)
+        counts.missed_strides = min(counts.missed_strides, self.stride_in_progress)
         return stride
 
     def _first_step_if(self, event: GaitEvent) -> int:
