@@ -55,6 +55,10 @@ def outcome_of(run: Run) -> dict[str, Any]:
     entrained = verdict is Verdict.ENTRAINED
     placed = [p for p in analysis.pulses if p.toe_off is not None]  # the others have no lag
     lags = [p.phase_lag for p in placed[-FINAL_PULSES:]]
+
+    def seconds(stamp: int) -> float:
+        return max(stamp - start, 0) / NANOSECONDS_PER_SECOND
+
     parameters = asdict(protocol)
     parameters["side"] = protocol.side.name.lower()
     parameters["pulses"]["torque"] = protocol.pulse_torque
@@ -83,7 +87,7 @@ def outcome_of(run: Run) -> dict[str, Any]:
                 for e in {e.stretch: e for e in analysis.entrainments}.values()
             ],
             "holes": [
-                {"start": max(h.start - start, 0) / 1e9, "missing": h.missing}
+                {"start": seconds(h.start), "end": seconds(h.end), "missing": h.missing}
                 for h in holes_of(run)
             ],
             "gait_events": asdict(analysis.event_counts),

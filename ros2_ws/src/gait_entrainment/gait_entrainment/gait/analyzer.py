@@ -159,6 +159,8 @@ class GaitAnalyzer:
         if after is not None and after.number != stride.number + 1:
             after = None
         unperturbed = self._unperturbed
+        if onsets and self._numbers.number == 0:
+            unperturbed.settle(_ANYBODY)
         pulses: list[PulsePhase] = []
         judged = 0  # the first of them that neither a hole nor another train comes after
         for onset in onsets:

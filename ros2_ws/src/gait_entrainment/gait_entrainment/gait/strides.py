@@ -4,6 +4,7 @@
 """Gait events and the strides of one leg; events may be missing, doubled or out of order."""
 
 import math
+import statistics
 from dataclasses import dataclass
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
@@ -11,6 +12,8 @@ from gait_entrainment.gait.plausibility import GaitLimits, GaitWatch
 
 # Heel strike and toe-off of each leg.
 PLACES = 4
+# Three strides: by then torque has ended, as if nobody walked.
+CONVINCING_PLACES = 3 * PLACES
 
 # How many places of the gait are remembered, four strides: enough to tell an event that comes
 # twice from one that comes late, and a bound on memory if a leg's strikes stop coming.
@@ -77,8 +80,8 @@ class StrideTracker:
     number. Out of order is fine until the leg's next heel strike, which closes one stride and
     gives up those that still lack a bound. The side of step 0 is taken from the first event. If
     two events contradict each other, the first to come is believed; and each only if the strides
-    since those before can have taken so long. A stride of events that fit together, but not what
-    was believed, is believed from then on: no single wrong event silences all that follow.
+    since those before can have taken so long. Three strides of events that fit together, but not
+    what was believed, are believed from then on: no single wrong event silences all that follow.
     """
 
     def __init__(self, side: Side, limits: GaitLimits | None = None) -> None:
@@ -139,13 +142,16 @@ class StrideTracker:
         return self.watch.believes((place - since) / PLACES, elapsed)
 
     def _doubt(self, event: GaitEvent) -> Stride | None:
-        """Drop an event, unless a stride of dropped ones fits together: then go on with those."""
+        """Drop an event, unless three strides of such fit together: then go on with those."""
         if self._rival is None or self._rival._fate(event) != "accepted":
             self._rival = StrideTracker(self.side, self.watch.limits)
         stride = self._rival.add(event) if event.place >= 0 else None
-        if self._rival.counts.accepted <= PLACES:
+        if self._rival.counts.accepted <= CONVINCING_PLACES:
             return None
         self.__dict__.update(self._rival.__dict__, counts=self.counts)
+        counts = self.counts  # those of places that were wrong are void
+        counts.missing = max(self._latest_place + 1 - counts.accepted, 0)
+        counts.missed_strides = min(counts.missed_strides, self.stride_in_progress)
         return stride
 
     def _first_step_if(self, event: GaitEvent) -> int:
@@ -174,20 +180,23 @@ class UnperturbedPeriod:
     """Mean period of the complete strides before the first pulse, in exact integer arithmetic."""
 
     def __init__(self) -> None:
-        self._count = self._sum = self._squares = 0
+        self._periods: list[int] = []  # [ns]
         self.mean = math.nan  # [s]
         self.deviation = math.nan  # standard deviation of the strides [s]; NaN with one
         self.standard_error = math.nan  # of the mean [s]; NaN with one stride
 
     def add(self, stride: Stride) -> None:
         """Take one stride."""
-        period = stride.end - stride.start
-        self._count += 1
-        self._sum += period
-        self._squares += period * period
-        n, total = self._count, self._sum
-        self.mean = total / (n * NANOSECONDS_PER_SECOND)
+        self._periods.append(stride.end - stride.start)
+
+    def settle(self, limits: GaitLimits) -> None:
+        """Set the figures, from the strides that their median allows: a pause is none of them."""
+        own = statistics.median(self._periods or [0]) * (1 - limits.stride_change)
+        kept = [p for p in self._periods if own <= p <= own / (1 - limits.stride_change) ** 2]
+        n, total = len(kept), sum(kept)
+        if n > 0:
+            self.mean = total / (n * NANOSECONDS_PER_SECOND)
         if n > 1:
-            variance = (n * self._squares - total * total) / (n * n * (n - 1))
+            variance = (n * sum(p * p for p in kept) - total * total) / (n * n * (n - 1))
             self.standard_error = math.sqrt(variance) / NANOSECONDS_PER_SECOND
             self.deviation = self.standard_error * math.sqrt(n)

@@ -8,9 +8,9 @@ import math
 import pytest
 
 from gait_entrainment.conventions import EventKind, Side
-from gait_entrainment.experiment import Conductor, GaitError
+from gait_entrainment.experiment import Conductor, GaitError, Part
 from gait_entrainment.gait import GaitEvent, GaitLimits, GaitWatch
-from gait_entrainment.protocol import Protocol
+from gait_entrainment.protocol import Protocol, PulsePlan
 
 SECOND = 1_000_000_000
 STRIDE = 1_100_000_000
@@ -120,3 +120,33 @@ def test_an_unsteady_baseline_ends_the_run_with_the_figures():
     conductor = Conductor(Protocol(), limits=GaitLimits(stride_change=1.0, baseline_spread=0.05))
     with pytest.raises(GaitError, match=r"strides of 0\.825 to 1\.1 s, which vary by"):
         gait(conductor, 17, stray=range(1, 15, 3), short=0.75)
+
+
+@pytest.mark.parametrize(("step", "seconds"), [(40, 0.0), (4000, 0.0), (0, 3600.0), (40, 3600.0)])
+@pytest.mark.parametrize("after", [1, 5, 16])
+def test_one_wrong_event_neither_ends_an_experiment_nor_keeps_it_from_ending(step, seconds, after):
+    conductor = Conductor(Protocol(baseline=6, pulses=PulsePlan(count=8), washout=3))
+    for number in range(19):
+        for when, kind, side, ahead in (
+            (0.0, EventKind.HEEL_STRIKE, Side.RIGHT, 0),
+            (0.1, EventKind.TOE_OFF, Side.LEFT, 1),
+            (0.5, EventKind.HEEL_STRIKE, Side.LEFT, 1),
+            (0.6, EventKind.TOE_OFF, Side.RIGHT, 2),
+        ):
+            stamp = round((number + when) * STRIDE)
+            conductor.add_event(GaitEvent(stamp, kind, side, 2 * number + ahead))
+        if number == after:
+            far = round((number + 0.7 + seconds) * SECOND)
+            wrong = GaitEvent(far, EventKind.HEEL_STRIKE, Side.RIGHT, 2 * number + 2 + step)
+            conductor.add_event(wrong)
+        assert conductor.strides == number
+        finished = conductor.part(stamp) is Part.FINISHED
+        assert finished == (conductor.strides >= 17)
+
+
+def test_an_implausible_gait_under_pulses_ends_the_torque():
+    conductor = Conductor(Protocol())
+    # Twice as fast, which others may walk, and this person did not.
+    _, stamp = gait(conductor, 20, stray=range(17, 30), short=0.5)
+    with pytest.raises(GaitError, match="the gait has stopped"):
+        conductor.horizon(stamp)
