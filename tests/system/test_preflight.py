@@ -10,8 +10,8 @@ import pytest
 from harness import entrain_run
 from test_drivers import SHORT, emulated_motor, entrain
 
-from gait_entrainment.robot import keep_proof, preflight_of
 from gait_entrainment_bags import BagReader
+from gait_entrainment_drivers.proof import keep_proof, preflight_of
 
 
 @pytest.fixture

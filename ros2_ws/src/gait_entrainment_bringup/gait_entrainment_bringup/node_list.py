@@ -92,8 +92,8 @@ def parameters(
     Return the parameters of every node for a run that is recorded into the folder ``bag``.
 
     If ``armed``, a real robot may deliver torque without another word, even one whose watchdog is
-    ``unproved`` (`gait_entrainment.robot.proof`); ``onset`` is when the analyzer takes a pulse to
-    begin, "commanded" or "measured"; promised torque leads by ``lead_time`` [s] in real time.
+    ``unproved`` (`gait_entrainment_drivers.proof`); ``onset`` is when the analyzer takes a pulse
+    to begin, "commanded" or "measured"; promised torque leads by ``lead_time`` [s] in real time.
     """
     side = protocol.side.name.lower()
     measured = real_time and not find_driver(protocol.driver).simulated

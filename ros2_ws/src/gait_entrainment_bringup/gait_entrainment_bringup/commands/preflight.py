@@ -8,10 +8,11 @@ import json
 from collections.abc import Iterator
 
 from gait_entrainment.errors import UsageError
-from gait_entrainment.robot import find_driver, keep_preflight
+from gait_entrainment.robot import find_driver
 from gait_entrainment_bringup.checklist import Point, points
 from gait_entrainment_bringup.operator_console import keys_at_once
 from gait_entrainment_bringup.run_options import add_run_options, checked_run
+from gait_entrainment_drivers.proof import keep_preflight
 
 DESCRIPTION = (
     "Go through the checklist before a session: what the protocol asks for and what limits it, the"

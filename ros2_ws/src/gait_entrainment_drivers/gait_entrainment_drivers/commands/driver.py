@@ -13,16 +13,11 @@ from typing import Any
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.errors import EntrainmentError
-from gait_entrainment.robot import (
-    DeviceError,
-    LimitError,
-    driver_names,
-    find_driver,
-    keep_proof,
-)
+from gait_entrainment.robot import DeviceError, LimitError, driver_names, find_driver
 from gait_entrainment.settings import settings_of
 from gait_entrainment_drivers.conformance.bench import DriverBench, Result, Tolerances, run_check
 from gait_entrainment_drivers.conformance.checks import CHECKS, silent_host
+from gait_entrainment_drivers.proof import keep_proof
 
 # Where the check of a running node is found: it needs ROS, which this package does not know.
 NODE_CHECK = "gait_entrainment.node_check"

@@ -30,13 +30,11 @@ from gait_entrainment.robot import (
     PlannedPulses,
     PulseTrain,
     find_driver,
-    preflight_of,
-    proof_of,
-    require_proof,
 )
 from gait_entrainment.robot.faults import DEADMAN_SILENT, NOT_STOPPED, OPERATOR_SILENT
 from gait_entrainment.settings import setting
 from gait_entrainment.stop_channel import StopAnswer
+from gait_entrainment_drivers.proof import preflight_of, proof_of, require_proof
 from gait_entrainment_msgs.action import DeliverPulseTrain
 from gait_entrainment_msgs.msg import AnkleRobotSetup, Horizon, Trouble
 from gait_entrainment_nodes.messaging import topics

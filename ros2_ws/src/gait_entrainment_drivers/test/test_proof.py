@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from gait_entrainment.robot import DeviceError, keep_proof, proof_of
+from gait_entrainment.robot import DeviceError
+from gait_entrainment_drivers.proof import keep_proof, proof_of
 
 ROBOT = r"ak_mit_can:channel=can0,note=a\,b"
 

@@ -41,11 +41,6 @@ class Preflight:
     failed: str  # the points that failed, separated by commas; empty if all passed
     at: str  # when that was, by ISO 8601 in UTC
 
-    @property
-    def age(self) -> float:
-        """How long ago that was [s]."""
-        return (datetime.now(timezone.utc) - datetime.fromisoformat(self.at)).total_seconds()
-
 
 def proof_of(driver: str) -> Proof | None:
     """Return what was proved of the driver that a text names; None if nothing can be read."""
