@@ -9,7 +9,7 @@ import statistics
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from itertools import pairwise
 from pathlib import Path
 
@@ -78,8 +78,8 @@ def points(
 
 
 def _limits(protocol: Protocol) -> Point:
-    limits = replace(protocol.limits, **gentle_limits(protocol))
-    told = ", ".join(f"{name} {value:g}" for name, value in asdict(limits).items())
+    limits = asdict(protocol.limits) | gentle_limits(protocol)
+    told = ", ".join(f"{name} {value:g}" for name, value in limits.items())
     plan = protocol.pulses
     pulses = f"{plan.count} pulses of {protocol.pulse_torque:g} N m for {plan.width:g} s"
     return Point("limits", True, f"{pulses}; {told}")

@@ -35,7 +35,7 @@ def conduct(
     *,
     quiet: bool,
     real_time: bool,
-    silence: float = SILENCE_TIMEOUT,
+    silence: float,
 ) -> None:
     """
     Conduct a protocol through the experiment node to its end, and watch the processes meanwhile.

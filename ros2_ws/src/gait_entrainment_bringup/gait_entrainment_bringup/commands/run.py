@@ -88,13 +88,19 @@ def run_experiment(
             if node not in options.elsewhere:
                 supervisor.start(node, arguments)
         # Not at the top: it loads ROS, and a mistake in the options is answered without.
-        from gait_entrainment_bringup.run_client import conduct
+        from gait_entrainment_bringup.run_client import SILENCE_TIMEOUT, conduct
 
         real = not find_driver(protocol.driver).simulated
-        silence = {"silence": PERSON_SILENCE} if real else {}
+        silence = PERSON_SILENCE if real else SILENCE_TIMEOUT
         load = partial(load_report, figures)
-        how = {"quiet": options.json, "real_time": options.real_time}
-        conduct(supervisor, protocol, load, **how, **silence)
+        conduct(
+            supervisor,
+            protocol,
+            load,
+            quiet=options.json,
+            real_time=options.real_time,
+            silence=silence,
+        )
         supervisor.wait_for_record()
         # No torque is left and the record is closed: in which order the rest ends does not matter.
         supervisor.request_stop(NODES)

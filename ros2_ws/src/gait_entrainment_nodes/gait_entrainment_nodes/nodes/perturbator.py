@@ -101,8 +101,11 @@ class Perturbator(Participant, TolerantLifecycleNode):
 
     def __init__(self) -> None:
         super().__init__("perturbator")
-        groups = {"limits": (DeviceLimits, "limits."), "planned": (PlannedPulses, "planned.")}
-        self.begin_participation(settings=Settings, **groups)
+        self.begin_participation(
+            settings=Settings,
+            limits=(DeviceLimits, "limits."),
+            planned=(PlannedPulses, "planned."),
+        )
         self._robot: GuardedRobot | None = None  # from configuring to cleaning up
         self._dose = Dose()  # of everybody who was on the robot since this node was started
         self._armed_by = ""
