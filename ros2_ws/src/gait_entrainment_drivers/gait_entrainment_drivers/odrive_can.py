@@ -21,6 +21,8 @@ from gait_entrainment_drivers.host_timed import HostTimedRobot
 HEARTBEAT_PERIOD = 0.15
 # Without one for this long [s], though asked again and again, its errors cannot be seen.
 HEARTBEAT_LOST = 0.5
+# An axis cannot be asked for its mode, and a frame may be lost: it is told so often.
+_MODE_FRAMES = 4
 NO_HEARTBEAT = Fault(
     "no_heartbeat", "The axis sends no heartbeat, not even on request: its errors cannot be seen."
 )
@@ -68,7 +70,8 @@ class OdriveAxis(CanMotor):
 
     def enable(self) -> None:
         """Enter closed-loop torque control at zero torque."""
-        self._command(odrive.SET_MODE, odrive.TORQUE_MODE)
+        for _ in range(_MODE_FRAMES):
+            self._command(odrive.SET_MODE, odrive.TORQUE_MODE)
         self._reach(odrive.CLOSED_LOOP)
         self._errors, self._old_reason = 0, None
         self._require_zero_torque("is it calibrated?")

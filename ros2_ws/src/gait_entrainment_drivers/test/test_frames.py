@@ -31,6 +31,7 @@ from gait_entrainment_drivers.odrive import (
     HEARTBEAT,
     IDLE,
     PAIR,
+    SET_MODE,
     STATE,
     STOP,
     TORQUE_MODE,
@@ -223,6 +224,23 @@ def test_an_ak_motor_that_missed_the_change_of_mode_is_told_again(monkeypatch):
     robot.enable()
     assert missed
     assert wire.motor.enabled
+
+
+def test_an_odrive_that_missed_its_mode_is_told_again(monkeypatch):
+    robot, wire = odrive()
+    command, missed = robot._command, []
+
+    def lose_the_first(number, data=b"", *, remote=False):
+        if number == SET_MODE and not missed:
+            missed.append(data)
+        else:
+            command(number, data, remote=remote)
+
+    monkeypatch.setattr(robot, "_command", lose_the_first)
+    robot.enable()
+    assert missed
+    robot.exchange(1.0, 0.01)
+    assert wire.motor.torque == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("make", [ak, odrive])
