@@ -18,7 +18,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.parameter import Parameter
-from rclpy.qos import HistoryPolicy, QoSProfile
+from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment.messages import nanoseconds_of
@@ -178,7 +178,10 @@ class BagPlayer(Participant):
             raise ValueError(f"remap: no topic {unknown[0]} in the bag")
         offers = {name: _offer(self._bag.topics[name]) for name in self._types}
         self._players = {
-            name: self.offer(topics.Topic(names.get(name, name), self._types[name], offer))
+            name: self.offer(
+                topics.Topic(names.get(name, name), self._types[name], offer),
+                counted=offer.reliability != ReliabilityPolicy.BEST_EFFORT,  # which may get lost
+            )
             for name, offer in offers.items()
         }
         # Who keeps all waits by itself; who keeps the last ones for late-comers would overwrite.
