@@ -84,15 +84,15 @@ def checked_run(
         require_proof(protocol.driver, unproved=options.unproved)
     bag = options.out or bag_folder(protocol)
     if records:
-        check_output(bag)
+        check_output(bag, exactly=options.out is not None)
     return protocol, bag
 
 
-def check_output(bag: Path) -> None:
-    """Raise UsageError if a bag cannot be made."""
+def check_output(bag: Path, *, exactly: bool = True) -> None:
+    """Raise UsageError if a bag cannot be made, ``exactly`` there or under a name beside."""
     if not is_utf8(bag):
         raise UsageError(f"--out: {str(bag.absolute())!a}; allowed: a name in UTF-8")
-    if os.path.lexists(bag):
+    if exactly and os.path.lexists(bag):
         raise UsageError(f"--out: {bag} is already there; a bag is never overwritten")
     parent = next(folder for folder in bag.absolute().parents if folder.exists())
     if not parent.is_dir():

@@ -31,7 +31,7 @@ class PlannedPulses:
 
     torque: float = setting(200.0, "magnitude of the protocol's pulses", "N m", (0.0, 200.0))
     duration: float = setting(10.0, "their duration", "s", (0.0, 10.0))
-    count: int = setting(_NO_LIMIT, "their number", within=(1, _NO_LIMIT))
+    count: int = setting(_NO_LIMIT, "their number", "1", (1, _NO_LIMIT))
 
     def __post_init__(self) -> None:
         """Check every field."""
@@ -68,13 +68,13 @@ class DeviceLimits:
     )
     impulse: float = setting(15.0, "largest angular impulse within a stride", "N m s", (0.0, 1e3))
     rising: int = setting(
-        0, "first pulses of a train, which rise in equal steps to its height", within=(0, 1000)
+        0, "first pulses of a train, which rise in equal steps to its height", "1", (0, 1000)
     )
     pulses_per_minute: float = setting(
         600.0, "most pulses in a minute, by the period of a train", "1/min", (1.0, 6000.0)
     )
     session_pulses: int = setting(
-        _NO_LIMIT, "most pulses from when the node was started", within=(0, _NO_LIMIT)
+        _NO_LIMIT, "most pulses from when the node was started", "1", (0, _NO_LIMIT)
     )
     session_impulse: float = setting(
         1e6, "largest sum of angular impulse from when the node was started", "N m s", (0.0, 1e6)
