@@ -59,18 +59,6 @@ def profile_of(message: Any, start: int = 0) -> TorqueProfile:
     )
 
 
-def hole_before(message: Any, promised: float | None) -> tuple[int, int] | None:
-    """
-    Return the span [ns since 1970] before a TorqueProfile message of which no profile is here.
-
-    ``promised`` is where the one before ends: None before the first, infinity after a stop.
-    """
-    begin = nanoseconds_of(message.times[0])
-    if promised is None:
-        return (0, begin) if message.revision else None
-    return (int(promised), begin) if begin > promised else None
-
-
 def pulse_of(message: Any, start: int = 0) -> tuple[int, float, float]:
     """Return onset [ns], height [N m] and width [s] of a TorquePulse message."""
     return nanoseconds_of(message.header.stamp) - start, message.torque, message.duration

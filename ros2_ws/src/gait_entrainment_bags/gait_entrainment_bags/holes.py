@@ -6,6 +6,7 @@
 from collections import Counter
 from typing import Any
 
+from gait_entrainment.conventions import nanoseconds_of
 from gait_entrainment_bags.decoding import decoder_for
 from gait_entrainment_bags.errors import BagError
 from gait_entrainment_bags.metadata import TopicInfo
@@ -64,3 +65,15 @@ class RunRecord:
             if topic.type == _PROFILE and (topic, run) not in self._ended:
                 holes.append(f"{topic.name}: the end of run {run}")
         return holes
+
+
+def hole_before(message: Any, promised: float | None) -> tuple[int, int] | None:
+    """
+    Return the span [ns since 1970] before a TorqueProfile message of which no profile is here.
+
+    ``promised`` is where the one before ends: None before the first, infinity after a stop.
+    """
+    begin = nanoseconds_of(message.times[0])
+    if promised is None:
+        return (0, begin) if message.revision else None
+    return (int(promised), begin) if begin > promised else None

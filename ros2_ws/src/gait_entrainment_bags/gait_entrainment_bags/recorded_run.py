@@ -31,6 +31,7 @@ from gait_entrainment.protocol import Protocol, ProtocolError, read_protocol
 from gait_entrainment.robot import MeasuredOnsets, TorqueProfile
 from gait_entrainment_bags.decoding import decoder_for
 from gait_entrainment_bags.errors import BagError
+from gait_entrainment_bags.holes import hole_before
 from gait_entrainment_bags.mcap_records import BagMessage
 from gait_entrainment_bags.reader import BagReader
 from gait_entrainment_bags.recovery import RECOVERY_KEY
@@ -189,7 +190,7 @@ class _Record:
         promises = self._values(topic_names.TORQUE_PROFILE, lambda m: (m, _promise_of(m)))
         for message, promise in promises:
             if isinstance(promise, TorqueProfile):
-                if hole := messages.hole_before(message, adjoins):
+                if hole := hole_before(message, adjoins):
                     self.unknown.append(hole)
                 adjoins = promise.valid_until
                 self.onsets += promise.onsets

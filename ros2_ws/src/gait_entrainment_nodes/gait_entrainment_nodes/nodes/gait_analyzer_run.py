@@ -12,7 +12,6 @@ from gait_entrainment.gait import Entrainment, GaitAnalyzer, PulsePhase, Stride,
 from gait_entrainment.gait.analyzer import Result
 from gait_entrainment.messages import (
     event_of,
-    hole_before,
     nanoseconds_of,
     profile_of,
     pulse_of,
@@ -21,6 +20,7 @@ from gait_entrainment.messages import (
     stop_of,
 )
 from gait_entrainment.robot import MeasuredOnsets
+from gait_entrainment_bags.holes import hole_before
 from gait_entrainment_msgs import msg
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.stamps import header, to_time
