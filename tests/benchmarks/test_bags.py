@@ -41,6 +41,7 @@ name, rate, duration = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
 rclpy.init()
 node = rclpy.create_node("publisher_" + name)
 node.stopping = False
+node.real_time = False
 states = CountedPublisher(node, Topic(name, JointState))
 counts = node.create_publisher(PUBLISHED_COUNTS.type, PUBLISHED_COUNTS.name, PUBLISHED_COUNTS.qos)
 while not (states.matched and counts.get_subscription_count()):

@@ -34,13 +34,14 @@ class CountedPublisher:
     """
     A publisher that counts, and that waits for a slow reader rather than lose a message.
 
-    Its node has an attribute ``stopping``, which ends the waiting.
+    Its node has an attribute ``stopping``, which ends the waiting, and one ``real_time``, in which
+    it waits for nobody.
     """
 
     def __init__(self, node: Any, topic: Topic, *, counted: bool = True) -> None:
         self._node, self.counted = node, counted
         qos = topic.qos
-        if qos is EVERY_MESSAGE and not node.get_parameter("use_sim_time").value:
+        if qos is EVERY_MESSAGE and node.real_time:
             qos = EVERY_MESSAGE_IN_REAL_TIME
         self._publisher = node.create_publisher(topic.type, topic.name, qos)
         self.count = 0

@@ -93,6 +93,11 @@ class BagPlayer(Participant):
     settings: Settings
     _begun = False  # all subscriptions that are waited for have been matched
 
+    @property
+    def real_time(self) -> bool:
+        """It waits for its readers, at whatever rate it plays."""
+        return False
+
     def __init__(self) -> None:
         super().__init__("bag_player")
         fixed = settings_of(Settings).keys() - {"rate"}

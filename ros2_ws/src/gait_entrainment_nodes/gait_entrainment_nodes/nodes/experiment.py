@@ -157,7 +157,7 @@ class Experiment(Participant):
             self.publish,
             self._request,
             recorded=recorded,
-            real_time=not self.get_parameter("use_sim_time").value,
+            real_time=self.real_time,
             held_up=self._held_up,
         )
         self.note_state(DiagnosticStatus.OK, f"run {run.number} goes on")

@@ -58,7 +58,7 @@ def run_node(make_node: Callable[[], Any]) -> int:
             _join_ros()
             node = make_node()
             node.offer_ready()
-            if not node.get_parameter("use_sim_time").value:
+            if node.real_time:
                 come_before_others()
         except (EntrainmentError, ParameterException, ValueError, RuntimeError) as error:
             print(f"{name}: {' '.join(str(error).split())}", file=sys.stderr)

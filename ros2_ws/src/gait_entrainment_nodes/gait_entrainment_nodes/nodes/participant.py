@@ -46,6 +46,11 @@ class Participant(Node):
     finished = False  # set to end the loop with exit code 0
     run: Any = None  # the run that goes on, with its ``number``; None between runs
 
+    @property
+    def real_time(self) -> bool:
+        """Whether the wall clock waits for nobody here: for no reader, and for no other process."""
+        return not self.get_parameter("use_sim_time").value
+
     def begin_participation(self, *, fixed: Collection[str] = (), **settings: Any) -> None:
         """
         Set up what every participant has.
