@@ -48,7 +48,7 @@ class Participant(Node):
 
     @property
     def real_time(self) -> bool:
-        """Whether the wall clock waits for nobody here: for no reader, and for no other process."""
+        """Whether this node waits for nobody: neither for a reader nor for its turn."""
         return not self.get_parameter("use_sim_time").value
 
     def begin_participation(self, *, fixed: Collection[str] = (), **settings: Any) -> None:
