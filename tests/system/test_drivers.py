@@ -69,7 +69,7 @@ def emulated_motor(tmp_path, *options):
         # Patience for a machine that others share.
         yield (
             f"ak_mit_can:interface=udp_multicast,channel={CHANNEL},port={port},"
-            "rate=200,silence=0.9,lateness=0.9",
+            "rate=200,silence=0.9,lateness=0.9,host_silence=1",
             trace,
         )
     finally:

@@ -14,7 +14,7 @@ from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 from test_drivers import emulated_motor
 
-from gait_entrainment.messages import nanoseconds_of
+from gait_entrainment_bags.messages import nanoseconds_of
 from gait_entrainment_bringup.node_list import STOP_ORDER
 from gait_entrainment_msgs.action import DeliverPulseTrain
 from gait_entrainment_msgs.msg import Horizon

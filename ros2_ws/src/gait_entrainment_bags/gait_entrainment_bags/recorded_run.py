@@ -21,7 +21,6 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gait_entrainment import messages, topic_names
 from gait_entrainment.conventions import Side
 from gait_entrainment.experiment import Conductor, GaitError
 from gait_entrainment.gait import Analysis, GaitEvent, Stride, VerdictSettings, analyze
@@ -29,6 +28,7 @@ from gait_entrainment.gait.analyzer import Result
 from gait_entrainment.outcome import Run, outcome_of, timing_outcome
 from gait_entrainment.protocol import Protocol, ProtocolError, read_protocol
 from gait_entrainment.robot import MeasuredOnsets, TorqueProfile
+from gait_entrainment_bags import messages, topic_names
 from gait_entrainment_bags.decoding import decoder_for
 from gait_entrainment_bags.errors import BagError
 from gait_entrainment_bags.holes import hole_before

@@ -14,11 +14,11 @@ from itertools import pairwise
 from pathlib import Path
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
-from gait_entrainment.messages import nanoseconds_of
 from gait_entrainment.protocol import Protocol
 from gait_entrainment.robot import DeviceError, GuardedRobot, find_driver
 from gait_entrainment.robot.faults import STOPPED
 from gait_entrainment.stop_channel import StopAnswer, stop_all
+from gait_entrainment_bags.messages import nanoseconds_of
 from gait_entrainment_bringup.node_list import CLOCK_OFFSET, gentle_limits
 from gait_entrainment_bringup.operator_console import STOP_KEY, pressed_key
 from gait_entrainment_drivers.proof import proof_of

@@ -21,8 +21,8 @@ from lifecycle_msgs.srv import ChangeState
 from std_srvs.srv import Trigger
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.messages import nanoseconds_of, profile_of, state_of
 from gait_entrainment.robot import DeviceError, Fault, LimitError, PulseTrain, TorqueProfile
+from gait_entrainment_bags.messages import nanoseconds_of, profile_of, state_of
 from gait_entrainment_drivers.conformance.bench import (
     Bench,
     Result,

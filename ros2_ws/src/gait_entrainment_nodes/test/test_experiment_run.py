@@ -7,8 +7,8 @@ import pytest
 
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.experiment import Conductor, Part
-from gait_entrainment.messages import nanoseconds_of
 from gait_entrainment.protocol import Protocol, PulsePlan
+from gait_entrainment_bags.messages import nanoseconds_of
 from gait_entrainment_msgs.msg import GaitEvent, Progress, TorqueProfile, Trouble
 from gait_entrainment_nodes.messaging.stamps import header, to_time
 from gait_entrainment_nodes.messaging.topics import EXPERIMENT_STATE, HORIZON

@@ -7,7 +7,7 @@ import pytest
 
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.gait import PulsePhase, Stride, VerdictSettings
-from gait_entrainment.messages import MessageError, nanoseconds_of
+from gait_entrainment_bags.messages import MessageError, nanoseconds_of
 from gait_entrainment_msgs.msg import AnkleRobotState, GaitEvent, Progress, TorqueProfile
 from gait_entrainment_nodes.messaging.stamps import header, to_time
 from gait_entrainment_nodes.nodes.gait_analyzer_run import RESULTS, Run

@@ -6,9 +6,9 @@
 import pytest
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.messages import nanoseconds_of
 from gait_entrainment.robot import DeviceError, DeviceLimits, LimitError, PulseTrain, find_driver
 from gait_entrainment.robot.faults import TORQUE_EXCEEDED
+from gait_entrainment_bags.messages import nanoseconds_of
 from gait_entrainment_msgs.msg import AnkleRobotState
 from gait_entrainment_nodes.messaging.topics import PULSES, TORQUE_PROFILE
 from gait_entrainment_nodes.nodes.perturbator_run import Result, Run

@@ -6,7 +6,7 @@
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gait_entrainment.messages import nanoseconds_of
+from gait_entrainment_bags.messages import nanoseconds_of
 from gait_entrainment_nodes.messaging.stamps import header, to_time
 
 # What a ROS stamp can hold: seconds are signed, nanoseconds are not.

@@ -9,9 +9,9 @@ import time
 import pytest
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.messages import nanoseconds_of
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.robot import TorqueProfile
+from gait_entrainment_bags.messages import nanoseconds_of
 from gait_entrainment_msgs.msg import Progress
 from gait_entrainment_nodes.nodes.walker_run import Stretch, WalkerRun
 from gait_entrainment_nodes.nodes.walker_sim_run import LockStepRun, RealTimeRun, Starved

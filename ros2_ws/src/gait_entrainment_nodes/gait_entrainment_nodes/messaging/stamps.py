@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""ROS stamps of the core's integer nanoseconds; gait_entrainment.messages goes the other way."""
+"""ROS stamps of integer nanoseconds; gait_entrainment_bags.messages goes the other way."""
 
 from builtin_interfaces.msg import Time
 from std_msgs.msg import Header

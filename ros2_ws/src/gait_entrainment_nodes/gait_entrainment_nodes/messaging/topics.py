@@ -21,7 +21,7 @@ from std_msgs.msg import Bool, Empty, String
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
-from gait_entrainment import topic_names
+from gait_entrainment_bags import topic_names
 from gait_entrainment_msgs import msg
 
 

@@ -21,7 +21,6 @@ from rclpy.parameter import Parameter
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
-from gait_entrainment.messages import nanoseconds_of
 from gait_entrainment.settings import setting, settings_of
 from gait_entrainment_bags import (
     FASTEST,
@@ -36,6 +35,7 @@ from gait_entrainment_bags import (
     choose_topics,
     find_definition,
 )
+from gait_entrainment_bags.messages import nanoseconds_of
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.player_services import srv
 from gait_entrainment_nodes.messaging.raw_messages import message_class

@@ -22,10 +22,10 @@ from rclpy.node import NodeNameNonExistentError
 from rclpy.task import Future
 
 from gait_entrainment.experiment import Conductor, Part
-from gait_entrainment.messages import nanoseconds_of
 from gait_entrainment.protocol import ProtocolError, read_protocol
 from gait_entrainment.robot import PulseTrain
 from gait_entrainment.settings import setting
+from gait_entrainment_bags.messages import nanoseconds_of
 from gait_entrainment_msgs import msg
 from gait_entrainment_msgs.action import DeliverPulseTrain, RunProtocol
 from gait_entrainment_msgs.srv import StartRun

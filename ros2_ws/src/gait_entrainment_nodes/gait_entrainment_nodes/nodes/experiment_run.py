@@ -17,8 +17,8 @@ from typing import Any
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment.errors import EntrainmentError
 from gait_entrainment.experiment import Conductor, Part
-from gait_entrainment.messages import MessageError, event_of, nanoseconds_of
 from gait_entrainment.robot import PulseTrain
+from gait_entrainment_bags.messages import MessageError, event_of, nanoseconds_of
 from gait_entrainment_msgs import msg
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.stamps import header, to_time

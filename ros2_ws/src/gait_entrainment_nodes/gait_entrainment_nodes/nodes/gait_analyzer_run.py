@@ -10,7 +10,9 @@ from typing import Any
 from gait_entrainment.conventions import Side
 from gait_entrainment.gait import Entrainment, GaitAnalyzer, PulsePhase, Stride, VerdictSettings
 from gait_entrainment.gait.analyzer import Result
-from gait_entrainment.messages import (
+from gait_entrainment.robot import MeasuredOnsets
+from gait_entrainment_bags.holes import hole_before
+from gait_entrainment_bags.messages import (
     event_of,
     nanoseconds_of,
     profile_of,
@@ -19,8 +21,6 @@ from gait_entrainment.messages import (
     state_of,
     stop_of,
 )
-from gait_entrainment.robot import MeasuredOnsets
-from gait_entrainment_bags.holes import hole_before
 from gait_entrainment_msgs import msg
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.stamps import header, to_time

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
-from gait_entrainment.messages import nanoseconds_of
+from gait_entrainment_bags.messages import nanoseconds_of
 from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.nodes.experiment_run import RECORDER, ExperimentError
 from gait_entrainment_nodes.nodes.participant import Participant

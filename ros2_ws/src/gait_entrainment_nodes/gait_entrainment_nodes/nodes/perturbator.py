@@ -19,7 +19,6 @@ from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from std_srvs.srv import Trigger
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.messages import nanoseconds_of
 from gait_entrainment.robot import (
     DeviceError,
     DeviceLimits,
@@ -34,6 +33,7 @@ from gait_entrainment.robot import (
 from gait_entrainment.robot.faults import DEADMAN_SILENT, NOT_STOPPED, OPERATOR_SILENT
 from gait_entrainment.settings import setting
 from gait_entrainment.stop_channel import StopAnswer
+from gait_entrainment_bags.messages import nanoseconds_of
 from gait_entrainment_drivers.proof import preflight_of, proof_of, require_proof
 from gait_entrainment_msgs.action import DeliverPulseTrain
 from gait_entrainment_msgs.msg import AnkleRobotSetup, Horizon, Trouble

@@ -22,9 +22,9 @@ from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
-from gait_entrainment.messages import nanoseconds_of, profile_of, stop_of
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.settings import setting
+from gait_entrainment_bags.messages import nanoseconds_of, profile_of, stop_of
 from gait_entrainment_msgs import msg
 from gait_entrainment_msgs.srv import StartRun
 from gait_entrainment_nodes.messaging import topics

@@ -10,7 +10,8 @@ import pytest
 
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.gait import GaitEvent, PulsePhase, Stride
-from gait_entrainment.messages import (
+from gait_entrainment.robot import RobotState, TorqueProfile
+from gait_entrainment_bags.messages import (
     MessageError,
     event_of,
     nanoseconds_of,
@@ -20,7 +21,6 @@ from gait_entrainment.messages import (
     state_of,
     stop_of,
 )
-from gait_entrainment.robot import RobotState, TorqueProfile
 
 START = 946_684_800_000_000_000
 
