@@ -7,6 +7,7 @@ import os
 import resource
 import shutil
 import subprocess
+from pathlib import Path
 
 import pytest
 from harness import LONG, PATIENCE, QUICK, entrain_run, probe
@@ -14,6 +15,7 @@ from harness import LONG, PATIENCE, QUICK, entrain_run, probe
 from gait_entrainment_bags import BagReader
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 
+BAG = Path(__file__).parents[2] / "bags" / "paper_example"
 # What is wrong; the options; what the line must name, field and allowed range.
 WRONG_USAGE = {
     "negative width": (["--width=-0.1"], ["width", "-0.1", "1e-09 to 10 s"]),
@@ -144,6 +146,47 @@ def test_node_and_ready_refuse_what_is_no_domain_and_no_name(words, domain, code
     )
     assert done.returncode == code
     assert_one_line(done.stderr, named)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["entrain", "run"],
+        ["entrain", "replay", str(BAG)],
+        ["entrain", "node", "walker_sim"],
+        ["entrain", "ready", "walker_sim"],
+        ["entrain", "stop-ros"],
+        ["walker_sim"],
+    ],
+    ids=" ".join,
+)
+def test_environment_that_ros_cannot_start_in_is_one_line(command, tmp_path):
+    done = subprocess.run(
+        command,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        env={**os.environ, "RMW_IMPLEMENTATION": "rmw_nonsense"},
+    )
+    assert (done.returncode, done.stdout) == (1, "")
+    assert_one_line(done.stderr, [*command[:2], "RMW_IMPLEMENTATION: 'rmw_nonsense'", "allowed:"])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_run_needs_no_home(tmp_path):
+    environment = {name: value for name, value in os.environ.items() if name != "HOME"}
+    words = ["--baseline=2", "--pulses=1", "--washout=0", "--no-figures", "--out=bag"]
+    done = subprocess.run(
+        ["entrain", "run", *words],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert_readable(tmp_path / "bag")
 
 
 @pytest.fixture
