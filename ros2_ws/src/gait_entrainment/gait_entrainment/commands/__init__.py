@@ -85,7 +85,8 @@ class _Parser(argparse.ArgumentParser):
         options, unknown = super().parse_known_args(args, namespace)
         if unknown:
             self.error(f"unrecognized arguments: {' '.join(unknown)}")
-        vars(options).setdefault("prog", self.prog)
+        if "prog" not in options:
+            options.prog = self.prog
         return options, unknown
 
 
