@@ -103,7 +103,7 @@ EXIT_CODES = [
 )
 def test_exit_codes(code, words, capsys, monkeypatch):
     monkeypatch.chdir(ROOT)
-    found, out, err = ended(capsys, *words)
+    found, _, err = ended(capsys, *words)
     assert found == code
     if code != 0 and words[:2] != ["bag", "check"]:  # whose findings are its output
         prog = "entrain " + " ".join(str(word) for word in words[:2] if str(word).isalpha())

@@ -13,6 +13,7 @@ import pytest
 from harness import LONG, PATIENCE, QUICK, entrain_run, probe
 
 from gait_entrainment_bags import BagReader
+from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 
 BAG = Path(__file__).parents[2] / "bags" / "paper_example"
@@ -263,16 +264,16 @@ WRONG_PARAMETERS = [
     ("walker_sim", ["-p", "mass:=0.0"], ["mass", "0.0", "above 0"]),
     ("walker_sim", ["-p", "mass:=.nan"], ["mass", "nan"]),
     ("walker_sim", ["-p", "sample_rate:=1001.0"], ["sample_rate", "1001.0", "0 to 1000 Hz"]),
-    ("walker_sim", ["-p", "masss:=80.0"], ["masss", "unknown", "mass,"]),
     ("walker_sim", ["-p", "first_heel_strike:=middle"], ["first_heel_strike", "left, right"]),
     ("perturbator", ["-p", "side:=up"], ["side", "'up'", "left, right"]),
     ("perturbator", ["-p", "limits.torque:=1000.0"], ["limits.torque", "1000.0", "0 to 200"]),
+    # In a section of the node's own it is no other node's: a mistyped limit.
+    ("perturbator", ["-p", "limits.torqe:=5.0"], ["limits.torqe", "unknown", "limits.torque"]),
     ("gait_analyzer", ["-p", "side:=3"], ["side", "3"]),
     ("gait_analyzer", ["-p", "onset:=felt"], ["onset", "'felt'", "commanded, measured"]),
     ("experiment", ["-p", "silence_timeout:=0.0"], ["silence_timeout", "0.1 to 60 s"]),
     ("bag_recorder", [], ["output", "folder"]),
     ("bag_recorder", ["-p", "output:=/proc/bag"], ["output", "/proc/bag"]),
-    ("bag_recorder", ["-p", "output:=there", "-p", "topic:=x"], ["topic", "unknown", "topics"]),
     ("bag_recorder", ["-p", "output:=there", "-p", "custom_data:=x"], ["custom_data", "JSON"]),
 ]
 
@@ -297,6 +298,25 @@ def test_node_refuses_a_wrong_parameter_in_one_line(node, arguments, named, tmp_
     assert_one_line(done.stderr, named)
     assert done.stderr.startswith(f"{node}: ")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_unknown_parameters_are_warned_of_in_one_line(tmp_path):
+    file = tmp_path / "shared.yaml"
+    file.write_text("/**: {ros__parameters: {masss: 80.0, camera.rate: 30, mass: 80.0}}")
+    with claimed_domain() as domain, probe(domain) as listener:
+        node = subprocess.Popen(
+            ["walker_sim", "--ros-args", "--params-file", str(file)],
+            env={**os.environ, "ROS_DOMAIN_ID": str(domain)},
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        try:
+            listener.call(Ready, "walker_sim/ready")
+        finally:
+            node.terminate()
+            _, text = node.communicate(timeout=PATIENCE)
+    assert node.returncode == 0
+    assert_one_line(text, ["[WARN]", "walker_sim", "ignored: masss (mass?), camera.rate"])
 
 
 def test_second_experiment_in_a_domain_is_refused():
