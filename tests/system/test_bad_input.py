@@ -7,13 +7,16 @@ import os
 import resource
 import shutil
 import subprocess
+from pathlib import Path
 
 import pytest
 from harness import LONG, PATIENCE, QUICK, entrain_run, probe
 
 from gait_entrainment_bags import BagReader
+from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 
+BAG = Path(__file__).parents[2] / "bags" / "paper_example"
 # What is wrong; the options; what the line must name, field and allowed range.
 WRONG_USAGE = {
     "negative width": (["--width=-0.1"], ["width", "-0.1", "1e-09 to 10 s"]),
@@ -146,6 +149,47 @@ def test_node_and_ready_refuse_what_is_no_domain_and_no_name(words, domain, code
     assert_one_line(done.stderr, named)
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["entrain", "run"],
+        ["entrain", "replay", str(BAG)],
+        ["entrain", "node", "walker_sim"],
+        ["entrain", "ready", "walker_sim"],
+        ["entrain", "stop-ros"],
+        ["walker_sim"],
+    ],
+    ids=" ".join,
+)
+def test_environment_that_ros_cannot_start_in_is_one_line(command, tmp_path):
+    done = subprocess.run(
+        command,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        env={**os.environ, "RMW_IMPLEMENTATION": "rmw_nonsense"},
+    )
+    assert (done.returncode, done.stdout) == (1, "")
+    assert_one_line(done.stderr, [*command[:2], "RMW_IMPLEMENTATION: 'rmw_nonsense'", "allowed:"])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_run_needs_no_home(tmp_path):
+    environment = {name: value for name, value in os.environ.items() if name != "HOME"}
+    words = ["--baseline=2", "--pulses=1", "--washout=0", "--no-figures", "--out=bag"]
+    done = subprocess.run(
+        ["entrain", "run", *words],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert_readable(tmp_path / "bag")
+
+
 @pytest.fixture
 def small_disk(tmp_path):
     """Give a folder on a file system of 6 MB, or skip where none may be made."""
@@ -220,16 +264,16 @@ WRONG_PARAMETERS = [
     ("walker_sim", ["-p", "mass:=0.0"], ["mass", "0.0", "above 0"]),
     ("walker_sim", ["-p", "mass:=.nan"], ["mass", "nan"]),
     ("walker_sim", ["-p", "sample_rate:=1001.0"], ["sample_rate", "1001.0", "0 to 1000 Hz"]),
-    ("walker_sim", ["-p", "masss:=80.0"], ["masss", "unknown", "mass,"]),
     ("walker_sim", ["-p", "first_heel_strike:=middle"], ["first_heel_strike", "left, right"]),
     ("perturbator", ["-p", "side:=up"], ["side", "'up'", "left, right"]),
     ("perturbator", ["-p", "limits.torque:=1000.0"], ["limits.torque", "1000.0", "0 to 200"]),
+    # In a section of the node's own it is no other node's: a mistyped limit.
+    ("perturbator", ["-p", "limits.torqe:=5.0"], ["limits.torqe", "unknown", "limits.torque"]),
     ("gait_analyzer", ["-p", "side:=3"], ["side", "3"]),
     ("gait_analyzer", ["-p", "onset:=felt"], ["onset", "'felt'", "commanded, measured"]),
     ("experiment", ["-p", "silence_timeout:=0.0"], ["silence_timeout", "0.1 to 60 s"]),
     ("bag_recorder", [], ["output", "folder"]),
     ("bag_recorder", ["-p", "output:=/proc/bag"], ["output", "/proc/bag"]),
-    ("bag_recorder", ["-p", "output:=there", "-p", "topic:=x"], ["topic", "unknown", "topics"]),
     ("bag_recorder", ["-p", "output:=there", "-p", "custom_data:=x"], ["custom_data", "JSON"]),
 ]
 
@@ -254,6 +298,25 @@ def test_node_refuses_a_wrong_parameter_in_one_line(node, arguments, named, tmp_
     assert_one_line(done.stderr, named)
     assert done.stderr.startswith(f"{node}: ")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_unknown_parameters_are_warned_of_in_one_line(tmp_path):
+    file = tmp_path / "shared.yaml"
+    file.write_text("/**: {ros__parameters: {masss: 80.0, camera.rate: 30, mass: 80.0}}")
+    with claimed_domain() as domain, probe(domain) as listener:
+        node = subprocess.Popen(
+            ["walker_sim", "--ros-args", "--params-file", str(file)],
+            env={**os.environ, "ROS_DOMAIN_ID": str(domain)},
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        try:
+            listener.call(Ready, "walker_sim/ready")
+        finally:
+            node.terminate()
+            _, text = node.communicate(timeout=PATIENCE)
+    assert node.returncode == 0
+    assert_one_line(text, ["[WARN]", "walker_sim", "ignored: masss (mass?), camera.rate"])
 
 
 def test_second_experiment_in_a_domain_is_refused():

@@ -66,9 +66,17 @@ class Parameters:
 
 
 def assert_in_order(parameters):
-    """Check that all is described, and that what must not be set is refused with a reason."""
+    """
+    Check that all is described, and that what must not be set is refused with a reason.
+
+    To set everything as it is, as `ros2 param dump` and `load` do, is refused nowhere.
+    """
     described = parameters.described()
     assert described
+    names = parameters.call(ListParameters, "list_parameters").result.names
+    values = parameters.call(GetParameters, "get_parameters", names=names).values
+    dumped = [ParameterMessage(name=n, value=v) for n, v in zip(names, values, strict=True)]
+    assert not any(parameters.put_messages(dumped))
     wrong, named = [], []
     for name, (descriptor, value) in described.items():
         assert len(descriptor.description) > 5, name
@@ -77,7 +85,10 @@ def assert_in_order(parameters):
             assert descriptor.description.endswith("]"), name
             assert len(ranges) == 1, name
         if descriptor.read_only:
-            wrong.append((name, value))
+            other = ParameterValue(type=value.type, string_value="other")
+            other.bool_value, other.string_array_value = not value.bool_value, ["other"]
+            other.double_value, other.integer_value = value.double_value + 1, 1
+            wrong.append((name, other))
             named.append("read-only")
             continue
         if value.type == ParameterType.PARAMETER_DOUBLE:
@@ -91,9 +102,9 @@ def assert_in_order(parameters):
         named += [name] * (len(wrong) - len(named))
         wrong.append((name, ParameterValue(type=ParameterType.PARAMETER_BYTE_ARRAY)))
         named.append("type")
-    wrong.append(
-        ("use_sim_time", ParameterValue(type=ParameterType.PARAMETER_BOOL, bool_value=True))
-    )
+    time = values[names.index("use_sim_time")]
+    other = ParameterValue(type=time.type, bool_value=not time.bool_value)
+    wrong.append(("use_sim_time", other))
     named.append("use_sim_time")
     messages = [ParameterMessage(name=name, value=value) for name, value in wrong]
     for message, word, reason in zip(

@@ -34,7 +34,7 @@ setup(
     extras_require={"test": ["pytest"]},  # so that colcon test runs pytest
     zip_safe=False,
     entry_points={
-        "console_scripts": [f"{node} = {NAME}.nodes.{node}:main" for node in NODES],
+        "console_scripts": [f"{node} = {NAME}.executable:main" for node in NODES],
         "gait_entrainment.commands": [f"nodes = {NAME}.commands"],
         "gait_entrainment.drivers": [f"ros2_control = {NAME}.ros2_control:Ros2ControlRobot"],
         "gait_entrainment.node_check": [f"node = {NAME}.node_bench:check_node"],

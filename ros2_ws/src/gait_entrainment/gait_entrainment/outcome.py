@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind
-from gait_entrainment.gait import Analysis, GaitEvent, Hole, Reason, Verdict
+from gait_entrainment.gait import Analysis, GaitEvent, Hole, Reason, Stride, Verdict
 from gait_entrainment.protocol import Protocol
 from gait_entrainment.robot import PulseTiming
 from gait_entrainment.robot.timing import distribution
@@ -35,19 +35,24 @@ _MEANINGS = {
 class Run:
     """What a simulated and a recorded run have in common; stamps are integer nanoseconds."""
 
-    protocol: Protocol
+    protocol: Protocol | None  # None if nobody told it
     events: tuple[GaitEvent, ...]  # in the order in which they came
     onsets: tuple[int, ...]  # of the pulses
     timings: tuple[PulseTiming, ...]  # commanded, sent and measured onset of each pulse
-    measured_period: float  # mean stride period over the baseline [s]; NaN without a plan
-    pulse_period: float  # as planned [s]; NaN without a plan
+    measured_period: float  # mean stride period before the pulses [s]; NaN if unknown
+    pulse_period: float  # as planned, without a protocol as seen [s]; NaN if unknown
     analysis: Analysis
+
+    @property
+    def strides(self) -> list[Stride]:
+        """The strides of the protocol, which more may follow; without a protocol, all."""
+        last = math.inf if self.protocol is None else self.protocol.strides
+        return [stride for stride in self.analysis.strides if stride.number <= last]
 
 
 def outcome_of(run: Run) -> dict[str, Any]:
     """Return what ``--json`` prints; times in seconds, None for what is not known."""
-    protocol, analysis = run.protocol, run.analysis
-    strides = [s for s in analysis.strides if s.number <= protocol.strides]
+    analysis, strides = run.analysis, run.strides
     start = strides[0].start if strides else 0
     last = analysis.entrainments[-1] if analysis.entrainments else None
     verdict = last.verdict if last else Verdict.UNDECIDED
@@ -59,9 +64,6 @@ def outcome_of(run: Run) -> dict[str, Any]:
     def seconds(stamp: int) -> float:
         return max(stamp - start, 0) / NANOSECONDS_PER_SECOND
 
-    parameters = asdict(protocol)
-    parameters["side"] = protocol.side.name.lower()
-    parameters["pulses"]["torque"] = protocol.pulse_torque
     outcome: dict[str, Any] = _without_nan(
         {
             "unperturbed_stride_period": run.measured_period,
@@ -74,7 +76,7 @@ def outcome_of(run: Run) -> dict[str, Any]:
                     "phase_lag": pulse.phase_lag,
                 }
                 for pulse in analysis.pulses
-                if pulse.stride <= protocol.strides
+                if strides and pulse.stride <= strides[-1].number
             ],
             "verdict": verdict.name.lower(),
             "reason": reason.name.lower() if reason else None,
@@ -91,41 +93,47 @@ def outcome_of(run: Run) -> dict[str, Any]:
                 for h in holes_of(run)
             ],
             "gait_events": asdict(analysis.event_counts),
-            "parameters": parameters,
+            "parameters": run.protocol and _parameters(run.protocol),
         }
     )
     return outcome
 
 
+def _parameters(protocol: Protocol) -> dict[str, Any]:
+    """Return a protocol with its side as a word and its torque in N m, however it was given."""
+    parameters = asdict(protocol)
+    parameters["side"] = protocol.side.name.lower()
+    parameters["pulses"]["torque"] = protocol.pulse_torque
+    return parameters
+
+
 def holes_of(run: Run) -> list[Hole]:
     """Return what the record of a run lacks; its last strides too, whether walked or not."""
     holes, strides = list(run.analysis.holes), run.analysis.strides
-    if strides and (missing := run.protocol.strides - strides[-1].number) > 0:
+    if strides and run.protocol is not None:
         end = strides[-1].end
-        holes.append(Hole(end, end, f"the last {missing} strides"))
+        if (missing := run.protocol.strides - strides[-1].number) > 0:
+            holes.append(Hole(end, end, f"the last {missing} strides"))
     return holes
 
 
 def summary(outcome: dict[str, Any]) -> str:
     """Return the outcome in a few lines."""
-    parameters = outcome["parameters"]
+    plan = outcome["parameters"] and outcome["parameters"]["pulses"]
     strides, pulses = outcome["stride_period"], outcome["pulses"]
     unperturbed, period = outcome["unperturbed_stride_period"], outcome["perturbation_period"]
-    planned = parameters["pulses"]["count"]
     lines = [f"strides          {len(strides)}, pulses placed in them: {len(pulses)}"]
-    if len(pulses) != planned:
-        lines[0] += f" of {planned}"
+    if plan and len(pulses) != plan["count"]:
+        lines[0] += f" of {plan['count']}"
         if not outcome["holes"]:
             lines[0] += "; the train is longer than the run: add washout strides"
     if strides:
         measured = "not measured" if unperturbed is None else f"{unperturbed:.4f} s"
         lines.append(f"stride period    {measured} unperturbed, {strides[-1]:.4f} s last")
     if period is not None:
-        torque, width = parameters["pulses"]["torque"], parameters["pulses"]["width"]
+        shape = f"{plan['torque']:.2f} N m for {plan['width']:g} s " if plan else ""
         offset = "" if unperturbed is None else f" ({(period - unperturbed) * 1e3:+.1f} ms)"
-        lines.append(
-            f"pulses           {torque:.2f} N m for {width:g} s every {period:.4f} s{offset}"
-        )
+        lines.append(f"pulses           {shape}every {period:.4f} s{offset}")
     verdict = outcome["verdict"]
     if outcome["entrained"]:
         verdict += f" since stride {outcome['entrained_since_stride']}"

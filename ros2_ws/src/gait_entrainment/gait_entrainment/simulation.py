@@ -22,6 +22,7 @@ from gait_entrainment.walker import Ending, Walker
 class Simulation(Run):
     """What came of a simulated experiment; stamps count from its start."""
 
+    protocol: Protocol
     train: PulseTrain | None  # as planned; None if the walker did not come so far
     ending: Ending | None  # fall or fly-off; None if every stride was walked
 

@@ -53,8 +53,8 @@ def _stride_period(run: RecordedRun) -> Any:
     ):
         if np.isfinite(period):
             axes.axhline(period, color=colour, ls=style, lw=1.2, label=f"{text} {period:.4f} s")
-    periods = {s.number: s.period for s in run.analysis.strides}
-    numbers = range(1, min(max(periods, default=0), run.protocol.strides) + 1)
+    periods = {s.number: s.period for s in run.strides}
+    numbers = range(1, max(periods, default=0) + 1)
     axes.plot(numbers, [periods.get(number, np.nan) for number in numbers], **_DOTTED_LINE)
     _shade_holes(axes, run)
     axes.set(xlabel="stride", ylabel="stride period [s]", title="Stride period")
@@ -126,10 +126,10 @@ def _pulse_timing(run: RecordedRun) -> Any:
 
 def _ankle_torque(run: RecordedRun) -> Any:
     """Draw one line of ankle torque per stride, from the other leg's heel strike on, as Fig. 7."""
-    rows = drawn_strides(run.protocol, run.analysis)
+    rows = drawn_strides(run)
     figure, axes = _new_figure(2 + 0.28 * len(rows), right=0.7)
     torques = run.torques
-    peak = run.protocol.walker.peak_torque
+    peak = torques.intrinsic.max(initial=1.0)
     scale = 0.9 / peak
     longest = 0.0
     for row, stride in enumerate(rows):

@@ -14,7 +14,7 @@ import math
 import struct
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -68,6 +68,7 @@ class AnkleTorques:
 class RecordedRun(Run):
     """What a bag holds of one run; stamps are nanoseconds since 1970, as recorded."""
 
+    side: Side  # the perturbed leg
     torques: AnkleTorques  # of the strides that figures show; empty unless asked for
     messages: int  # in the bag, on all topics
     lost: int | None  # published but not recorded; None if no publisher gave a count
@@ -85,54 +86,96 @@ def read_run(
     *,
     torques: bool = True,
     onset: str | None = None,
+    protocol: Protocol | None = None,
+    side: Side | None = None,
 ) -> RecordedRun:
     """
-    Read a bag of this project, a folder or an ``.mcap`` file, and analyze it anew.
+    Read a bag, a folder or an ``.mcap`` file, and analyze it anew, whoever recorded it.
 
     ``settings`` are the numbers in the verdict. ``torques`` reads the ankle torque of the strides
     that figures show. A pulse begins at its "commanded" or "measured" ``onset``; by default as
-    the live analysis took it. Raises BagError if it is no bag, is damaged, or lacks the protocol
-    or the topics that are needed.
+    the live analysis took it. ``protocol`` and ``side`` are as `protocol_and_side` takes them.
+    Raises BagError if it is no bag, is damaged, or lacks the topics that are needed.
     """
     with BagReader(path) as bag:
-        try:
-            protocol = read_protocol(bag.custom_data["protocol"])
-        except KeyError:
-            raise BagError(f"{path}: holds no protocol: not a run of this project") from None
-        except ProtocolError as error:
-            raise BagError(f"{path}: its protocol cannot be read: {error}") from None
+        protocol, side = protocol_and_side(bag, protocol, side)
         record = _Record(bag)
         onsets = {"commanded": record.onsets, "measured": [t.onset for t in record.timings]}
         live_onset = bag.custom_data.get("onset", "commanded")
         if live_onset not in onsets:
             raise BagError(f"{path}: its onset is {live_onset!r}; allowed: {', '.join(onsets)}")
         live, analysis = (
-            analyze(record.events, onsets[kind], protocol.side, settings, record.unknown)
+            analyze(record.events, onsets[kind], side, settings, record.unknown)
             for kind in (live_onset, onset or live_onset)
         )
-        conductor = Conductor(protocol)
-        try:
-            for event in record.events:
-                conductor.add_event(event)
-        except (GaitError, ProtocolError):
-            pass  # too few events are left to plan by: the periods stay unknown
-        drawn = drawn_strides(protocol, analysis) if torques else []
-        return RecordedRun(
+        measured_period, pulse_period = _periods(protocol, record.events, analysis)
+        run = RecordedRun(
             protocol=protocol,
+            side=side,
             events=tuple(record.events),
             onsets=tuple(record.onsets),
-            measured_period=conductor.measured_period,
-            pulse_period=conductor.pulse_period,
+            measured_period=measured_period,
+            pulse_period=pulse_period,
             analysis=analysis,
             timings=tuple(record.timings),
             onset=live_onset,
-            differences=record.differences_from(live, protocol.side),
-            torques=record.read_torques(protocol.side, drawn),
+            differences=record.differences_from(live, side),
+            torques=record.read_torques(side, []),
             messages=bag.message_count,
             lost=_lost(bag),
             real_time_factor=record.real_time_factor,
             ended_early=bag.custom_data.get(ENDED_EARLY, ""),
         )
+        if torques:
+            run = replace(run, torques=record.read_torques(side, drawn_strides(run)))
+        return run
+
+
+def protocol_and_side(
+    bag: BagReader, protocol: Protocol | None = None, side: Side | None = None
+) -> tuple[Protocol | None, Side]:
+    """
+    Return the protocol of a recorded run, if anybody tells it, and the perturbed leg.
+
+    A ``protocol`` that is given stands for the one in the bag, and a ``side`` for the protocol's.
+    A recorder of another project keeps no protocol: the leg is then that on which the robot sat.
+    Raises BagError if the bag's protocol cannot be read, or nothing tells the leg.
+    """
+    if protocol is None and "protocol" in bag.custom_data:
+        try:
+            protocol = read_protocol(bag.custom_data["protocol"])
+        except ProtocolError as error:
+            raise BagError(f"{bag.path}: its protocol cannot be read: {error}") from None
+    if protocol is not None:
+        protocol = protocol if side is None else replace(protocol, side=side)
+        return protocol, protocol.side
+    name = _find(bag, topic_names.TORQUE_PROFILE)
+    if side is None and name is not None:
+        with _fields_expected(name):
+            for _, message in bag.decoded([name]):
+                return None, Side(message.side)
+    if side is None:
+        raise BagError(
+            f"{bag.path}: holds no run, or one of which nothing tells the perturbed leg: "
+            "give --side or --protocol"
+        )
+    return None, side
+
+
+def _periods(
+    protocol: Protocol | None, events: Sequence[GaitEvent], analysis: Analysis
+) -> tuple[float, float]:
+    """Return unperturbed and pulse period [s]: as a protocol plans them, else as analyzed."""
+    if protocol is None:
+        last = analysis.entrainments[-1] if analysis.entrainments else None
+        return (last.unperturbed_period, last.pulse_period) if last else (math.nan, math.nan)
+    conductor = Conductor(protocol)
+    try:
+        for event in events:
+            conductor.add_event(event)
+    except (GaitError, ProtocolError):
+        pass  # too few events are left to plan by: the periods stay unknown
+    return conductor.measured_period, conductor.pulse_period
 
 
 def _lost(bag: BagReader) -> int | None:
@@ -153,10 +196,9 @@ def _lost(bag: BagReader) -> int | None:
         ) from None
 
 
-def drawn_strides(protocol: Protocol, analysis: Analysis) -> list[Stride]:
+def drawn_strides(run: RecordedRun) -> list[Stride]:
     """Return the strides whose ankle torque is drawn: up to 24, evenly spread over the run."""
-    strides = [s for s in analysis.strides if s.number <= protocol.strides]
-    if not strides:
+    if not (strides := run.strides):
         return []
     chosen = np.unique(np.linspace(0, len(strides) - 1, STRIDES_DRAWN).round().astype(int))
     return [strides[i] for i in chosen]
@@ -219,8 +261,10 @@ class _Record:
             received.sort(key=lambda message: message.place)
         if len(clocks) < 2 or clocks[1].publish_time <= clocks[0].publish_time:
             return math.nan
-        wall = clocks[1].publish_time - clocks[0].publish_time
-        return (clocks[1].log_time - clocks[0].log_time) / wall
+        # By what the clock said: other recorders log by the wall clock.
+        decode = decoder_for(self._bag.topics[topic_names.CLOCK])
+        begin, end = (messages.nanoseconds_of(decode(tick.data).clock) for tick in clocks)
+        return (end - begin) / (clocks[1].publish_time - clocks[0].publish_time)
 
     def _values(self, relative: str, value_of: Callable[[Any], _Value]) -> Iterator[_Value]:
         """Give the values of the messages of a topic, which are not kept."""
@@ -330,6 +374,7 @@ def recorded_outcome(run: RecordedRun, bag: Path) -> dict[str, Any]:
     factor = run.real_time_factor
     return outcome_of(run) | {
         "bag": str(bag),
+        "side": run.side.name.lower(),
         "messages": run.messages,
         "lost": run.lost,
         "real_time_factor": None if math.isnan(factor) else factor,

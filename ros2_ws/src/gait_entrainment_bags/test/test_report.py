@@ -59,6 +59,7 @@ def test_the_figures_are_drawn(simulation, tmp_path):
     zeros = np.zeros(len(stamps))
     run = RecordedRun(
         protocol=simulation.protocol,
+        side=Side.RIGHT,
         events=simulation.events,
         onsets=simulation.onsets,
         measured_period=simulation.measured_period,
@@ -85,6 +86,7 @@ def test_a_run_without_pulses_or_strides_can_be_drawn_too(tmp_path):
     empty = np.empty(0)
     run = RecordedRun(
         protocol=Protocol(),
+        side=Side.RIGHT,
         events=(),
         onsets=(),
         measured_period=math.nan,

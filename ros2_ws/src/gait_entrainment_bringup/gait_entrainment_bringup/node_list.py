@@ -16,9 +16,11 @@ from typing import Any
 
 import yaml
 
-from gait_entrainment.protocol import Protocol, read_protocol, said_limits
+from gait_entrainment.conventions import Side
+from gait_entrainment.protocol import Protocol, said_limits, write_protocol
 from gait_entrainment.robot import find_driver
 from gait_entrainment_bags import BagError, BagReader
+from gait_entrainment_bags.recorded_run import protocol_and_side
 from gait_entrainment_bringup.provenance import provenance
 from gait_entrainment_nodes.messaging.environment import shared_file
 
@@ -158,23 +160,30 @@ def _drawn(protocol: Protocol) -> dict[str, Any]:
 
 
 def replay_parameters(
-    path: Path, namespace: str | None = None, out: Path | None = None
+    path: Path,
+    namespace: str | None = None,
+    out: Path | None = None,
+    protocol: Protocol | None = None,
+    side: Side | None = None,
 ) -> tuple[str, Parameters]:
     """
     Return the namespace and the parameters of a replay of a bag, a folder or an ``.mcap`` file.
 
     It goes into a namespace, by default into the one that was recorded, which is returned without
-    a slash at its end, and is recorded into ``out``, if given. There are parameters of the display
-    only if the bag holds no picture. BagError if the bag cannot be read or is no run of ours.
+    a slash at its end, and is recorded into ``out``, if given. ``protocol`` and ``side`` are as
+    `protocol_and_side` takes them. There are parameters of the display only if the bag holds no
+    picture. BagError if the bag cannot be read or holds no gait events.
     """
     with BagReader(path) as bag:
         topics = list(bag.topics)
         recorded = next((name for name in topics if name.endswith("/gait_events")), None)
-        if recorded is None or "protocol" not in bag.custom_data:
-            raise BagError(f"{path}: not a run of this project: no protocol or no gait events")
-        protocol = read_protocol(bag.custom_data["protocol"])
+        if recorded is None:
+            raise BagError(f"{path}: not a run of this project: no gait events")
+        protocol, side = protocol_and_side(bag, protocol, side)
         custom_data = bag.custom_data
-    side, onset = protocol.side.name.lower(), custom_data.get("onset", "commanded")
+    if protocol is not None:
+        custom_data = custom_data | {"protocol": write_protocol(protocol)}
+    onset = custom_data.get("onset", "commanded")
     recorded = recorded.removesuffix("/gait_events")
     namespace = recorded if namespace is None else namespace.rstrip("/")
     moved = [name for name in topics if namespace != recorded and name.startswith(f"{recorded}/")]
@@ -190,7 +199,11 @@ def replay_parameters(
             "expect": expected if out is None else expected * 2,
             "use_sim_time": False,
         },
-        "gait_analyzer": {"side": side, "onset": onset, "use_sim_time": True},
+        "gait_analyzer": {
+            "side": side.name.lower(),
+            "onset": onset,
+            "use_sim_time": True,
+        },
     }
     if out is not None:
         given["bag_recorder"] = {
@@ -200,7 +213,8 @@ def replay_parameters(
             "use_sim_time": True,
         }
     if f"{recorded}/robot_description" not in topics:
-        given[DISPLAY] = _drawn(protocol) | {"use_sim_time": True}
+        drawn = {} if protocol is None else _drawn(protocol)
+        given[DISPLAY] = drawn | {"use_sim_time": True}
     return namespace, given
 
 

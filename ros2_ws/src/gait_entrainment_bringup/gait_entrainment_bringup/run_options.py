@@ -108,11 +108,12 @@ def check_output(bag: Path, *, exactly: bool = True) -> None:
 @contextmanager
 def claimed_folder(bag: Path, *, exactly: bool) -> Iterator[Path]:
     """
-    Make the folder of a bag, which is this run's from then on; take it away if it stays empty.
+    Make the folder of a bag, which is this run's from then on; take away what stays empty.
 
     Unless it has to be ``exactly`` this one, a number is appended while another run has it.
     Raises UsageError if it is there already.
     """
+    parents = [parent for parent in bag.absolute().parents if not parent.exists()]
     for number in itertools.count(1):
         folder = bag if number == 1 else bag.with_name(f"{bag.name}_{number}")
         try:
@@ -126,8 +127,9 @@ def claimed_folder(bag: Path, *, exactly: bool) -> Iterator[Path]:
     try:
         yield folder
     finally:
-        with suppress(OSError):  # it is not empty
-            folder.rmdir()
+        with suppress(OSError):  # one is not empty
+            for made in (folder, *parents):
+                made.rmdir()
 
 
 def is_utf8(path: Path) -> bool:

@@ -11,15 +11,17 @@ that name in the same package:
     DESCRIPTION, EXAMPLES     what ``entrain NAME --help`` says
     add_options(parser)       adds the options
     run(options) -> int       does it and returns the exit code; a command of several actions has
-                              none, but sets it, and ``prog``, as defaults of each action's parser
+                              none, but sets it as a default of each action's parser
 
 Whatever a command raises as an EntrainmentError is printed here, in one line.
 """
 
 import argparse
 import importlib
+import os
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 from gait_entrainment.errors import EntrainmentError
 
@@ -38,8 +40,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     prog = f"entrain {name}"
     try:
         options = make_parser(name).parse_args(words)
-        prog = getattr(options, "prog", prog)
-        return int(options.run(options))
+        prog = options.prog
+        code = int(options.run(options))
+        print(end="", flush=True)  # what was printed and cannot be written is an error, too
+        return code
     except EntrainmentError as error:
         print(f"{prog}: {error}", file=sys.stderr)
         return error.exit_code
@@ -56,12 +60,39 @@ def main(arguments: Sequence[str] | None = None) -> int:
         pass
     except OSError as error:  # such as a folder that cannot be written
         print(f"{prog}: {error}", file=sys.stderr)
+    finally:
+        _forget_unwritable_output()
     return 1
+
+
+def _forget_unwritable_output() -> None:
+    """Keep Python from writing again at its end what was refused, and from ending with 120."""
+    try:
+        print(end="", flush=True)
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+class _Parser(argparse.ArgumentParser):
+    """
+    A parser whose actions refuse by themselves what they do not know, with their own usage.
+
+    argparse hands it up to the first parser, whose usage helps nobody. ``prog`` of the options is
+    the innermost parser's.
+    """
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        options, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        if "prog" not in options:
+            options.prog = self.prog
+        return options, unknown
 
 
 def make_parser(name: str = "") -> argparse.ArgumentParser:
     """Return the parser of the command line; only the command of this name is loaded."""
-    parser = argparse.ArgumentParser(prog="entrain", description=_DESCRIPTION)
+    parser = _Parser(prog="entrain", description=_DESCRIPTION)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     # A command of the core does not search the other packages: that takes longer than to run it.
     packages = {__name__: COMMANDS} if name in COMMANDS else _find_packages()

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from gait_entrainment.commands.outcome_options import add_outcome_options
 from gait_entrainment.outcome import summary, timing_summary
+from gait_entrainment_bags.commands.record_options import add_record_options, told_of_record
 from gait_entrainment_bags.figures import draw_figures
 from gait_entrainment_bags.recorded_run import messages_line, read_run, recorded_outcome
 
@@ -18,12 +19,13 @@ EXAMPLES = """examples:
   entrain analyze bags/paper_example --json     one JSON object, as of entrain simulate
   entrain analyze bags/mine --onset measured    pulses begin where the measured torque rises
   entrain analyze bags/mine --figures out       draws the figures into the folder out
+  entrain analyze theirs --protocol mine.yaml   recorded by ros2 bag record
 """
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    parser.add_argument("bag", type=Path, metavar="BAG", help="folder or .mcap file")
+    add_record_options(parser)
     parser.add_argument("--figures", type=Path, metavar="FOLDER", help="draw figures into it")
     add_outcome_options(parser, onset=None)
 
@@ -31,7 +33,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Analyze and print."""
     drawn = options.figures is not None
-    recorded = read_run(options.bag, torques=drawn, onset=options.onset)
+    told = told_of_record(options)
+    recorded = read_run(options.bag, torques=drawn, onset=options.onset, **told)
     figures: list[Path] = []
     if drawn:
         options.figures.mkdir(parents=True, exist_ok=True)

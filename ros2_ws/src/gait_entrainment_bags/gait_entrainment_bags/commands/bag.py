@@ -71,7 +71,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
             epilog=examples,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
-        action.set_defaults(run=run, prog=action.prog)
+        action.set_defaults(run=run)
         if name == "check":
             action.add_argument("bags", type=Path, nargs="+", metavar="BAG", help=_BAG)
         else:

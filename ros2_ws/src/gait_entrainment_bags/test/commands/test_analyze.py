@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from rosbags.rosbag2 import StoragePlugin, Writer
 
 from gait_entrainment.commands import main
 from gait_entrainment_bags import BagReader, BagWriter, check, recover
@@ -135,7 +136,7 @@ def test_the_bag_follows_every_rule_and_opens_without_ros_and_message_packages()
     ("name", "expected", "words"),
     [
         ("nowhere", 2, "no such file"),
-        ("foreign", 1, "holds no protocol"),
+        ("foreign", 1, "nothing tells the perturbed leg"),
         ("text", 1, "not an MCAP"),
         ("protocol=\0", 1, "its protocol cannot be read"),
         ("onset=sideways", 1, "'sideways'; allowed: commanded, measured"),
@@ -177,3 +178,61 @@ def test_messages_of_another_version_are_named(capsys, tmp_path, renamed):
     assert (code, out) == (1, "")
     assert err.count("\n") == 1
     assert f"{renamed[0].strip('/')}: its messages have no field {renamed[1]}" in err
+
+
+@pytest.fixture(scope="module")
+def foreign(tmp_path_factory):
+    """Give the bag as `rosbags` writes it: by the time of reception, without custom data."""
+    folder = tmp_path_factory.mktemp("foreign") / "bag"
+    with (
+        BagReader(BAG) as bag,
+        Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer,
+    ):
+        connections = {
+            name: writer.add_connection(
+                name, topic.type, msgdef=topic.schema_text, rihs01=topic.type_hash
+            )
+            for name, topic in bag.topics.items()
+        }
+        for message in sorted(bag.messages(), key=lambda message: message.publish_time):
+            if message.topic not in ("/ankle_torque", "/published_counts"):
+                writer.write(connections[message.topic], message.publish_time, message.data)
+    return folder
+
+
+def test_the_bag_of_another_recorder_is_an_equal(capsys, foreign):
+    ours = json.loads(entrain(capsys, "analyze", BAG, "--json")[1])
+    code, out, err = entrain(
+        capsys, "analyze", foreign, "--protocol", BAG / "protocol.yaml", "--json"
+    )
+    assert (code, err) == (0, "")
+    # Such a file does not say when a message was published, nor what was lost.
+    told = json.loads(out) | {
+        key: ours[key] for key in ("bag", "messages", "lost", "real_time_factor")
+    }
+    assert told == ours
+
+
+def test_without_a_protocol_the_rest_is_still_told(capsys, foreign, tmp_path):
+    ours = json.loads(entrain(capsys, "analyze", BAG, "--json")[1])
+    code, out, err = entrain(capsys, "analyze", foreign, "--json")
+    assert (code, err) == (0, "")
+    told = json.loads(out)
+    assert told["parameters"] is None
+    assert (told["side"], told["as_published_live"]) == ("right", True)
+    assert told["stride_period"][:80] == ours["stride_period"]
+    for key in ("unperturbed_stride_period", "perturbation_period"):
+        assert told[key] == pytest.approx(ours[key], abs=1e-9)
+    for key in ("pulses", "verdict", "entrained_since_stride", "final_phase_lag", "holes"):
+        assert told[key] == ours[key]
+    code, out, _ = entrain(capsys, "analyze", foreign, "--figures", tmp_path)
+    assert (code, out.count(".png")) == (0, 4)
+    assert "entrained since stride 29" in out
+
+
+def test_another_leg_than_the_recorded_one_can_be_analyzed(capsys, foreign):
+    told = json.loads(entrain(capsys, "analyze", foreign, "--side", "left", "--json")[1])
+    assert told["side"] == "left"
+    # The pulses settle in the other leg's double stance: half a stride away from its own.
+    assert told["entrained"]
+    assert abs(told["final_phase_lag"]) > 0.5

@@ -11,6 +11,7 @@ from gait_entrainment.errors import UsageError
 from gait_entrainment.outcome import outcome_of, summary
 from gait_entrainment.settings import Setting
 from gait_entrainment_bags import BagReader
+from gait_entrainment_bags.commands.record_options import add_record_options, told_of_record
 from gait_entrainment_bags.recorded_run import RecordedRun, read_run
 from gait_entrainment_bringup.node_list import MOVED, parameter_arguments, replay_parameters
 from gait_entrainment_bringup.run_options import check_output, is_utf8
@@ -33,7 +34,7 @@ _RATE = Setting("seconds of the bag per second", least=0, least_excluded=True)
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    parser.add_argument("bag", type=Path, metavar="BAG", help="folder or .mcap file")
+    add_record_options(parser)
     parser.add_argument(
         "--rate", metavar="FLOAT", help=f"{_RATE.meaning}; default: as fast as it goes"
     )
@@ -52,7 +53,7 @@ def run(options: argparse.Namespace) -> int:
     if options.out is not None:
         check_output(options.out)
     stop_on_signals()
-    recorded = read_run(options.bag, torques=False)
+    recorded = read_run(options.bag, torques=False, **told_of_record(options))
     with claimed_domain() as domain:
         results = replay(options, domain)
     return report(options, recorded, results)
@@ -60,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
 
 def replay(options: argparse.Namespace, domain: int) -> dict[str, list[bytes]]:
     """Start the nodes, play the bag, stop the nodes; return the results by topic."""
-    namespace, given = replay_parameters(options.bag, out=options.out)
+    namespace, given = replay_parameters(options.bag, out=options.out, **told_of_record(options))
     given["bag_player"] |= {"rate": options.rate or 0.0, "start_paused": True}
     remaps = [f"__ns:={namespace}", *(f"{name}:={name[1:]}" for name in MOVED)]
     moved = [word for remap in remaps for word in ("-r", remap)] if namespace else []

@@ -7,8 +7,6 @@ import argparse
 import sys
 from contextlib import suppress
 
-from gait_entrainment_msgs.srv import Ready
-from gait_entrainment_nodes.messaging.client import Client, all_answered
 from gait_entrainment_nodes.messaging.domain import wanted_domain
 from gait_entrainment_nodes.messaging.environment import set_environment
 
@@ -27,6 +25,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Ask every node until all are ready; 1 if they are not in time."""
     set_environment(wanted_domain() or 0)
+    # Not at the top: they load ROS, which is to find an environment that it can start in.
+    from gait_entrainment_msgs.srv import Ready
+    from gait_entrainment_nodes.messaging.client import Client, all_answered
+
     with Client("entrain_ready") as client:
         asked = [client.ask(Ready, f"{n}/ready", accept=lambda a: a.ready) for n in options.nodes]
         with suppress(KeyboardInterrupt):  # what is known by then is told

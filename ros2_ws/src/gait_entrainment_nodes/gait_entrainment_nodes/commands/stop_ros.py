@@ -9,10 +9,8 @@ import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 
-from std_srvs.srv import Trigger
-
-from gait_entrainment_nodes.messaging.client import Client, Question, all_answered
 from gait_entrainment_nodes.messaging.domain import DomainError, domains_in_use, wanted_domain
+from gait_entrainment_nodes.messaging.environment import require_usable_environment
 
 # How long to look for perturbators [s]; in a domain that a run has claimed, until one is found and
 # all have answered, but no longer than this.
@@ -38,6 +36,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Stop everything; 1 if nothing was found, or a stop was not confirmed."""
+    require_usable_environment()
     domains = {DEFAULT_DOMAIN: DISCOVERY, **dict.fromkeys(domains_in_use(), PATIENCE)}
     try:
         if (wanted := wanted_domain()) is not None:
@@ -64,6 +63,11 @@ def run(options: argparse.Namespace) -> int:
 
 def stop_all(domain: int, patience: float) -> dict[str, str | None]:
     """Call every stop service in a domain; return the answers, None if no stop is confirmed."""
+    # Not at the top: they load ROS, which is to find an environment that it can start in.
+    from std_srvs.srv import Trigger
+
+    from gait_entrainment_nodes.messaging.client import Client, Question, all_answered
+
     calls: dict[str, Question] = {}
     look_until = time.monotonic() + DISCOVERY
     with Client(f"entrain_stop_{domain}", domain=domain) as client:

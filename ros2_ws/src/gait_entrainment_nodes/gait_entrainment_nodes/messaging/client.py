@@ -24,6 +24,7 @@ from rclpy.node import Node
 
 from gait_entrainment.errors import UsageError
 from gait_entrainment_msgs.srv import Ready
+from gait_entrainment_nodes.messaging.environment import UnusableEnvironmentError
 from gait_entrainment_nodes.messaging.errors import SilenceError
 from gait_entrainment_nodes.messaging.topics import Topic
 
@@ -74,7 +75,8 @@ class Client:
     A node with a context and an executor of its own, in a ROS domain or that of the environment.
 
     ``each_round`` is called over and over while anything is waited for. An exception in it ends
-    the waiting, for instance when a process that should answer has ended.
+    the waiting, for instance when a process that should answer has ended. Raises
+    UnusableEnvironmentError if ROS cannot start.
     """
 
     def __init__(
@@ -87,7 +89,10 @@ class Client:
     ) -> None:
         self.each_round = each_round
         self._context = Context()
-        rclpy.init(args=[], context=self._context, domain_id=domain)
+        try:
+            rclpy.init(args=[], context=self._context, domain_id=domain)
+        except RuntimeError as error:
+            raise UnusableEnvironmentError(" ".join(str(error).split())) from None
         # Fewer endpoints are discovered sooner.
         self.node = Node(
             name,

@@ -5,15 +5,73 @@
 
 import getpass
 import os
+import shutil
 import socket
+import tempfile
 from contextlib import suppress
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
+from ament_index_python.resources import get_resources
+
+from gait_entrainment.errors import EntrainmentError
 
 PACKAGE = "gait_entrainment_nodes"
 # Below the loop that times the torque.
 _PRIORITY = 10
+SHARED_MEMORY = Path("/dev/shm")
+# Fast DDS without a page for its locks there dies of SIGBUS; with some it does without the rest.
+_LOCKS = 1_000_000
+
+
+class UnusableEnvironmentError(EntrainmentError):
+    """ROS cannot start in this environment; the message names the variable or the place."""
+
+
+def require_usable_environment() -> None:
+    """
+    See that ROS can start, before it is loaded: it would end the process with words of its own.
+
+    Logs go to a temporary folder if there is no home folder that can be written. Raises
+    UnusableEnvironmentError.
+    """
+    chosen = os.environ.get("RMW_IMPLEMENTATION")
+    installed = get_resources("rmw_typesupport").keys() - {"rmw_implementation"}
+    if chosen and chosen not in installed:
+        raise UnusableEnvironmentError(
+            f"RMW_IMPLEMENTATION: {chosen!r} is not installed; allowed: "
+            f"{', '.join(sorted(installed))}, or unset"
+        )
+    if os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "OFF":
+        raise UnusableEnvironmentError(
+            "ROS_AUTOMATIC_DISCOVERY_RANGE: 'OFF' keeps nodes from finding each other; allowed: "
+            "LOCALHOST, SUBNET, SYSTEM_DEFAULT, or unset"
+        )
+    if SHARED_MEMORY.exists() and shutil.disk_usage(SHARED_MEMORY).free < _LOCKS:
+        raise UnusableEnvironmentError(
+            f"{SHARED_MEMORY} is full, and Fast DDS needs it; remove what fills it, such as "
+            "fastrtps_* of processes that have ended"
+        )
+    _choose_log_folder()
+
+
+def _choose_log_folder() -> None:
+    """See that ROS can write its logs where the user says, or have them in a temporary folder."""
+    given = os.environ.get("ROS_LOG_DIR", "")
+    folder = given or f"{os.environ.get('ROS_HOME') or '~/.ros'}/log"
+    try:
+        if folder.startswith("~") and "HOME" not in os.environ:
+            raise FileNotFoundError
+        path = Path(folder).expanduser()
+        path.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=path).close()
+    except OSError as error:
+        if given:
+            raise UnusableEnvironmentError(
+                f"ROS_LOG_DIR: {given}: cannot be written to: {error.strerror}; allowed: a folder "
+                "of yours, or unset"
+            ) from None
+        os.environ["ROS_LOG_DIR"] = f"{tempfile.gettempdir()}/ros-{os.getuid()}"
 
 
 def shared_file(package: str, name: str) -> Path:
@@ -39,7 +97,12 @@ def dds_variables(*, real_time: bool) -> dict[str, str]:
 
 
 def set_environment(domain: int, *, real_time: bool = False) -> dict[str, str]:
-    """Put this process into a ROS domain; return the environment for those it starts."""
+    """
+    Put this process into a ROS domain; return the environment for those it starts.
+
+    To be called before ROS is loaded. Raises UnusableEnvironmentError if ROS could not start.
+    """
+    require_usable_environment()
     os.environ.update(dds_variables(real_time=real_time))
     # No node has large matrices: threads for them take longer to start than they save.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -77,12 +77,37 @@ def read_settings(value: Callable[[str], Any], dataclass_type: Any, prefix: str 
     return dataclass_type(**values)
 
 
-def refuse_unknown_parameters(node: Node) -> None:
-    """Raise SettingError if the node was started with a parameter that it does not have."""
-    for name in given_parameters(node):
-        if not node.has_parameter(name) and not name.startswith("qos_overrides."):
-            known = ", ".join(sorted(node.list_parameters([], 0).names))
-            raise SettingError(f"{name}: unknown parameter; allowed: {known}")
+def warn_of_unknown_parameters(node: Node) -> None:
+    """
+    Warn of parameters that the node was started with and does not have: files are often shared.
+
+    Raises SettingError for one in a section that is the node's own, such as ``limits``: it can be
+    meant for no other, and whoever mistypes a limit is not to go without.
+    """
+    known = [name for name in node.list_parameters([], 0).names if not _of_rclpy(name)]
+    sections = {name.rpartition(".")[0] for name in known} - {""}
+    given = (name for name in given_parameters(node) if not _of_rclpy(name))
+    unknown = [name for name in given if not node.has_parameter(name)]
+    for name in unknown:
+        if (section := name.rpartition(".")[0]) in sections:
+            allowed = ", ".join(sorted(n for n in known if n.startswith(f"{section}.")))
+            raise SettingError(f"{name}: unknown parameter; allowed: {allowed}")
+    if unknown:
+        logger: Any = node.get_logger()  # type: ignore[no-untyped-call]
+        told = ", ".join(name + _alike(name, known) for name in unknown)
+        logger.warning(f"unknown parameters are ignored: {told}")
+
+
+def _of_rclpy(name: str) -> bool:
+    return name.startswith("qos_overrides.")
+
+
+def _alike(name: str, known: list[str]) -> str:
+    """Return the parameter that may have been meant, as a question behind the name."""
+    import difflib  # here, since few need it
+
+    alike = difflib.get_close_matches(name, known, n=1)
+    return f" ({alike[0]}?)" if alike else ""
 
 
 def _declare(

@@ -24,7 +24,7 @@ from gait_entrainment_nodes.messaging.topics import DIAGNOSTICS, PUBLISHED_COUNT
 from gait_entrainment_nodes.nodes.parameters import (
     declare_settings,
     read_settings,
-    refuse_unknown_parameters,
+    warn_of_unknown_parameters,
 )
 
 # How often a node publishes its state on /diagnostics [s]; rqt calls it stale after 5 s.
@@ -63,7 +63,7 @@ class Participant(Node):
         groups = {n: s if isinstance(s, tuple) else (s, "") for n, s in settings.items()}
         for group, prefix in groups.values():
             declare_settings(self, group, prefix, fixed)
-        refuse_unknown_parameters(self)
+        warn_of_unknown_parameters(self)
         self._settings = groups
         self.take_parameters({})
         self.add_on_set_parameters_callback(self._on_set_parameters)
@@ -91,6 +91,20 @@ class Participant(Node):
 
         read = {name: read_settings(value, *group) for name, group in self._settings.items()}
         vars(self).update(read)
+
+    def set_parameters_atomically(self, parameter_list: list[Any]) -> SetParametersResult:
+        """Set what changes; to say again what is so is no change, even of what is read-only."""
+        changes = [parameter for parameter in parameter_list if not self._has(parameter)]
+        if parameter_list and not changes:
+            return SetParametersResult(successful=True)
+        return super().set_parameters_atomically(changes)
+
+    def _has(self, parameter: Any) -> bool:
+        """Return whether a parameter has this very value and type."""
+        if not self.has_parameter(parameter.name):
+            return False
+        present = self.get_parameter(parameter.name).get_parameter_value()
+        return bool(present == parameter.get_parameter_value())
 
     def _on_set_parameters(self, changes: Sequence[Any]) -> SetParametersResult:
         """Take a change or refuse it with the reason; types and ranges have been checked."""

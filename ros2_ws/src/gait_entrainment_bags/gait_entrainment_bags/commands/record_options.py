@@ -1,0 +1,35 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Options that tell of a recorded run what its bag, by whatever recorder, may not hold."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from gait_entrainment.conventions import Side
+from gait_entrainment.protocol import read_protocol
+
+
+def add_record_options(parser: argparse.ArgumentParser) -> None:
+    """Add the bag, and the protocol and the perturbed leg that stand for those in it."""
+    parser.add_argument("bag", type=Path, metavar="BAG", help="folder or .mcap file")
+    parser.add_argument(
+        "--protocol",
+        type=Path,
+        metavar="FILE",
+        help="the protocol that was conducted (default: as in the bag, if it holds one)",
+    )
+    parser.add_argument(
+        "--side",
+        choices=[side.name.lower() for side in Side],
+        help="the perturbed leg (default: as in the protocol, else where the robot sat)",
+    )
+
+
+def told_of_record(options: argparse.Namespace) -> dict[str, Any]:
+    """Return protocol and side as the options tell them, None where they do not."""
+    return {
+        "protocol": options.protocol and read_protocol(options.protocol),
+        "side": None if options.side is None else Side[options.side.upper()],
+    }

@@ -1,0 +1,68 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""An environment in which ROS cannot start is told in one line, before ROS is loaded."""
+
+import os
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from gait_entrainment_nodes.messaging import environment
+from gait_entrainment_nodes.messaging.environment import (
+    UnusableEnvironmentError,
+    require_usable_environment,
+)
+
+VARIABLES = ("RMW_IMPLEMENTATION", "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOG_DIR", "ROS_HOME")
+
+
+@pytest.fixture(autouse=True)
+def variables(monkeypatch, tmp_path):
+    """Give a usable environment; what is changed of it is undone."""
+    for name in VARIABLES:
+        monkeypatch.setenv(name, "")  # what ROS takes for unset
+    monkeypatch.setenv("HOME", str(tmp_path))
+    return monkeypatch
+
+
+def test_logs_stay_in_the_home_folder(tmp_path):
+    require_usable_environment()
+    assert not os.environ["ROS_LOG_DIR"]
+    assert (tmp_path / ".ros" / "log").is_dir()
+
+
+@pytest.mark.parametrize("home", [None, "/proc"], ids=["none", "unwritable"])
+def test_logs_go_to_a_temporary_folder_without_a_home(home, variables):
+    if home is None:
+        variables.delenv("HOME")
+    else:
+        variables.setenv("HOME", home)
+    require_usable_environment()
+    assert Path(os.environ["ROS_LOG_DIR"]).parent == Path(tempfile.gettempdir())
+
+
+@pytest.mark.parametrize(
+    ("variable", "value", "words"),
+    [
+        ("RMW_IMPLEMENTATION", "rmw_nonsense", "'rmw_nonsense' is not installed; allowed: rmw_"),
+        ("RMW_IMPLEMENTATION", "rmw_implementation", "is not installed"),
+        ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF", "allowed: LOCALHOST, SUBNET, SYSTEM_DEFAULT"),
+        ("ROS_LOG_DIR", "/proc/nowhere", "allowed: a folder of yours, or unset"),
+    ],
+)
+def test_what_ros_cannot_start_with_is_named(variable, value, words, variables):
+    variables.setenv(variable, value)
+    with pytest.raises(UnusableEnvironmentError) as caught:
+        require_usable_environment()
+    assert str(caught.value).startswith(f"{variable}: ")
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_full_shared_memory_is_named(variables):
+    used = environment.shutil.disk_usage("/")
+    variables.setattr(environment.shutil, "disk_usage", lambda _: used._replace(free=4096))
+    with pytest.raises(UnusableEnvironmentError, match="/dev/shm is full"):
+        require_usable_environment()

@@ -1,0 +1,126 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Every command: help, usage for what it refuses, and the exit codes of the README."""
+
+import argparse
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from gait_entrainment.commands import main, make_parser
+
+ROOT = Path(__file__).parents[1]
+BAG = ROOT / "bags" / "paper_example"
+SHORT = ["--baseline=2", "--pulses=2", "--washout=0"]
+
+
+def subparsers(parser):
+    """Return the parsers of a parser's actions, by name."""
+    groups = [a for a in parser._actions if isinstance(a, argparse._SubParsersAction)]
+    return groups[0].choices if groups else {}
+
+
+def all_commands():
+    """Return every command, and each of its actions behind it."""
+    found = []
+    for command in subparsers(make_parser()):
+        actions = subparsers(subparsers(make_parser(command))[command])
+        found += [[command, action] for action in actions] or [[command]]
+    return found
+
+
+def needed(words):
+    """Return words that stand for the arguments that a command cannot do without."""
+    parser = make_parser(words[0])
+    for word in words:
+        parser = subparsers(parser)[word]
+    positional = [a for a in parser._actions if not a.option_strings]
+    return [next(iter(a.choices or ["x"])) for a in positional]
+
+
+def ended(capsys, *words):
+    """Run a command; return its exit code, and what it printed to people and as errors."""
+    try:
+        code = main([*map(str, words)])
+    except SystemExit as end:  # argparse's
+        code = end.code
+    return code, *capsys.readouterr()
+
+
+@pytest.mark.parametrize("words", all_commands(), ids=" ".join)
+def test_each_command_has_help_and_refuses_an_option_with_its_own_usage(words, capsys):
+    code, out, err = ended(capsys, *words, "--help")
+    assert (code, err) == (0, "")
+    usage = f"usage: entrain {' '.join(words)} "
+    assert out.startswith(usage)
+    code, out, err = ended(capsys, *words, *needed(words), "--nonsense")
+    assert (code, out) == (2, "")
+    assert err.startswith(usage)
+    *_, last = err.splitlines()
+    assert last.startswith(f"entrain {' '.join(words)}: error: ")
+    assert "--nonsense" in last
+
+
+def test_what_is_no_command_shows_them_all(capsys):
+    for words in ([], ["nonsense"], ["--nonsense"]):
+        code, out, err = ended(capsys, *words)
+        assert (code, out) == (2, "")
+        assert err.startswith("usage: entrain ")
+
+
+# 0 done, 1 it failed, 2 wrong usage.
+EXIT_CODES = [
+    (0, ["simulate", *SHORT]),
+    (0, ["analyze", BAG]),
+    (0, ["bag", "info", BAG]),
+    (0, ["bag", "check", BAG]),
+    (0, ["driver", "list"]),
+    (1, ["simulate", "--torque=31"]),
+    (1, ["simulate", "--torque=-29", "--width=0.4"]),  # the walker falls
+    (1, ["simulate", "--driver=magic"]),
+    (1, ["analyze", "README.md"]),
+    (1, ["bag", "info", "README.md"]),
+    (1, ["bag", "check", "README.md"]),
+    (1, ["driver", "check", "magic"]),
+    (2, ["simulate", "--width=-1"]),
+    (2, ["simulate", "nowhere.yaml"]),
+    (2, ["analyze", "nowhere"]),
+    (2, ["analyze", BAG, "--protocol=nowhere.yaml"]),
+    (2, ["analyze", BAG, "--side=middle"]),
+    (2, ["bag", "check", "nowhere"]),
+    (2, ["bag", "export", BAG, "docs"]),
+    (2, ["run", f"--out={BAG}"]),
+    (2, ["replay", "nowhere"]),
+    (2, ["replay", BAG, "--rate=-1"]),
+    (2, ["node", "walker_sim", "--lead-time=20"]),
+]
+
+
+@pytest.mark.parametrize(
+    ("code", "words"), EXIT_CODES, ids=[f"{c} {' '.join(map(str, w))}" for c, w in EXIT_CODES]
+)
+def test_exit_codes(code, words, capsys, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    found, _, err = ended(capsys, *words)
+    assert found == code
+    if code != 0 and words[:2] != ["bag", "check"]:  # whose findings are its output
+        prog = "entrain " + " ".join(str(word) for word in words[:2] if str(word).isalpha())
+        assert err.splitlines()[-1].startswith((f"{prog}: ", f"entrain {words[0]}: ")), err
+        assert "Traceback" not in err
+
+
+@pytest.mark.parametrize(("out", "code", "told"), [("full", 1, "No space left"), ("head", 0, "")])
+def test_output_that_nobody_takes_ends_with_such_a_code_too(out, code, told):
+    command = "entrain bag info bags/paper_example --json"
+    script = {
+        "full": f"{command} > /dev/full",
+        "head": f"{command} | true; exit $((${{PIPESTATUS[0]}} > 1))",
+    }
+    done = subprocess.run(
+        ["bash", "-c", script[out]], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == code
+    assert told in done.stderr
+    assert len(done.stderr.splitlines()) == bool(told)
