@@ -74,9 +74,8 @@ def write_protocol(protocol: Protocol) -> str:
     content["side"] = protocol.side.name.lower()
     content["pulses"] = {k: v for k, v in content["pulses"].items() if v is not None}
     content["limits"] = said_limits(protocol)
-    if not content["limits"]:
-        del content["limits"]
-    text: str = yaml.safe_dump(content, sort_keys=False)
+    said = {k: v for k, v in content.items() if v != {}}
+    text: str = yaml.safe_dump(said, sort_keys=False)
     return text
 
 

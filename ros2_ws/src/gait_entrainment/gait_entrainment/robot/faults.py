@@ -36,9 +36,7 @@ OPERATOR_SILENT = Fault(
     " process is frozen.",
 )
 DEADMAN_SILENT = Fault(
-    "deadman_silent",
-    "The emergency stop fell silent for longer than the limit: it was let go, or its node has"
-    " ended.",
+    "deadman_silent", "The emergency stop fell silent: it was let go, or its node has ended."
 )
 EXPERIMENT_SILENT = Fault(
     "experiment_silent", "The experiment sent no horizon for longer than the limit."

@@ -1,11 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""
-Limits that every pulse train is checked against before a robot sees it.
-
-A person may get torque of some height, width, slope and rate, and so much of it in a session.
-"""
+"""Limits that every pulse train is checked against before a robot sees it."""
 
 import math
 from dataclasses import dataclass, replace

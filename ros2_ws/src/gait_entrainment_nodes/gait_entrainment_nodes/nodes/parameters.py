@@ -93,7 +93,7 @@ def warn_of_unknown_parameters(node: Node) -> None:
             allowed = ", ".join(sorted(n for n in known if n.startswith(f"{section}.")))
             raise SettingError(f"{name}: unknown parameter; allowed: {allowed}")
     if unknown:
-        logger: Any = node.get_logger()  # type: ignore[no-untyped-call]
+        logger: Any = node.get_logger()
         told = ", ".join(name + _alike(name, known) for name in unknown)
         logger.warning(f"unknown parameters are ignored: {told}")
 
