@@ -15,7 +15,7 @@ run() {
 }
 
 system=(deaths drivers interventions perturbator preflight real_time_run ros2_control spectators stopping)
-alone=(ros2_ws/src/gait_entrainment_drivers/test)
+alone=(ros2_ws/src/gait_entrainment_drivers/test tests/safety)
 for name in "${system[@]}"; do alone+=("tests/system/test_$name.py"); done
 run --numprocesses auto --dist loadfile "${alone[@]/#/--ignore=}" ros2_ws/src tests "$@"
 run "${alone[@]}" "$@"

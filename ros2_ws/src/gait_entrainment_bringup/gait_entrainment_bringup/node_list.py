@@ -17,6 +17,7 @@ from typing import Any
 import yaml
 
 from gait_entrainment.conventions import Side
+from gait_entrainment.gait import GaitLimits
 from gait_entrainment.protocol import Protocol, said_limits, write_protocol
 from gait_entrainment.robot import find_driver
 from gait_entrainment_bags import BagError, BagReader
@@ -147,7 +148,9 @@ def parameters(
 
 def gentle_limits(protocol: Protocol) -> dict[str, float]:
     """Return what limits the pulses of a real robot, unless the protocol says otherwise."""
-    gentle: dict[str, float] = {"rising": RISING}
+    # No two pulses closer than the shortest stride that is believed.
+    most = 60 / GaitLimits().stride_least
+    gentle: dict[str, float] = {"rising": RISING, "pulses_per_minute": most}
     if protocol.pulse_torque:
         rate = abs(protocol.pulse_torque) / (FLANK_SHARE * protocol.pulses.width)
         gentle["rate"] = min(rate, 1e6)
