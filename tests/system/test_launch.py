@@ -22,6 +22,7 @@ from gait_entrainment.protocol import read_protocol
 from gait_entrainment.simulation import simulate
 from gait_entrainment_bags import BagReader
 from gait_entrainment_bags.recorded_run import read_run
+from gait_entrainment_bringup.node_list import NODES
 from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 from gait_entrainment_nodes.messaging.player_services import srv
@@ -103,6 +104,9 @@ def test_experiment_ends_the_launch_with_success(tmp_path):
         launch.find_nodes()
         assert launch.wait() == 0, launch.text
         assert launch.survivors() == []
+    assert launch.text.count("started in ROS domain") == len(NODES)
+    assert "\nverdict          undecided" in launch.text
+    assert f"\nbag              {bag}\n" in launch.text
     topics, recorded, simulated = recorded_events(bag)
     assert recorded == simulated
     assert {"/clock", "/joint_states", "/gait/strides", "/rosout"} <= topics
@@ -221,6 +225,7 @@ def test_experiment_that_fails_fails_the_launch(tmp_path):
         launch.find_nodes()
         assert launch.wait() == 1, launch.text
         assert "The walker fell" in launch.text
+        assert f"the bag of the run so far is {bag}" in launch.text
         assert launch.survivors() == []
     # Readable; launch stops all nodes at once, so the last messages may lack.
     assert read_run(bag).messages > 1000
@@ -287,12 +292,26 @@ def test_device_is_brought_up_and_its_end_ends_the_launch(tmp_path):
         assert launch.survivors() == []
 
 
-def test_device_that_cannot_be_configured_fails_the_launch(tmp_path):
+@pytest.mark.parametrize(
+    ("file", "argument", "words"),
+    [
+        ("experiment", f"bag:={BAG}", f"bag: {BAG} is already there"),
+        ("experiment", "protocol:=nowhere.yaml", "nowhere.yaml: cannot be read"),
+        ("experiment", "params_file:=nowhere.yaml", "nowhere.yaml: no such file"),
+        ("experiment", "onset:=felt", "onset: 'felt'; allowed: commanded, measured"),
+        ("replay", "bag:=nowhere", "nowhere: no such file"),
+        ("replay", "rate:=fast", "rate: 'fast'; allowed: at least 0"),
+        ("device_only", "driver:=nosuch", "'nosuch' is unknown; allowed: "),
+        ("device_only", "side:=middle", "side: 'middle'; allowed: left, right"),
+    ],
+)
+def test_a_mistake_is_found_before_a_node_is_started(file, argument, words, tmp_path):
+    needed = {"replay": [f"bag:={BAG}"], "device_only": ["driver:=ideal"]}
+    arguments = [*needed.get(file, []), argument]
     with (
         claimed_domain() as domain,
-        launched("device_only.launch.py", tmp_path / "out", domain, "driver:=nosuch") as launch,
+        launched(f"{file}.launch.py", tmp_path / "out", domain, *arguments) as launch,
     ):
-        launch.find_nodes(("perturbator", "gait_analyzer"))
         assert launch.wait() == 1, launch.text
-        assert "'nosuch' is unknown" in launch.text
-        assert launch.survivors() == []
+    assert words in launch.text
+    assert "process started" not in launch.text

@@ -65,12 +65,16 @@ def value(context: LaunchContext, name: str) -> str:
     return str(LaunchConfiguration(name).perform(context))
 
 
+def choice(context: LaunchContext, name: str, *allowed: str) -> str:
+    """Return the value of an argument, one of those allowed; LaunchError for another."""
+    if (text := value(context, name).lower()) not in allowed:
+        raise LaunchError(f"{name}: {text!r}; allowed: {', '.join(allowed)}")
+    return text
+
+
 def is_true(context: LaunchContext, name: str) -> bool:
     """Return the value of an argument; LaunchError if it is neither true nor false."""
-    text = value(context, name).lower()
-    if text not in ("true", "false"):
-        raise LaunchError(f"{name}: {text!r}; allowed: true, false")
-    return text == "true"
+    return choice(context, name, "true", "false") == "true"
 
 
 def full_namespace(context: LaunchContext, namespace: str) -> str:
@@ -129,12 +133,15 @@ def in_background(context: LaunchContext, work: Callable[[Client], None]) -> Non
     context.add_completion_future(context.asyncio_loop.run_in_executor(None, do))
 
 
-def ended_by(nodes: list[Node], last: set[str], over: list[Action]) -> list[Action]:
+def ended_by(
+    nodes: list[Node], last: set[str], over: list[Action], bag: Path | None = None
+) -> list[Action]:
     """
     Return the handlers that end the launch with its nodes.
 
     Those named in ``last`` end by themselves; once all of them have ended well, ``over`` is done.
-    If another node ends, or one with another exit code than 0, the launch ends with exit code 1.
+    If another node ends, or one with another exit code than 0, the launch ends with exit code 1,
+    and with the path of the ``bag`` that it was to make, if there is one.
     """
     waited_for = set(last)
 
@@ -144,7 +151,8 @@ def ended_by(nodes: list[Node], last: set[str], over: list[Action]) -> list[Acti
         name = event.process_name.rpartition("-")[0]
         if event.returncode != 0 or name not in last:
             # Only an exception gives launch an exit code; it prints it in one line.
-            raise LaunchError(f"{name} ended with exit code {event.returncode}")
+            kept = f"; the bag of the run so far is {bag}" if bag and bag.exists() else ""
+            raise LaunchError(f"{name} ended with exit code {event.returncode}{kept}")
         waited_for.discard(name)
         return [] if waited_for else over
 

@@ -69,39 +69,55 @@ def checked_run(
     Raises UsageError, LimitError or DeviceError.
     """
     protocol = chosen_protocol(options)
-    protocol.limits.check_pulse(protocol.pulse_torque, protocol.pulses.width)
     for name, told in _NUMBERS.items():
         if (text := getattr(options, name)) is not None:
             setattr(options, name, told.parse(_option(name), text))
-    driver = find_driver(protocol.driver) if drives else None
-    if driver and not driver.simulated:
-        if not options.real_time:
-            raise LimitError(f"driver: {driver.name} runs in real time only; add --real-time")
-        if not options.arm:
-            raise LimitError(
-                f"driver: {driver.name} applies real torque: see that all is well, then add --arm"
-            )
-        require_proof(protocol.driver, unproved=options.unproved)
+    protocol.limits.check_pulse(protocol.pulse_torque, protocol.pulses.width)
+    if drives:
+        switches = {"armed": options.arm, "unproved": options.unproved}
+        check_robot(protocol, real_time=options.real_time, **switches)
     bag = options.out or bag_folder(protocol)
     if records:
         check_output(bag, exactly=options.out is not None)
     return protocol, bag
 
 
-def check_output(bag: Path, *, exactly: bool = True) -> None:
-    """Raise UsageError if a bag cannot be made, ``exactly`` there or under a name beside."""
+def check_robot(protocol: Protocol, *, real_time: bool, armed: bool, unproved: bool) -> None:
+    """Raise LimitError or DeviceError if a run could not get torque from a protocol's robot."""
+    driver = find_driver(protocol.driver)
+    if driver.simulated:
+        return
+    if not real_time:
+        raise LimitError(
+            f"driver: {driver.name} runs in real time only; add --real-time, or real_time:=true to "
+            "a launch file"
+        )
+    if not armed:
+        raise LimitError(
+            f"driver: {driver.name} applies real torque: see that all is well, then add --arm, or "
+            "arm:=true to a launch file"
+        )
+    require_proof(protocol.driver, unproved=unproved)
+
+
+def check_output(bag: Path, option: str = "--out", *, exactly: bool = True) -> None:
+    """
+    Raise UsageError if a bag cannot be made, ``exactly`` there or under a name beside.
+
+    The message begins with the option that named it.
+    """
     if not is_utf8(bag):
-        raise UsageError(f"--out: {str(bag.absolute())!a}; allowed: a name in UTF-8")
+        raise UsageError(f"{option}: {str(bag.absolute())!a}; allowed: a name in UTF-8")
     if exactly and os.path.lexists(bag):
-        raise UsageError(f"--out: {bag} is already there; a bag is never overwritten")
+        raise UsageError(f"{option}: {bag} is already there; a bag is never overwritten")
     parent = next(folder for folder in bag.absolute().parents if folder.exists())
     if not parent.is_dir():
-        raise UsageError(f"--out: {parent} is not a folder; allowed: a new folder in a folder")
+        raise UsageError(f"{option}: {parent} is not a folder; allowed: a new folder in a folder")
     try:
         tempfile.TemporaryDirectory(dir=parent).cleanup()
     except OSError as error:
         raise UsageError(
-            f"--out: {parent} cannot be written to: {error.strerror}; choose another folder"
+            f"{option}: {parent} cannot be written to: {error.strerror}; choose another folder"
         ) from None
 
 

@@ -16,6 +16,7 @@ from launch import Action, LaunchContext, LaunchDescription
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 
+from gait_entrainment.robot import find_driver
 from gait_entrainment_bringup import launch_nodes as shared
 from gait_entrainment_nodes.messaging.client import Client
 
@@ -27,7 +28,9 @@ TRANSITIONS = {
 
 def nodes(context: LaunchContext) -> list[Action]:
     """Make the nodes, and bring the perturbator up meanwhile."""
-    namespace, side, driver = (shared.value(context, n) for n in ("namespace", "side", "driver"))
+    namespace, driver = (shared.value(context, name) for name in ("namespace", "driver"))
+    side = shared.choice(context, "side", "left", "right")
+    find_driver(driver)  # which one there is not is told before a node is started
     arming = {"armed": "arm", "unproved": "unproved"}
     given = {"side": side, "driver": driver}
     given |= {name: shared.is_true(context, argument) for name, argument in arming.items()}

@@ -5,37 +5,51 @@
 Conduct one protocol over the nodes and record it: `entrain run` as a launch file.
 
 Nodes and parameters are those of `entrain run`. The experiment brings the perturbator up, and the
-launch ends with the experiment: exit code 0 once it is over and recorded, 1 if it failed.
+launch ends with the experiment: exit code 0 and the outcome once it is over and recorded, 1 if it
+failed. What would make it fail from the first is found before a node is started.
 """
 
 from pathlib import Path
 
 from launch import Action, LaunchContext, LaunchDescription
-from launch.actions import EmitEvent
+from launch.actions import EmitEvent, OpaqueFunction
 from launch.events import Shutdown
 
 from gait_entrainment.protocol import read_protocol, write_protocol
 from gait_entrainment_bringup import launch_nodes as shared
 from gait_entrainment_bringup.node_list import NODES, bag_folder, parameters
+from gait_entrainment_bringup.run_options import check_output, check_robot
 
 
 def nodes(context: LaunchContext) -> list[Action]:
     """Make the nodes once the arguments are known: the protocol says what they are given."""
     protocol = read_protocol(shared.value(context, "protocol") or None)
-    given = parameters(
-        protocol,
-        Path(shared.value(context, "bag") or bag_folder(protocol)),
-        real_time=shared.is_true(context, "real_time"),
-        armed=shared.is_true(context, "arm"),
-        unproved=shared.is_true(context, "unproved"),
-        onset=shared.value(context, "onset"),
-    )
+    real_time = shared.is_true(context, "real_time")
+    arming = {"armed": "arm", "unproved": "unproved"}
+    switches = {name: shared.is_true(context, argument) for name, argument in arming.items()}
+    onset = shared.choice(context, "onset", "commanded", "measured")
+    bag = Path(shared.value(context, "bag") or bag_folder(protocol)).absolute()
+    protocol.limits.check_pulse(protocol.pulse_torque, protocol.pulses.width)
+    check_robot(protocol, real_time=real_time, **switches)
+    check_output(bag, "bag")
+    given = parameters(protocol, bag, real_time=real_time, onset=onset, **switches)
     given["experiment"]["protocol"] = write_protocol(protocol)
     namespace = shared.value(context, "namespace")
     made = [shared.make_node(context, name, namespace, given[name]) for name in NODES]
-    over = [EmitEvent(event=Shutdown(reason="the experiment is over and recorded"))]
-    ending = shared.ended_by(made, {"experiment", "bag_recorder"}, over)
+    over = [
+        OpaqueFunction(function=tell, args=[bag]),
+        EmitEvent(event=Shutdown(reason="the experiment is over and recorded")),
+    ]
+    ending = shared.ended_by(made, {"experiment", "bag_recorder"}, over, bag)
     return [*ending, *shared.rviz(context, namespace, given), *made]
+
+
+def tell(_: LaunchContext, bag: Path) -> None:
+    """Print the outcome of the run, and where its bag is."""
+    # Not at the top: it takes a second to load.
+    from gait_entrainment_bringup.run_report import report
+
+    report(bag, figures=False, as_json=False)
 
 
 def generate_launch_description() -> LaunchDescription:

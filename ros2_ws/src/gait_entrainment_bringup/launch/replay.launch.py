@@ -15,9 +15,12 @@ from launch.actions import OpaqueFunction
 from launch.events import Shutdown
 from std_srvs.srv import Trigger
 
+from gait_entrainment.settings import Setting
 from gait_entrainment_bringup import launch_nodes as shared
 from gait_entrainment_bringup.node_list import REPLAY_NODES, replay_parameters
 from gait_entrainment_nodes.messaging.client import Client
+
+RATE = Setting("seconds of the bag per second", least=0)
 
 
 def nodes(context: LaunchContext) -> list[Action]:
@@ -26,7 +29,7 @@ def nodes(context: LaunchContext) -> list[Action]:
     into = shared.full_namespace(context, chosen) if chosen else None
     namespace, given = replay_parameters(Path(shared.value(context, "bag")), into)
     if rate := shared.value(context, "rate"):
-        given["bag_player"]["rate"] = float(rate)
+        given["bag_player"]["rate"] = RATE.parse("rate", rate)
     place = namespace or "/"
     made = [shared.make_node(context, name, place, given[name]) for name in REPLAY_NODES]
 

@@ -58,6 +58,8 @@ def run_node(make_node: Callable[[], Any]) -> int:
             _join_ros()
             node = make_node()
             node.offer_ready()
+            domain = rclpy.get_default_context().get_domain_id()
+            node.get_logger().info(f"started in ROS domain {domain}")
             if node.real_time:
                 come_before_others()
         except (EntrainmentError, ParameterException, ValueError, RuntimeError) as error:
