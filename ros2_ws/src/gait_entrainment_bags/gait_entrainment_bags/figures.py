@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
-from gait_entrainment.drawing import BLUE, GREEN, GREY, ORANGE, new_figure
-from gait_entrainment.outcome import holes_of
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind
+from gait_entrainment.drawing import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure
+from gait_entrainment.gait import Verdict
+from gait_entrainment.outcome import holes_of, timing_outcome, timing_summary
 from gait_entrainment.robot.timing import distribution, lateness_ms
 from gait_entrainment_bags.recorded_run import RecordedRun, drawn_strides
 
@@ -19,31 +20,49 @@ _DOTTED_LINE = {"color": BLUE, "marker": ".", "lw": 0.8}
 
 
 def draw_figures(run: RecordedRun, folder: Path) -> list[Path]:
-    """Draw the figures of a run as PNG files into a folder; return their paths."""
-    figures = {
-        "stride_period.png": _stride_period(run),
-        "phase_lag.png": _phase_lag(run),
-        "pulse_timing.png": _pulse_timing(run),
-        "ankle_torque.png": _ankle_torque(run),
-    }
+    """
+    Draw the figures of a run as PNG files into a folder; return their paths.
+
+    Of a robot whose pulses all begin at their command there is no figure of their timing.
+    """
+    figures = {"stride_period.png": _stride_period(run), "phase_lag.png": _phase_lag(run)}
+    if timing_summary(timing_outcome(run.timings, run.measured_period)):
+        figures["pulse_timing.png"] = _pulse_timing(run)
+    figures["ankle_torque.png"] = _ankle_torque(run)
     for name, figure in figures.items():
         figure.savefig(folder / name, dpi=130)
     return [folder / name for name in figures]
 
 
 def _new_figure(
-    height: float = _HEIGHT, *, right: float = 0.15, top: float = 0.4, bottom: float = 0.55
+    run: RecordedRun, title: str, height: float = _HEIGHT, *, right: float = 0.15, top: float = 0.6
 ) -> tuple[Any, Any]:
     """Return a figure and its axes; fitting the margins [inch] would take as long as to draw."""
     figure, axes = new_figure(size=(_WIDTH, height), layout=None)
     figure.subplots_adjust(
-        left=0.8 / _WIDTH, right=1 - right / _WIDTH, bottom=bottom / height, top=1 - top / height
+        left=0.8 / _WIDTH, right=1 - right / _WIDTH, bottom=0.9 / height, top=1 - top / height
     )
+    driver = "" if run.protocol is None else f", {run.protocol.driver}"
+    last = run.analysis.entrainments[-1] if run.analysis.entrainments else None
+    verdict = "" if last is None else f": {last.verdict.name.lower()}"
+    if last is not None and last.verdict is Verdict.ENTRAINED:
+        verdict += f" since stride {last.entrained_since_stride}"
+    figure.suptitle(title, x=0.8 / _WIDTH, y=1 - 0.08 / height, ha="left", va="top", fontsize=11)
+    named = {"x": 0.8 / _WIDTH, "y": 1 - 0.3 / height, "ha": "left", "va": "top", "fontsize": 8}
+    figure.text(s=f"{run.name}{driver}{verdict}", color=GREY, **named)
     return figure, axes
 
 
+def _add_legend(figure: Any, axes: Any) -> None:
+    """Add the legend below the axes, where it hides nothing."""
+    handles, labels = axes.get_legend_handles_labels()
+    if handles:
+        style = {"frameon": False, "fontsize": 8, "ncols": len(handles)}
+        figure.legend(handles, labels, loc="lower center", **style)
+
+
 def _stride_period(run: RecordedRun) -> Any:
-    figure, axes = _new_figure()
+    figure, axes = _new_figure(run, "Stride period")
     if given := [pulse.stride for pulse in run.analysis.pulses]:
         span = min(given) - 0.5, max(given) + 0.5
         axes.axvspan(*span, color=ORANGE, alpha=0.10, lw=0, label="pulses")
@@ -57,31 +76,45 @@ def _stride_period(run: RecordedRun) -> Any:
     numbers = range(1, max(periods, default=0) + 1)
     axes.plot(numbers, [periods.get(number, np.nan) for number in numbers], **_DOTTED_LINE)
     _shade_holes(axes, run)
-    axes.set(xlabel="stride", ylabel="stride period [s]", title="Stride period")
+    axes.set(xlabel="stride", ylabel="stride period [s]")
     axes.ticklabel_format(useOffset=False)
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend(frameon=False)
+    _add_legend(figure, axes)
     return figure
 
 
 def _phase_lag(run: RecordedRun) -> Any:
-    figure, axes = _new_figure()
-    axes.axhline(0, color=GREY, ls="--", lw=1.2, label="toe-off: end of double stance")
-    pulses = {pulse.number: pulse for pulse in run.analysis.pulses}
-    points = [
-        (pulses[number].stride, pulses[number].phase_lag * 1e3)
-        if number in pulses
-        else (np.nan, np.nan)  # no line across a hole
-        for number in range(1, max(pulses, default=0) + 1)
-    ]
-    axes.plot(*np.array(points).reshape(-1, 2).T, label="pulse onset", **_DOTTED_LINE)
+    """Draw each lag at its pulse's place in the walk, and the double stance that it refers to."""
+    figure, axes = _new_figure(run, "Phase lag of the pulses", right=0.8)
+    strikes = np.sort([e.stamp for e in run.events if e.kind is EventKind.HEEL_STRIKE])
+    rows: list[tuple[float, float, float]] = []  # place, lag and double stance [ms]
+    latest = None
+    for pulse in run.analysis.pulses:
+        stance = np.nan
+        if pulse.toe_off is not None and (before := np.searchsorted(strikes, pulse.toe_off)):
+            stance = (pulse.toe_off - strikes[before - 1]) / 1e6
+        place, lag = pulse.stride + pulse.phase, pulse.phase_lag
+        # No line across a hole, nor from one end of the stride to the other.
+        if latest and pulse.number > latest.number + 1:
+            rows.append((np.nan, np.nan, np.nan))
+        elif latest and abs(lag - latest.phase_lag) > 0.5 * run.measured_period:
+            rows.append((place, np.nan, stance))
+        rows.append((place, lag * 1e3, stance))
+        latest = pulse
+    places, lags, stances = np.array(rows).reshape(-1, 3).T
+    shade = {"color": BLUE, "alpha": 0.15, "lw": 0, "label": "double stance"}
+    axes.fill_between(places, -stances, 0, **shade)
+    axes.axhline(0, color=GREY, ls="--", lw=1.2, label="toe-off")
+    axes.plot(places, lags, label="pulse onset", **_DOTTED_LINE)
     _shade_holes(axes, run)
     last = run.analysis.entrainments[-1] if run.analysis.entrainments else None
     if last is not None and (since := last.entrained_since_stride):
-        label = f"near its final lag since stride {since}"
-        axes.axvline(since, color=GREEN, lw=1.2, label=label)
-    axes.set(xlabel="stride", ylabel="onset minus toe-off [ms]", title="Phase lag of the pulses")
-    axes.legend(frameon=False)
+        axes.axvline(since, color=GREEN, lw=1.2, label="from here near its final lag")
+    axes.set(xlabel="stride", ylabel="onset minus toe-off [ms]")
+    if np.isfinite(run.measured_period):
+        percent = 10 * run.measured_period  # [ms]
+        scales = (lambda ms: ms / percent, lambda share: share * percent)
+        axes.secondary_yaxis("right", functions=scales).set_ylabel("[% of the unperturbed stride]")
+    _add_legend(figure, axes)
     return figure
 
 
@@ -97,7 +130,8 @@ def _shade_holes(axes: Any, run: RecordedRun) -> None:
 
 def _pulse_timing(run: RecordedRun) -> Any:
     """Draw which share of the pulses was sent, and was measured, by how late at most."""
-    figure, axes = _new_figure(_HEIGHT + 0.7, top=0.9, bottom=1.15)
+    title = f"Timing of {len(run.timings)} pulses"
+    figure, axes = _new_figure(run, title, _HEIGHT + 0.7, top=1.1)
     for kind, colour, style in (("sent", ORANGE, "--"), ("measured", BLUE, "-")):
         late = distribution(run.timings, kind, run.measured_period)
         if late is None:
@@ -108,51 +142,48 @@ def _pulse_timing(run: RecordedRun) -> Any:
             f"worst {late['worst_ms']:.1f} ms{missing}"
         )
         axes.ecdf(lateness_ms(run.timings, kind), color=colour, ls=style, label=label)
-    axes.set(
-        xlabel="onset after its command [ms]",
-        ylabel="share of the pulses",
-        ylim=(0, 1.02),
-        title=f"Timing of {len(run.timings)} pulses",
-    )
+    axes.set(xlabel="onset after its command [ms]", ylabel="share of the pulses", ylim=(0, 1.02))
     if np.isfinite(run.measured_period):
         percent = 10 * run.measured_period  # [ms]
         scales = (lambda ms: ms / percent, lambda share: share * percent)
         axes.secondary_xaxis("top", functions=scales).set_xlabel("[% of the unperturbed stride]")
-    if axes.get_legend_handles_labels()[0]:
-        axes.axvline(0, color=GREY, lw=1.2)  # so that the command is in view
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), frameon=False)
+    axes.axvline(0, color=GREY, lw=1.2)  # so that the command is in view
+    _add_legend(figure, axes)
     return figure
 
 
 def _ankle_torque(run: RecordedRun) -> Any:
-    """Draw one line of ankle torque per stride, from the other leg's heel strike on, as Fig. 7."""
+    """Draw one line of ankle torque per stride, from its heel strike on, as Fig. 7."""
     rows = drawn_strides(run)
-    figure, axes = _new_figure(2 + 0.28 * len(rows), right=0.7)
+    figure, axes = _new_figure(
+        run, "Ankle torque stride by stride", 2.2 + 0.24 * len(rows), right=0.7
+    )
     torques = run.torques
-    peak = torques.intrinsic.max(initial=1.0)
+    peak = float(torques.intrinsic.max(initial=1.0))
     scale = 0.9 / peak
-    longest = 0.0
+    longest = max((stride.period for stride in rows), default=1.0)
     for row, stride in enumerate(rows):
         inside = (torques.stamps >= stride.start) & (torques.stamps < stride.end)
         time = (torques.stamps[inside] - stride.start) / NANOSECONDS_PER_SECOND
-        longest = max(longest, stride.period)
         own = torques.intrinsic[inside] * scale
         whole = own + torques.effective[inside] * scale
-        delivered = torques.delivered[inside] != 0
-        axes.fill_between(time, row, row - own, color=BLUE, alpha=0.35, lw=0)
-        axes.fill_between(time, row - own, row - whole, color=ORANGE, lw=0)
+        bar = np.where(torques.delivered[inside] != 0, row + 0.12, np.nan)
+        first = row == 0
+        filled = {"lw": 0, "label": "own push-off" if first else None}
+        axes.fill_between(time, row, row - own, color=BLUE, alpha=0.35, **filled)
+        filled["label"] = "pulse that acts" if first else None
+        axes.fill_between(time, row - own, row - whole, color=ORANGE, **filled)
         axes.plot(time, row - whole, color=BLUE, lw=0.6)
-        axes.plot(time[delivered], np.full(delivered.sum(), row + 0.12), "s", ms=1.5, color=ORANGE)
-        axes.text(longest * 1.01, row, f"{stride.period:.4f} s", fontsize=7, va="bottom")
-    axes.text(longest * 1.01, -0.85, "stride period", fontsize=7)
+        delivered = {"lw": 2, "solid_capstyle": "butt"}
+        delivered["label"] = "pulse delivered" if first else None
+        axes.plot(time, bar, color=ORANGE, **delivered)
+        axes.text(longest * 1.02, row, f"{stride.period:.4f} s", fontsize=7, va="bottom")
+    axes.text(longest * 1.02, -0.85, "stride period", fontsize=7)
+    height = 10 ** np.floor(np.log10(peak))  # of the scale [N m]
+    axes.plot([0, 0], [0, -height * scale], color=BLACK, lw=2, solid_capstyle="butt")
+    axes.text(0.01 * longest, -0.5 * height * scale, f"{height:g} N m", fontsize=7, va="center")
     axes.set_yticks(range(len(rows)), [str(s.number) for s in rows], fontsize=7)
-    axes.invert_yaxis()
     axes.set_ylim(len(rows) - 0.5, -1.1)
-    axes.set(
-        xlabel="time since heel strike of the perturbed leg [s]",
-        ylabel="stride",
-        title=f"Ankle torque: own push-off (blue, peak {peak:.0f} N m), "
-        "pulse that acts (orange), pulse delivered (bar)",
-    )
-    axes.title.set_fontsize(9)
+    axes.set(xlabel="time since heel strike of the perturbed leg [s]", ylabel="stride")
+    _add_legend(figure, axes)
     return figure

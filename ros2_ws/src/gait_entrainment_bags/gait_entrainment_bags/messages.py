@@ -27,11 +27,16 @@ class MessageError(UsageError):
     """A message that has no meaning, such as one about a third leg."""
 
 
+def side_of(message: Any) -> Side:
+    """Return the side of a message about one leg; raises MessageError for an unknown one."""
+    return _member(Side, "side", message.side)
+
+
 def event_of(message: Any, start: int = 0) -> GaitEvent:
     """Return the event of a GaitEvent message; raises MessageError for an unknown kind or side."""
     stamp = nanoseconds_of(message.header.stamp) - start
-    kind, side = _member(EventKind, "kind", message.kind), _member(Side, "side", message.side)
-    return GaitEvent(stamp, kind, side, int(message.step))
+    kind = _member(EventKind, "kind", message.kind)
+    return GaitEvent(stamp, kind, side_of(message), int(message.step))
 
 
 def stop_of(message: Any, start: int = 0) -> int | None:
@@ -51,7 +56,7 @@ def profile_of(message: Any, start: int = 0) -> TorqueProfile:
     MessageError for an unknown side.
     """
     return TorqueProfile(
-        side=_member(Side, "side", message.side),
+        side=side_of(message),
         times=tuple(nanoseconds_of(stamp) - start for stamp in message.times),
         torques=tuple(message.torques),
         onsets=tuple(nanoseconds_of(stamp) - start for stamp in message.onsets),

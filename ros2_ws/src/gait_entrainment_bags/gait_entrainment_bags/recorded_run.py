@@ -37,8 +37,10 @@ from gait_entrainment_bags.reader import BagReader
 from gait_entrainment_bags.recovery import RECOVERY_KEY
 from gait_entrainment_bags.writer import ENDED_EARLY
 
-# Strides of which the ankle torque is read: more would not be told apart in a figure.
+# Strides of which the ankle torque is drawn: more would not be told apart in a figure. Those while
+# a lock forms are drawn one by one, the latest of them if they are many.
 STRIDES_DRAWN = 24
+_FORMING_DRAWN = 30
 _TYPES = {
     topic_names.GAIT_EVENTS: "GaitEvent",
     topic_names.TORQUE_PROFILE: "TorqueProfile",
@@ -68,6 +70,7 @@ class AnkleTorques:
 class RecordedRun(Run):
     """What a bag holds of one run; stamps are nanoseconds since 1970, as recorded."""
 
+    name: str  # of the protocol; without one, of the bag
     side: Side  # the perturbed leg
     torques: AnkleTorques  # of the strides that figures show; empty unless asked for
     messages: int  # in the bag, on all topics
@@ -104,13 +107,16 @@ def read_run(
         live_onset = bag.custom_data.get("onset", "commanded")
         if live_onset not in onsets:
             raise BagError(f"{path}: its onset is {live_onset!r}; allowed: {', '.join(onsets)}")
+        live_side = _side_in(bag, topic_names.STRIDES)
+        live_side = side if live_side is None else live_side
         live, analysis = (
-            analyze(record.events, onsets[kind], side, settings, record.unknown)
-            for kind in (live_onset, onset or live_onset)
+            analyze(record.events, onsets[kind], leg, settings, record.unknown)
+            for kind, leg in ((live_onset, live_side), (onset or live_onset, side))
         )
         measured_period, pulse_period = _periods(protocol, record.events, analysis)
         run = RecordedRun(
             protocol=protocol,
+            name=Path(path).stem if protocol is None else protocol.name,
             side=side,
             events=tuple(record.events),
             onsets=tuple(record.onsets),
@@ -119,7 +125,7 @@ def read_run(
             analysis=analysis,
             timings=tuple(record.timings),
             onset=live_onset,
-            differences=record.differences_from(live, side),
+            differences=record.differences_from(live, live_side),
             torques=record.read_torques(side, []),
             messages=bag.message_count,
             lost=_lost(bag),
@@ -149,17 +155,22 @@ def protocol_and_side(
     if protocol is not None:
         protocol = protocol if side is None else replace(protocol, side=side)
         return protocol, protocol.side
-    name = _find(bag, topic_names.TORQUE_PROFILE)
-    if side is None and name is not None:
-        with _fields_expected(name):
-            for _, message in bag.decoded([name]):
-                return None, Side(message.side)
+    side = _side_in(bag, topic_names.TORQUE_PROFILE) if side is None else side
     if side is None:
         raise BagError(
             f"{bag.path}: holds no run, or one of which nothing tells the perturbed leg: "
             "give --side or --protocol"
         )
     return None, side
+
+
+def _side_in(bag: BagReader, relative: str) -> Side | None:
+    """Return the side that the first message of a topic names; None if there is none."""
+    if name := _find(bag, relative):
+        with _fields_expected(name):
+            for _, message in bag.decoded([name]):
+                return messages.side_of(message)
+    return None
 
 
 def _periods(
@@ -196,12 +207,20 @@ def _lost(bag: BagReader) -> int | None:
         ) from None
 
 
-def drawn_strides(run: RecordedRun) -> list[Stride]:
-    """Return the strides whose ankle torque is drawn: up to 24, evenly spread over the run."""
-    if not (strides := run.strides):
+def drawn_strides(run: Run) -> list[Stride]:
+    """Return the strides whose ankle torque is drawn: evenly spread, each while a lock forms."""
+    strides, analysis = run.strides, run.analysis
+    if not strides:
         return []
-    chosen = np.unique(np.linspace(0, len(strides) - 1, STRIDES_DRAWN).round().astype(int))
-    return [strides[i] for i in chosen]
+    forming: list[Stride] = []
+    since = analysis.entrainments[-1].entrained_since_stride if analysis.entrainments else None
+    if since is not None and analysis.pulses:
+        first = analysis.pulses[0].stride
+        forming = [s for s in strides if first <= s.number <= since + 1][-_FORMING_DRAWN:]
+    others = [stride for stride in strides if stride not in forming]
+    count = min(max(STRIDES_DRAWN - len(forming), STRIDES_DRAWN // 3), len(others))
+    spread = np.linspace(0, len(others) - 1, count).round().astype(int)
+    return sorted([*forming, *(others[i] for i in spread)], key=lambda stride: stride.number)
 
 
 class _Record:

@@ -15,9 +15,15 @@ from gait_entrainment.conventions import Side
 from gait_entrainment.gait import analyze
 from gait_entrainment.outcome import outcome_of, summary
 from gait_entrainment.protocol import Protocol, PulsePlan
+from gait_entrainment.robot import PulseTiming
 from gait_entrainment.simulation import Simulation, simulate
 from gait_entrainment_bags.figures import draw_figures
-from gait_entrainment_bags.recorded_run import AnkleTorques, RecordedRun
+from gait_entrainment_bags.recorded_run import (
+    STRIDES_DRAWN,
+    AnkleTorques,
+    RecordedRun,
+    drawn_strides,
+)
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +65,7 @@ def test_the_figures_are_drawn(simulation, tmp_path):
     zeros = np.zeros(len(stamps))
     run = RecordedRun(
         protocol=simulation.protocol,
+        name="a_run",
         side=Side.RIGHT,
         events=simulation.events,
         onsets=simulation.onsets,
@@ -72,8 +79,10 @@ def test_the_figures_are_drawn(simulation, tmp_path):
         real_time_factor=math.nan,
     )
     paths = draw_figures(run, tmp_path)
-    names = ("stride_period", "phase_lag", "pulse_timing", "ankle_torque")
-    assert [p.stem for p in paths] == list(names)
+    assert [p.stem for p in paths] == ["stride_period", "phase_lag", "ankle_torque"]
+    late = (PulseTiming(run.onsets[0], run.onsets[0] + 10**7, run.onsets[0] + 2 * 10**7),)
+    paths = draw_figures(dataclasses.replace(run, timings=late), tmp_path)
+    assert "pulse_timing" in [p.stem for p in paths]
     for path in paths:
         content = path.read_bytes()
         assert content.startswith(b"\x89PNG")
@@ -82,10 +91,24 @@ def test_the_figures_are_drawn(simulation, tmp_path):
         assert height > 300
 
 
+def test_each_stride_is_drawn_while_a_lock_forms(simulation):
+    numbers = [stride.number for stride in drawn_strides(simulation)]
+    first = simulation.analysis.pulses[0].stride
+    since = simulation.analysis.entrainments[-1].entrained_since_stride
+    assert set(range(first, since + 2)) <= set(numbers)
+    assert (numbers[0], numbers[-1]) == (1, 80)
+    assert len(numbers) == len(set(numbers)) == STRIDES_DRAWN
+    drifting = simulate(Protocol(pulses=PulsePlan(period_offset=-0.2)))
+    numbers = [stride.number for stride in drawn_strides(drifting)]
+    assert len(numbers) == STRIDES_DRAWN
+    assert max(np.diff(numbers)) <= 4
+
+
 def test_a_run_without_pulses_or_strides_can_be_drawn_too(tmp_path):
     empty = np.empty(0)
     run = RecordedRun(
         protocol=Protocol(),
+        name="a_run",
         side=Side.RIGHT,
         events=(),
         onsets=(),
@@ -98,7 +121,7 @@ def test_a_run_without_pulses_or_strides_can_be_drawn_too(tmp_path):
         lost=None,
         real_time_factor=math.nan,
     )
-    assert len(draw_figures(run, tmp_path)) == 4
+    assert len(draw_figures(run, tmp_path)) == 3
 
 
 def test_holes_are_told_in_json_and_to_people(simulation):

@@ -89,13 +89,13 @@ def check_robot(protocol: Protocol, *, real_time: bool, armed: bool, unproved: b
         return
     if not real_time:
         raise LimitError(
-            f"driver: {driver.name} runs in real time only; add --real-time, or real_time:=true to "
-            "a launch file"
+            f"driver: {driver.name} runs in real time only; add --real-time, or to a launch file "
+            "real_time:=true"
         )
     if not armed:
         raise LimitError(
             f"driver: {driver.name} applies real torque: see that all is well, then add --arm, or "
-            "arm:=true to a launch file"
+            "to a launch file arm:=true"
         )
     require_proof(protocol.driver, unproved=unproved)
 
