@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind
-from gait_entrainment.drawing import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure
+from gait_entrainment.drawing import BLACK, BLUE, GREEN, GREY, ORANGE, add_legend, new_figure
 from gait_entrainment.gait import Verdict
 from gait_entrainment.outcome import holes_of, timing_outcome, timing_summary
 from gait_entrainment.robot.timing import distribution, lateness_ms
@@ -42,23 +42,31 @@ def _new_figure(
     figure.subplots_adjust(
         left=0.8 / _WIDTH, right=1 - right / _WIDTH, bottom=0.9 / height, top=1 - top / height
     )
-    driver = "" if run.protocol is None else f", {run.protocol.driver}"
-    last = run.analysis.entrainments[-1] if run.analysis.entrainments else None
-    verdict = "" if last is None else f": {last.verdict.name.lower()}"
-    if last is not None and last.verdict is Verdict.ENTRAINED:
-        verdict += f" since stride {last.entrained_since_stride}"
-    figure.suptitle(title, x=0.8 / _WIDTH, y=1 - 0.08 / height, ha="left", va="top", fontsize=11)
-    named = {"x": 0.8 / _WIDTH, "y": 1 - 0.3 / height, "ha": "left", "va": "top", "fontsize": 8}
-    figure.text(s=f"{run.name}{driver}{verdict}", color=GREY, **named)
+    about = run.name if run.protocol is None else f"{run.name}, {run.protocol.driver}"
+    if last := run.analysis.entrainments[-1:]:
+        about += f": {last[0].verdict.name.lower()}"
+        if last[0].verdict is Verdict.ENTRAINED:
+            about += f" since stride {last[0].entrained_since_stride}"
+    place = {"x": 0.8 / _WIDTH, "ha": "left", "va": "top"}
+    figure.text(s=title, y=1 - 0.08 / height, fontsize=11, **place)
+    figure.text(s=about, y=1 - 0.3 / height, fontsize=8, color=GREY, **place)
     return figure, axes
 
 
-def _add_legend(figure: Any, axes: Any) -> None:
-    """Add the legend below the axes, where it hides nothing."""
-    handles, labels = axes.get_legend_handles_labels()
-    if handles:
-        style = {"frameon": False, "fontsize": 8, "ncols": len(handles)}
-        figure.legend(handles, labels, loc="lower center", **style)
+def _add_legend_below(figure: Any, axes: Any) -> None:
+    """Add the legend at the bottom of the figure, where it hides nothing."""
+    place = {"bbox_to_anchor": (0.5, 0), "bbox_transform": figure.transFigure, "ncols": 4}
+    add_legend(axes, loc="lower center", **place)
+
+
+def _add_percent(run: RecordedRun, add_axis: Any, place: str) -> None:
+    """Add a scale in percent of the unperturbed stride to one in ms, if that stride is known."""
+    if np.isfinite(run.measured_period):
+        percent = 10 * run.measured_period  # [ms]
+        scales = (lambda ms: ms / percent, lambda share: share * percent)
+        add_axis(place, functions=scales).set(
+            **{"xlabel" if place == "top" else "ylabel": "[% of the unperturbed stride]"}
+        )
 
 
 def _stride_period(run: RecordedRun) -> Any:
@@ -78,7 +86,7 @@ def _stride_period(run: RecordedRun) -> Any:
     _shade_holes(axes, run)
     axes.set(xlabel="stride", ylabel="stride period [s]")
     axes.ticklabel_format(useOffset=False)
-    _add_legend(figure, axes)
+    _add_legend_below(figure, axes)
     return figure
 
 
@@ -110,11 +118,8 @@ def _phase_lag(run: RecordedRun) -> Any:
     if last is not None and (since := last.entrained_since_stride):
         axes.axvline(since, color=GREEN, lw=1.2, label="from here near its final lag")
     axes.set(xlabel="stride", ylabel="onset minus toe-off [ms]")
-    if np.isfinite(run.measured_period):
-        percent = 10 * run.measured_period  # [ms]
-        scales = (lambda ms: ms / percent, lambda share: share * percent)
-        axes.secondary_yaxis("right", functions=scales).set_ylabel("[% of the unperturbed stride]")
-    _add_legend(figure, axes)
+    _add_percent(run, axes.secondary_yaxis, "right")
+    _add_legend_below(figure, axes)
     return figure
 
 
@@ -143,12 +148,9 @@ def _pulse_timing(run: RecordedRun) -> Any:
         )
         axes.ecdf(lateness_ms(run.timings, kind), color=colour, ls=style, label=label)
     axes.set(xlabel="onset after its command [ms]", ylabel="share of the pulses", ylim=(0, 1.02))
-    if np.isfinite(run.measured_period):
-        percent = 10 * run.measured_period  # [ms]
-        scales = (lambda ms: ms / percent, lambda share: share * percent)
-        axes.secondary_xaxis("top", functions=scales).set_xlabel("[% of the unperturbed stride]")
+    _add_percent(run, axes.secondary_xaxis, "top")
     axes.axvline(0, color=GREY, lw=1.2)  # so that the command is in view
-    _add_legend(figure, axes)
+    _add_legend_below(figure, axes)
     return figure
 
 
@@ -168,15 +170,12 @@ def _ankle_torque(run: RecordedRun) -> Any:
         own = torques.intrinsic[inside] * scale
         whole = own + torques.effective[inside] * scale
         bar = np.where(torques.delivered[inside] != 0, row + 0.12, np.nan)
-        first = row == 0
-        filled = {"lw": 0, "label": "own push-off" if first else None}
-        axes.fill_between(time, row, row - own, color=BLUE, alpha=0.35, **filled)
-        filled["label"] = "pulse that acts" if first else None
-        axes.fill_between(time, row - own, row - whole, color=ORANGE, **filled)
+        filled = {"color": BLUE, "alpha": 0.35, "lw": 0, "label": "own push-off"}
+        axes.fill_between(time, row, row - own, **filled)
+        filled = {"color": ORANGE, "lw": 0, "label": "pulse that acts"}
+        axes.fill_between(time, row - own, row - whole, **filled)
         axes.plot(time, row - whole, color=BLUE, lw=0.6)
-        delivered = {"lw": 2, "solid_capstyle": "butt"}
-        delivered["label"] = "pulse delivered" if first else None
-        axes.plot(time, bar, color=ORANGE, **delivered)
+        axes.plot(time, bar, color=ORANGE, lw=2, solid_capstyle="butt", label="pulse delivered")
         axes.text(longest * 1.02, row, f"{stride.period:.4f} s", fontsize=7, va="bottom")
     axes.text(longest * 1.02, -0.85, "stride period", fontsize=7)
     height = 10 ** np.floor(np.log10(peak))  # of the scale [N m]
@@ -185,5 +184,5 @@ def _ankle_torque(run: RecordedRun) -> Any:
     axes.set_yticks(range(len(rows)), [str(s.number) for s in rows], fontsize=7)
     axes.set_ylim(len(rows) - 0.5, -1.1)
     axes.set(xlabel="time since heel strike of the perturbed leg [s]", ylabel="stride")
-    _add_legend(figure, axes)
+    _add_legend_below(figure, axes)
     return figure

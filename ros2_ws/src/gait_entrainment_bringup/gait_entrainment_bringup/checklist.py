@@ -22,11 +22,8 @@ from gait_entrainment_bags.messages import nanoseconds_of
 from gait_entrainment_bringup.node_list import CLOCK_OFFSET, gentle_limits
 from gait_entrainment_bringup.operator_console import STOP_KEY, pressed_key
 from gait_entrainment_drivers.proof import proof_of
-from gait_entrainment_msgs.srv import Ready
-from gait_entrainment_nodes.messaging.client import Client
 from gait_entrainment_nodes.messaging.domain import wanted_domain
 from gait_entrainment_nodes.messaging.environment import set_environment
-from gait_entrainment_nodes.nodes.participants import ClockOffset
 from gait_entrainment_nodes.nodes.stop_thread import StopThread
 
 # How long the commands of the robot's loop are watched [s].
@@ -102,6 +99,11 @@ def _record(bag: Path) -> Point:
 def _clocks(nodes: Sequence[str]) -> Iterator[Point]:
     """Compare the clocks of other hosts with this one."""
     set_environment(wanted_domain() or 0, real_time=True)
+    # Not at the top: they load ROS, which is to find an environment that it can start in.
+    from gait_entrainment_msgs.srv import Ready
+    from gait_entrainment_nodes.messaging.client import Client
+    from gait_entrainment_nodes.nodes.participants import ClockOffset
+
     with Client("entrain_preflight") as client:
         for node in nodes:
             offsets = []

@@ -88,14 +88,10 @@ def check_robot(protocol: Protocol, *, real_time: bool, armed: bool, unproved: b
     if driver.simulated:
         return
     if not real_time:
-        raise LimitError(
-            f"driver: {driver.name} runs in real time only; add --real-time, or to a launch file "
-            "real_time:=true"
-        )
+        raise LimitError(f"driver: {driver.name} runs in real time only; add --real-time")
     if not armed:
         raise LimitError(
-            f"driver: {driver.name} applies real torque: see that all is well, then add --arm, or "
-            "to a launch file arm:=true"
+            f"driver: {driver.name} applies real torque: see that all is well, then add --arm"
         )
     require_proof(protocol.driver, unproved=unproved)
 
