@@ -167,7 +167,7 @@ def test_an_analyzer_that_hangs_is_named(monkeypatch: pytest.MonkeyPatch) -> Non
         return answer
 
     monkeypatch.setattr(replay_client.ReplayClient, "call", call_and_stall)
-    options = SimpleNamespace(bag=BAG, rate=1.0, out=None, json=True)
+    options = SimpleNamespace(bag=BAG, protocol=None, side=None, rate=1.0, out=None, json=True)
     with claimed_domain() as domain:
         monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))  # undone, where replay sets it
         with pytest.raises(NodeError, match="gait_analyzer has been silent for 3 s"):
