@@ -157,6 +157,7 @@ def test_node_and_ready_refuse_what_is_no_domain_and_no_name(words, domain, code
         ["entrain", "node", "walker_sim"],
         ["entrain", "ready", "walker_sim"],
         ["entrain", "stop-ros"],
+        ["entrain", "driver", "check", "--node", "perturbator"],
         ["walker_sim"],
     ],
     ids=" ".join,

@@ -37,6 +37,6 @@ setup(
         "console_scripts": [f"{node} = {NAME}.executable:main" for node in NODES],
         "gait_entrainment.commands": [f"nodes = {NAME}.commands"],
         "gait_entrainment.drivers": [f"ros2_control = {NAME}.ros2_control:Ros2ControlRobot"],
-        "gait_entrainment.node_check": [f"node = {NAME}.node_bench:check_node"],
+        "gait_entrainment.node_check": [f"node = {NAME}.node_check:check_node"],
     },
 )

@@ -1,0 +1,17 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Where `entrain driver check --node` enters: the check loads ROS, which must be able to start."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from gait_entrainment_nodes.messaging.environment import require_usable_environment
+
+
+def check_node(*arguments: Any, **options: Any) -> Iterator[Any]:
+    """Do as `node_bench.check_node`; raises UnusableEnvironmentError before ROS is loaded."""
+    require_usable_environment()
+    from gait_entrainment_nodes import node_bench
+
+    return node_bench.check_node(*arguments, **options)
