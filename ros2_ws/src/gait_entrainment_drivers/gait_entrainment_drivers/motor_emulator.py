@@ -14,6 +14,7 @@ are zero), heat, supply, arbitration and load of the bus, bit errors.
 
 import argparse
 import math
+import os
 import random
 import signal
 import sys
@@ -32,6 +33,7 @@ from gait_entrainment_drivers.can_bus import open_bus, send
 Frames = list[tuple[int, bytes]]  # id and data of each
 
 # How often the emulator looks after itself while no frame comes [s].
+_PRIORITY = 60  # above the loop that times the torque
 _TICK = 0.001
 # Name, type, default and meaning of what every emulator takes.
 _OPTIONS: tuple[tuple[str, Callable[[str], object], object, str], ...] = (
@@ -122,6 +124,8 @@ def run_emulator(
     except DeviceError as error:
         print(f"{name}: {error}", file=sys.stderr)
         return 1
+    with suppress(PermissionError):  # it stands for hardware, which waits for nobody
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
     print(f"{name}: ready", flush=True)
     trace = options.trace.open("w", buffering=1) if options.trace else nullcontext()
     with bus, trace as file, suppress(KeyboardInterrupt):
