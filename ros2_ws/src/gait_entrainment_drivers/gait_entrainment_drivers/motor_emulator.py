@@ -32,8 +32,8 @@ from gait_entrainment_drivers.can_bus import open_bus, send
 
 Frames = list[tuple[int, bytes]]  # id and data of each
 
-# How often the emulator looks after itself while no frame comes [s].
 _PRIORITY = 60  # above the loop that times the torque
+# How often the emulator looks after itself while no frame comes [s].
 _TICK = 0.001
 # Name, type, default and meaning of what every emulator takes.
 _OPTIONS: tuple[tuple[str, Callable[[str], object], object, str], ...] = (
