@@ -84,10 +84,6 @@ def emulated_motor(program: str, trace: Path) -> Iterator[int]:
     try:
         assert motor.stdout is not None
         assert "ready" in motor.stdout.readline()
-        with contextlib.suppress(
-            PermissionError
-        ):  # it stands for hardware, which waits for nobody
-            os.sched_setscheduler(motor.pid, os.SCHED_FIFO, os.sched_param(60))
         yield port
     finally:
         motor.kill()
