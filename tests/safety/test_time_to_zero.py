@@ -22,7 +22,6 @@ GOES_ON = 470
         ("entrain stop", "latched: stopped"),
         ("SIGTSTP", "interrupted"),
         ("freeze walker_sim", "walker_sim has been silent"),
-        ("freeze perturbator", "perturbator has been silent"),
         ("kill torque loop", "torque_loop_ended"),
     ],
 )

@@ -27,7 +27,7 @@ def emulator(*arguments, trace=None, program="ak_motor_emulator", driver="ak_mit
     try:
         assert "ready" in process.stdout.readline()
         # Patience for a machine that others share; the limits themselves are tested one by one.
-        patience = "rate=250,silence=0.3,lateness=0.5,host_silence=1"
+        patience = "rate=250,silence=0.3,lateness=0.5,host_silence=3"
         yield f"{driver}:interface=udp_multicast,channel={CHANNEL},port={port},{patience}"
     finally:
         process.terminate()

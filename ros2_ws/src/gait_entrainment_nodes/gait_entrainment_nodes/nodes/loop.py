@@ -104,7 +104,12 @@ def _serve_once(executor: Any, node: Any) -> None:
     sleep = LONGEST_SLEEP
     if deadline is not None:
         sleep = min(max(deadline - time.monotonic(), 0.0), LONGEST_SLEEP)
-    executor.spin_once(timeout_sec=sleep)
+    try:
+        executor.spin_once(timeout_sec=sleep)
+    except RuntimeError as error:  # rclpy's RCLError, which it does not export
+        # Whoever asked a service has gone, or is not matched yet and asks again.
+        if "client will not receive response" not in str(error):
+            raise
     node.publish_state()
     deadline = node.next_deadline()
     if deadline is not None and time.monotonic() >= deadline:
