@@ -70,10 +70,25 @@ def pushed(robot, torque):
     return states
 
 
+# What this driver itself answers for; the guard and the loop are asked with the other drivers.
+OF_THE_DRIVER = {
+    "lifecycle",
+    "pulses",
+    "cancelling",
+    "stopping_in_mid_pulse",
+    "deactivating",
+    "reconnecting",
+    "silent_host",
+    "states",
+}
+
+
 def test_a_controller_that_times_out_keeps_every_promise():
     with controller("--timeout=0.1") as text:
         bench = DriverBench(find_driver(text), PATIENT)
-        results = [run_check(check, bench) for check in CHECKS]
+        chosen = [check for check in CHECKS if check.__name__ in OF_THE_DRIVER]
+        assert len(chosen) == len(OF_THE_DRIVER)
+        results = [run_check(check, bench) for check in chosen]
     assert [result for result in results if not result.kept] == []
 
 
