@@ -3,8 +3,8 @@
 # SPDX-License-Identifier: Apache-2.0
 
 # Every test. Most share the processors, a file for each at a time; then so do those that run in
-# real time with some patience. Those that hold real time to account, or stop every robot of this
-# machine, have it to themselves. Arguments go to pytest each time.
+# real time and wait most of the time. Those that stop every robot of this machine, or hold its
+# timing to account, have it to themselves. Arguments go to pytest each time.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -16,11 +16,12 @@ run() {
 }
 
 devices=ros2_ws/src/gait_entrainment_drivers/test
-patient=("$devices" tests/system/test_{interventions,perturbator,ros2_control}.py)
-alone=("$devices/test_torque_loop.py" tests/safety
-    tests/system/test_{deaths,drivers,preflight,real_time_run,spectators,stopping}.py)
-side_by_side=(--numprocesses auto --dist loadfile)
-run "${side_by_side[@]}" "${patient[@]/#/--ignore=}" "${alone[@]/#/--ignore=}" ros2_ws/src tests "$@"
-run "${side_by_side[@]}" "${alone[@]/#/--ignore=}" "${patient[@]}" "$@"
+alone=("$devices/test_torque_loop.py" tests/safety tests/system/test_{preflight,stop_command}.py)
+waiting=("$devices"
+    tests/system/test_{deaths,drivers,interventions,perturbator,real_time_run}.py
+    tests/system/test_{ros2_control,spectators,stopping}.py)
+run --numprocesses auto --dist loadfile \
+    "${waiting[@]/#/--ignore=}" "${alone[@]/#/--ignore=}" ros2_ws/src tests "$@"
+run --numprocesses 3 --dist loadfile "${alone[@]/#/--ignore=}" "${waiting[@]}" "$@"
 run "${alone[@]}" "$@"
 exit $failed

@@ -73,6 +73,6 @@ def test_in_lock_step_a_suspended_reader_is_named(tmp_path):
     ):
         begin = time.monotonic()
         assert run.wait() == 1
-        assert f"spectator (process {spectator}) is suspended" in run.text.splitlines()[0]
+        assert f"held up by process {spectator} " in run.text.splitlines()[0]
         # It takes all that the queues hold before anybody is held up.
         assert run.ended_at - begin < SILENCE_TIMEOUT + 10

@@ -10,6 +10,7 @@ from gait_entrainment_bringup.supervisor import Supervisor
 from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.client import Client
 from gait_entrainment_nodes.messaging.errors import NodeError
+from gait_entrainment_nodes.messaging.readers import who_hangs
 
 # A pause between two looks that is so long [s] says that this process was held up itself.
 HELD_UP = 1.0
@@ -33,7 +34,8 @@ class Watch:
         asked: Collection[str],
         silence: float,
     ) -> None:
-        self._supervisor, self._may_end, self._silence = supervisor, may_end, silence
+        self._client, self._supervisor = client, supervisor
+        self._may_end, self._silence = may_end, silence
         never, period = (lambda _: False), silence / 6
         self._signs = {
             node: client.ask(Ready, f"{node}/ready", accept=never, period=period) for node in asked
@@ -51,4 +53,5 @@ class Watch:
             sign.answer()
             answers = sign.latest is not None and node not in ended
             if answers and now - max(sign.answered_at, self._since) > self._silence:
-                raise NodeError(f"{node} has been silent for {self._silence:g} s", node)
+                silent = f"{node} has been silent for {self._silence:g} s"
+                raise NodeError(silent + who_hangs(self._client.node), node)

@@ -12,26 +12,27 @@ from pathlib import Path
 from typing import Any
 
 
-def suspended_readers(node: Any, publisher: str, namespace: str) -> list[str]:
-    """Return the readers of a node's topics whose process is suspended, each in words."""
+def who_hangs(node: Any) -> str:
+    """Return which readers in a node's domain hold up the rest, as the end of a message."""
     stopped = _suspended_processes()
-    found = []
-    for topic, _ in node.get_publisher_names_and_types_by_node(publisher, namespace):
-        for reader in node.get_subscriptions_info_by_topic(topic):
-            process = stopped.get(int.from_bytes(bytes(reader.endpoint_gid[4:6]), "little"))
-            if process is not None:
-                found.append(f"{reader.node_name} (process {process}) is suspended")
-    return list(dict.fromkeys(found))
+    found = {
+        stopped[number]
+        for topic, _ in node.get_topic_names_and_types()
+        for reader in node.get_subscriptions_info_by_topic(topic)
+        if (number := int.from_bytes(bytes(reader.endpoint_gid[4:6]), "little")) in stopped
+    }
+    return "".join(f"; held up by process {process}, which is suspended" for process in found)
 
 
-def _suspended_processes() -> dict[int, int]:
+def _suspended_processes() -> dict[int, str]:
     """Return the processes of this host that are suspended, by the lower half of their number."""
     found = {}
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
-            state = stat.read_text().rpartition(")")[2].split()[0]
+            name, state = stat.read_text().rpartition(")")[::2]
         except OSError:  # it has ended meanwhile
             continue
-        if state == "T":
-            found[int(stat.parent.name) & 0xFFFF] = int(stat.parent.name)
+        if state.split()[0] == "T":
+            number, _, command = name.partition(" (")
+            found[int(number) & 0xFFFF] = f"{number} ({command})"
     return found

@@ -18,7 +18,6 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.action import ActionClient
-from rclpy.node import NodeNameNonExistentError
 from rclpy.task import Future
 
 from gait_entrainment.experiment import Conductor, Part
@@ -30,7 +29,7 @@ from gait_entrainment_msgs import msg
 from gait_entrainment_msgs.action import DeliverPulseTrain, RunProtocol
 from gait_entrainment_msgs.srv import StartRun
 from gait_entrainment_nodes.messaging import topics
-from gait_entrainment_nodes.messaging.readers import suspended_readers
+from gait_entrainment_nodes.messaging.readers import who_hangs
 from gait_entrainment_nodes.messaging.stamps import to_time
 from gait_entrainment_nodes.nodes.experiment_run import (
     PERTURBATOR,
@@ -158,7 +157,7 @@ class Experiment(Participant):
             self._request,
             recorded=recorded,
             real_time=self.real_time,
-            held_up=self._held_up,
+            held_up=lambda: who_hangs(self),
         )
         self.note_state(DiagnosticStatus.OK, f"run {run.number} goes on")
         result = RunProtocol.Result(run=run.number, outcome=RunProtocol.Result.FAILED)
@@ -289,13 +288,6 @@ class Experiment(Participant):
         super().publish(topic, message)
         if topic is topics.EXPERIMENT_STATE:
             self._server.publish_feedback(RunProtocol.Feedback(state=message))
-
-    def _held_up(self, silent: str) -> str:
-        """Say by whom a node that is silent is held up."""
-        with contextlib.suppress(NodeNameNonExistentError):
-            readers = suspended_readers(self, silent, self.get_namespace())
-            return "; it is held up: " + ", ".join(readers) if readers else ""
-        return ""
 
     def _on_trouble(self, trouble: msg.Trouble) -> None:
         # Before the first horizon of a run the perturbator does not know its number.

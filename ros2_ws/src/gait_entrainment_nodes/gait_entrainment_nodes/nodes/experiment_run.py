@@ -42,8 +42,8 @@ class Run:
 
     ``request`` asks the perturbator for pulses; ``take_answer`` is then told its answer. If the
     run is ``recorded``, the walker waits for the recorder. In ``real_time`` nobody waits for
-    anybody, and each owes what it does by itself. ``held_up`` says by whom a node that is
-    silent is held up, if that is known. ``clock`` is steady time [s].
+    anybody, and each owes what it does by itself. ``held_up`` says who holds up the rest,
+    if that is known. ``clock`` is steady time [s].
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class Run:
         *,
         recorded: bool,
         real_time: bool = False,
-        held_up: Callable[[str], str] = lambda _: "",
+        held_up: Callable[[], str] = lambda: "",
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.number = number
@@ -259,7 +259,7 @@ class Run:
             if silent == WALKER and self._progress is not None:
                 total = self._progress.events
                 what = f"{WALKER}: {total - self._events} of {total} gait events missing"
-            why = self._held_up(silent)
+            why = self._held_up()
             self.fail(ExperimentError(f"{what} for {silence_timeout:g} s{why}", silent))
 
     def _debts(self) -> Iterator[tuple[float, str]]:

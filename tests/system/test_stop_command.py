@@ -1,0 +1,35 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""entrain stop: it reaches every robot of this machine, so nothing else may run beside it."""
+
+import os
+import re
+import subprocess
+
+from harness import entrain_run
+from test_drivers import entrain
+
+
+def test_stop_from_the_command_line_ends_a_run(tmp_path):
+    with entrain_run(tmp_path / "bag", "--real-time", "--baseline=2") as run:
+        run.wait_for_stride(2)
+        code, out, err = entrain(run.domain(), "stop")
+        assert code == 0, out + err
+        assert re.search(r"perturbator/\d+: the stop is latched", out)
+        assert run.wait() == 1
+        assert "stopped: The stop was called." in run.text
+
+
+def test_stop_that_finds_nobody_says_so():
+    code, out, err = entrain(None, "stop")
+    assert (code, out) == (1, "")
+    assert "no robot is driven by this machine" in err
+
+
+def test_stop_needs_no_home_and_no_ros():
+    bare = {"PATH": os.environ["PATH"], "PYTHONPATH": os.environ["PYTHONPATH"]}
+    done = subprocess.run(["entrain", "stop"], capture_output=True, text=True, env=bare)
+    assert done.returncode == 1
+    assert "no robot is driven by this machine" in done.stderr
+    assert "Traceback" not in done.stderr
