@@ -9,6 +9,7 @@ Not modelled: motion, heat, the speed of the line, bit errors.
 """
 
 import argparse
+import contextlib
 import math
 import os
 import pty
@@ -80,6 +81,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     ours, theirs = pty.openpty()
     tty.setraw(theirs)  # kept open: a driver that closes the line leaves the robot running
+    with contextlib.suppress(PermissionError):  # it stands for hardware, which waits for nobody
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(60))
     print(os.ttyname(theirs), flush=True)
     robot = EmulatedRobot(options.bandwidth, options.timeout)
     received, torque_since = bytearray(), math.inf
