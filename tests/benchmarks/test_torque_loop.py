@@ -51,8 +51,9 @@ def lateness_of_commands(port):
             sent += [state.stamp for state in robot.read()]
         assert not robot.faults, robot.faults
         refused = robot.scheduling_refused
-    # Deadlines are a period apart, and no command is sent before its own.
-    early = [stamp - k * 10**9 // RATE for k, stamp in enumerate(sent)]
+    # Deadlines are a period apart, and no command is sent before its own. Not each has an answer.
+    period = 10**9 // RATE
+    early = [stamp - round((stamp - sent[0]) / period) * period for stamp in sent]
     return [(value - min(early)) / 1e9 for value in early], refused
 
 
