@@ -49,7 +49,7 @@ def test_a_robot_that_is_fit_for_a_session_is_armed_and_its_bag_says_so(tmp_path
 @pytest.mark.usefixtures("state")
 def test_what_is_not_proved_or_not_pressed_fails_by_name(tmp_path):
     with emulated_motor(tmp_path) as (driver, _):
-        options = (f"--driver={driver}", "--arm", "--patience=0.5")
+        options = (f"--driver={driver}", "--arm", "--timeout=0.5")
         code, out, _ = entrain(None, "preflight", *options)
     assert code == 1
     assert out.splitlines()[-1] == "not fit for a session: watchdog, stop"

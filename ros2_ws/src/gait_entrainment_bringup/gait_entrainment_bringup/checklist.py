@@ -21,6 +21,7 @@ from gait_entrainment.stop_channel import StopAnswer, stop_all
 from gait_entrainment_bags.messages import nanoseconds_of
 from gait_entrainment_bringup.node_list import CLOCK_OFFSET, gentle_limits
 from gait_entrainment_bringup.operator_console import STOP_KEY, pressed_key
+from gait_entrainment_drivers.monitor import NEAR_ZERO_SHARE
 from gait_entrainment_drivers.proof import proof_of
 from gait_entrainment_nodes.messaging.domain import wanted_domain
 from gait_entrainment_nodes.messaging.environment import set_environment
@@ -36,8 +37,6 @@ _SPACE = 2 * 10**9
 _ASKED = 20
 # Torque has this long to fall after the stop [s].
 _FALL_TIME = 0.3
-# Torque that a sensor may show without any, as a share of the device's peak.
-_NEAR_ZERO_SHARE = 0.05
 
 
 @dataclass
@@ -50,12 +49,12 @@ class Point:
 
 
 def points(
-    protocol: Protocol, bag: Path, elsewhere: Sequence[str], patience: float
+    protocol: Protocol, bag: Path, elsewhere: Sequence[str], timeout: float
 ) -> Iterator[Point]:
     """
     Go through the checklist with a protocol's robot, enabled at zero torque.
 
-    ``elsewhere`` are nodes on other hosts; the stop has to be pressed within ``patience`` [s].
+    ``elsewhere`` are nodes on other hosts; the stop has to be pressed within ``timeout`` [s].
     """
     yield _limits(protocol)
     yield _watchdog(protocol.driver)
@@ -69,7 +68,7 @@ def points(
             robot.activate()
             yield Point("device", True, robot.identity or "answers; it does not say what it is")
             yield _loop(robot)
-            yield _stop(robot, patience)
+            yield _stop(robot, timeout)
     except DeviceError as error:
         yield Point("device", False, str(error))
 
@@ -144,7 +143,7 @@ def _loop(robot: GuardedRobot) -> Point:
     return Point("loop", max(late) < _LATE, found)
 
 
-def _stop(robot: GuardedRobot, patience: float) -> Point:
+def _stop(robot: GuardedRobot, timeout: float) -> Point:
     """Have the stop pressed, and see that it is obeyed."""
 
     def stop() -> StopAnswer:
@@ -157,19 +156,19 @@ def _stop(robot: GuardedRobot, patience: float) -> Point:
         return STOPPED in robot.faults
 
     print(
-        f"      press the stop within {patience:g} s: the space bar here, or `entrain stop` in "
+        f"      press the stop within {timeout:g} s: the space bar here, or `entrain stop` in "
         "another terminal",
         file=sys.stderr,
     )
     channel = StopThread("preflight", stop)
     try:
-        _watch(robot, pressed, patience, [])
+        _watch(robot, pressed, timeout, [])
         if STOPPED not in robot.faults:
-            return Point("stop", False, f"not pressed within {patience:g} s")
+            return Point("stop", False, f"not pressed within {timeout:g} s")
         measured = _watch(robot, lambda: False, _FALL_TIME, [])
     finally:
         channel.close()
-    near_zero = _NEAR_ZERO_SHARE * robot.capabilities.peak_torque
+    near_zero = NEAR_ZERO_SHARE * robot.capabilities.peak_torque
     if not abs(measured) <= near_zero:
         return Point("stop", False, f"pressed, but {measured:.2f} N m are measured: cut the power")
     return Point("stop", True, f"obeyed and latched, {measured:+.2f} N m measured")

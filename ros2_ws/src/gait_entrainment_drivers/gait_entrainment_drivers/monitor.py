@@ -10,6 +10,8 @@ from gait_entrainment.robot.faults import Fault
 from gait_entrainment.settings import check_settings, setting
 from gait_entrainment_drivers.device import Reading
 
+# Measured torque below this share of the peak is what a sensor shows without any.
+NEAR_ZERO_SHARE = 0.05
 NOT_FOLLOWED = Fault(
     "torque_not_followed",
     "The measured torque does not follow the command: it pushes unasked, in the wrong direction, "

@@ -37,7 +37,7 @@ from gait_entrainment.stop_channel import StopAnswer, StopListener
 from gait_entrainment_drivers.device import Reading, TorqueDevice
 from gait_entrainment_drivers.device_lock import DeviceLock
 from gait_entrainment_drivers.link import Link, Sample
-from gait_entrainment_drivers.monitor import NOT_FALLING, Monitor
+from gait_entrainment_drivers.monitor import NEAR_ZERO_SHARE, NOT_FALLING, Monitor
 
 HOST_SILENT = Fault(
     "host_silent",
@@ -49,8 +49,6 @@ HOST_SILENT = Fault(
 _ZERO_TICKS = 5
 _RUN_DOWN_SHARE = 0.02
 _RUN_DOWN_TIME = 0.2
-# Measured torque below this share of the peak is what a sensor shows without any.
-_NEAR_ZERO_SHARE = 0.05
 # Torque that was ended has this long to fall [s].
 _FALL_TIME = 0.15
 # While nothing is streamed: how often the stop channel and the parent are looked after [s].
@@ -70,7 +68,7 @@ class TorqueLoop:
         self._period = 1 / settings.rate
         capabilities = device.capabilities
         self._gone = _RUN_DOWN_SHARE * capabilities.peak_torque
-        self._near_zero = _NEAR_ZERO_SHARE * capabilities.peak_torque
+        self._near_zero = NEAR_ZERO_SHARE * capabilities.peak_torque
         self._monitor = Monitor(settings, capabilities.peak_torque, capabilities.torque_bandwidth)
         self._lock: DeviceLock | None = None  # while the device is open
         self._train: PulseTrain | None = None  # onsets in steady time

@@ -12,6 +12,7 @@ from gait_entrainment.robot import find_driver
 from gait_entrainment_bringup.checklist import Point, points
 from gait_entrainment_bringup.operator_console import keys_at_once
 from gait_entrainment_bringup.run_options import add_run_options, checked_run
+from gait_entrainment_bringup.signals import stop_on_signals
 from gait_entrainment_drivers.proof import keep_preflight
 
 DESCRIPTION = (
@@ -37,13 +38,15 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="compare the clock of this node's host, on which it runs already; repeatable",
     )
     parser.add_argument(
-        "--patience", type=float, default=60.0, help="how long to wait for the stop [s] (60)"
+        "--timeout", type=float, default=60.0, help="how long to wait for the stop [s] (60)"
     )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
 def run(options: argparse.Namespace) -> int:
     """Go through the checklist; 1 if a point of it fails."""
+    # However it is ended, the robot is brought to rest, as in a run.
+    stop_on_signals()
     options.real_time = options.unproved = True  # a lacking proof is a point that fails
     protocol, bag = checked_run(options)
     if find_driver(protocol.driver).simulated:
@@ -51,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
             f"driver: {protocol.driver} applies no real torque; allowed: a real robot"
         )
     with keys_at_once():
-        found = list(_told(points(protocol, bag, options.elsewhere, options.patience), options))
+        found = list(_told(points(protocol, bag, options.elsewhere, options.timeout), options))
     failed = ", ".join(point.name for point in found if not point.passed)
     keep_preflight(protocol.driver, failed)
     if options.json:
