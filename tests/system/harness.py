@@ -11,7 +11,7 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -53,6 +53,15 @@ PROMISED_TOPICS = (
     "/gait/entrainment",
     "/clock",
 )
+
+
+def open_files(pid: int) -> set[str]:
+    """Return what the descriptors of a process stand for; those it closes meanwhile are left out."""
+    opened = set()
+    for descriptor in Path(f"/proc/{pid}/fd").iterdir():
+        with suppress(FileNotFoundError):
+            opened.add(os.readlink(descriptor))
+    return opened
 
 
 def protocol_of(*options: str) -> Protocol:
@@ -243,7 +252,7 @@ class EntrainRun(Started):
     def domain(self) -> int:
         """Return its domain."""
         self.find_nodes()  # by then it has claimed one, by the name of a socket
-        held = {os.readlink(fd) for fd in Path(f"/proc/{self.process.pid}/fd").iterdir()}
+        held = open_files(self.process.pid)
         for line in Path("/proc/net/unix").read_text().splitlines():
             words = line.split()
             if f"socket:[{words[6]}]" in held and words[-1].startswith(f"@{CLAIMS}/"):
