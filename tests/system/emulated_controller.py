@@ -74,8 +74,8 @@ def main():
     node = Controller(options)
     executor = EventsExecutor()
     executor.add_node(node)
-    with contextlib.suppress(PermissionError):  # it stands for hardware, which waits for nobody
-        for thread in Path("/proc/self/task").iterdir():
+    for thread in Path("/proc/self/task").iterdir():
+        with contextlib.suppress(OSError):  # it stands for hardware, which waits for nobody
             os.sched_setscheduler(int(thread.name), os.SCHED_FIFO, os.sched_param(60))
     print("ready", flush=True)
     due = time.monotonic()

@@ -56,7 +56,7 @@ PROMISED_TOPICS = (
 
 
 def open_files(pid: int) -> set[str]:
-    """Return what the descriptors of a process stand for; those it closes meanwhile are left out."""
+    """Return what a process has open; what it closes meanwhile is left out."""
     opened = set()
     for descriptor in Path(f"/proc/{pid}/fd").iterdir():
         with suppress(FileNotFoundError):

@@ -10,10 +10,8 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
-from itertools import pairwise
 from pathlib import Path
 
-from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment.protocol import Protocol
 from gait_entrainment.robot import DeviceError, GuardedRobot, find_driver
 from gait_entrainment.robot.faults import STOPPED
@@ -101,6 +99,7 @@ def _clocks(nodes: Sequence[str]) -> Iterator[Point]:
     # Not at the top: they load ROS, which is to find an environment that it can start in.
     from gait_entrainment_msgs.srv import Ready
     from gait_entrainment_nodes.messaging.client import Client
+    from gait_entrainment_nodes.nodes.experiment_run import ExperimentError
     from gait_entrainment_nodes.nodes.participants import ClockOffset
 
     with Client("entrain_preflight") as client:
@@ -118,27 +117,31 @@ def _clocks(nodes: Sequence[str]) -> Iterator[Point]:
                 yield Point("clock", False, f"{node} does not answer")
                 continue
             best = min(offsets, key=lambda offset: offset.uncertainty)
+            try:
+                best.check(node, CLOCK_OFFSET)
+            except ExperimentError as error:
+                yield Point("clock", False, str(error))
+                continue
             ahead, uncertain = 1e3 * best.offset, 1e3 * best.uncertainty
             found = f"that of {node} is ahead by {ahead:+.2f} ms, give or take {uncertain:.2f} ms"
-            allowed = abs(ahead) + uncertain <= 1e3 * CLOCK_OFFSET
-            yield Point("clock", allowed, f"{found}; allowed: {1e3 * CLOCK_OFFSET:g} ms")
+            yield Point("clock", True, f"{found}; allowed: {1e3 * CLOCK_OFFSET:g} ms")
 
 
 def _loop(robot: GuardedRobot) -> Point:
     """Watch how regularly the device is commanded."""
     robot.begin(time.time_ns())
-    stamps: list[int] = []
-    _watch(robot, lambda: False, _WATCHED, stamps)
+    measured = _watch(robot, lambda: False, _WATCHED)
     if robot.faults:
         return Point("loop", False, "; ".join(f"{f.name}: {f.meaning}" for f in robot.faults))
-    period = 1 / robot.capabilities.state_rate
-    late = [(b - a) / NANOSECONDS_PER_SECOND - period for a, b in pairwise(stamps)]
-    if len(late) < 2:
+    if math.isnan(measured):
         return Point("loop", False, "the device gave no reading")
+    late = robot.timing.late
+    if len(late) < 2:
+        return Point("loop", True, "the device times its torque itself")
     percentiles = statistics.quantiles(late, n=100)
     p50, p99, worst = (1e3 * value for value in (percentiles[49], percentiles[98], max(late)))
     found = f"commands late by {p50:.2f} ms (median), {p99:.2f} ms (99 %), {worst:.2f} ms (worst)"
-    if refused := robot.scheduling_refused:
+    if refused := robot.timing.refused:
         found += f"; the system does not permit {refused}: docs/safety.md"
     return Point("loop", max(late) < _LATE, found)
 
@@ -162,10 +165,10 @@ def _stop(robot: GuardedRobot, timeout: float) -> Point:
     )
     channel = StopThread("preflight", stop)
     try:
-        _watch(robot, pressed, timeout, [])
+        _watch(robot, pressed, timeout)
         if STOPPED not in robot.faults:
             return Point("stop", False, f"not pressed within {timeout:g} s")
-        measured = _watch(robot, lambda: False, _FALL_TIME, [])
+        measured = _watch(robot, lambda: False, _FALL_TIME)
     finally:
         channel.close()
     near_zero = NEAR_ZERO_SHARE * robot.capabilities.peak_torque
@@ -174,9 +177,7 @@ def _stop(robot: GuardedRobot, timeout: float) -> Point:
     return Point("stop", True, f"obeyed and latched, {measured:+.2f} N m measured")
 
 
-def _watch(
-    robot: GuardedRobot, over: Callable[[], bool], longest: float, stamps: list[int]
-) -> float:
+def _watch(robot: GuardedRobot, over: Callable[[], bool], longest: float) -> float:
     """Read a robot until something is so, or for a time [s]; return the torque measured last."""
     give_up, measured = time.monotonic() + longest, math.nan
     while time.monotonic() < give_up and not over():
@@ -184,6 +185,5 @@ def _watch(
         robot.heard()
         robot.promise(max(time.time_ns(), robot.promised_until))
         for state in robot.read():
-            stamps.append(state.stamp)
             measured = state.measured
     return measured

@@ -17,13 +17,14 @@ import socket
 import subprocess
 import sys
 import time
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, ClassVar
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
-from gait_entrainment.robot.contract import AnkleRobot, RobotState
+from gait_entrainment.robot.contract import AnkleRobot, LoopTiming, RobotState
 from gait_entrainment.robot.faults import DeviceError, Fault, LimitError
 from gait_entrainment.robot.profile import TorqueProfile
 from gait_entrainment.robot.pulse_train import PulseTrain
@@ -35,6 +36,8 @@ from gait_entrainment_drivers.monitor import MonitorSettings
 # The loop has this long to start, and to open, enable, disable or close its device [s].
 _START_TIMEOUT = 10.0
 _ANSWER_TIMEOUT = 2.0
+# Commands whose lateness is remembered: ten seconds of the fastest loop.
+_REMEMBERED = 10_000
 _LOOP_ENDED = Fault(
     "torque_loop_ended",
     "The process that streams torque has ended: the device's own watchdog must bring zero. If "
@@ -79,6 +82,8 @@ class HostTimedRobot(AnkleRobot):
         self._train: PulseTrain | None = None
         self._faults: tuple[Fault, ...] = ()
         self._states: list[RobotState] = []
+        self._late: deque[float] = deque(maxlen=_REMEMBERED)
+        self.timing = LoopTiming(late=self._late)
         self._samples: list[tuple[int, float]] = []  # stamp [ns], measured torque [N m]
         self._held = 0.0  # torque of the last sample that was promised [N m]
         self._promised = 0  # up to this instant [ns]; 0 until a run begins
@@ -249,8 +254,7 @@ class HostTimedRobot(AnkleRobot):
             return
         for kind, *content in messages:
             if kind == "samples":
-                samples, self.late = content
-                for sample in samples:
+                for sample in content[0]:
                     self._take(sample)
             elif kind == "faults":
                 (self._faults,) = content
@@ -258,12 +262,13 @@ class HostTimedRobot(AnkleRobot):
             elif kind == "done":
                 name, self._done[name] = content[0], content[1]
             elif kind == "scheduling":
-                (self.scheduling_refused,) = content
+                (self.timing.refused,) = content
             elif kind == "identity":
                 (self.identity,) = content
 
     def _take(self, sample: Sample) -> None:
         stamp, reading = sample.sent + self._offset, sample.reading
+        self._late.append(sample.late)
         if not self._promised:  # nobody asks for samples until a run begins
             self._samples, self._states = self._samples[-1:], self._states[-1:]
         if reading is not None:

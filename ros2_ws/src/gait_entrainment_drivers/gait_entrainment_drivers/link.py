@@ -30,6 +30,7 @@ class Sample:
     sent: int  # steady time [ns]
     commanded: float  # [N m]
     reading: Reading | None
+    late: float  # by how much the command came late [s]
 
 
 class Link:
@@ -49,11 +50,11 @@ class Link:
         self._waiting.append(pickle.dumps(message))
         self._flush()
 
-    def send_samples(self, samples: list[Any], late: float) -> None:
+    def send_samples(self, samples: list[Any]) -> None:
         """Send samples as far as the other side takes them, and empty the list by as many."""
         self._flush()
         while samples and not self._waiting:
-            self.send("samples", samples[:_PACKET_SAMPLES], late)
+            self.send("samples", samples[:_PACKET_SAMPLES])
             del samples[:_PACKET_SAMPLES]
 
     def received(self) -> list[Any]:

@@ -80,7 +80,6 @@ class TorqueLoop:
         self._ended_at = math.inf  # when torque was ended [s]
         self._measured = math.nan  # torque measured last [N m]
         self._heard_at = self._answered_at = self._due = time.monotonic()
-        self.late: list[float] = []
 
     def serve(self) -> None:
         """Serve until the parent says so, or is gone."""
@@ -125,9 +124,9 @@ class TorqueLoop:
                 self._end_torque(fault)
         elif now - self._answered_at > self._settings.silence:
             self._end_torque(DEVICE_SILENT)
-        self._samples.append(Sample(sent, torque, reading))
+        self._samples.append(Sample(sent, torque, reading, late))
         self._answer_stops(now)
-        self._link.send_samples(self._samples, late)
+        self._link.send_samples(self._samples)
         # After a hiccup it goes on from now: commands that were missed are not made up for.
         self._due = max(self._due + self._period, time.monotonic() - self._settings.lateness)
 

@@ -39,6 +39,14 @@ class RobotState:
     faults: tuple[Fault, ...] = ()  # what is wrong; empty when all is well
 
 
+@dataclass
+class LoopTiming:
+    """How the loop that streams torque is doing."""
+
+    refused: str = ""  # what the system did not permit it
+    late: Sequence[float] = ()  # by how much its latest commands came late [s]
+
+
 class AnkleRobot(ABC):
     """
     A driver of one ankle robot: every abstract method implemented, and this list kept.
@@ -103,7 +111,7 @@ class AnkleRobot(ABC):
     Options: ClassVar[type[Any]]
     capabilities: Capabilities
     identity = ""  # what a configured device says of itself, such as its firmware
-    scheduling_refused = ""  # what the system did not permit the loop that times the torque
+    timing = LoopTiming()
 
     @abstractmethod
     def __init__(self, side: Side, options: Any, seed: int) -> None:

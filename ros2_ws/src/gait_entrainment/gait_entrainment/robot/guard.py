@@ -23,7 +23,7 @@ from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
-from gait_entrainment.robot.contract import AnkleRobot, Capabilities, RobotState
+from gait_entrainment.robot.contract import AnkleRobot, Capabilities, LoopTiming, RobotState
 from gait_entrainment.robot.faults import (
     DRIVER_FAILED,
     EXPERIMENT_SILENT,
@@ -80,9 +80,9 @@ class GuardedRobot:
         return self._robot.identity
 
     @property
-    def scheduling_refused(self) -> str:
-        """What the system did not permit the loop that times the torque; empty if nothing."""
-        return self._robot.scheduling_refused
+    def timing(self) -> LoopTiming:
+        """How the loop that streams torque is doing."""
+        return self._robot.timing
 
     @property
     def enabled(self) -> bool:

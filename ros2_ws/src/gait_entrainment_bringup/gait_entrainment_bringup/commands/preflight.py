@@ -12,8 +12,8 @@ from gait_entrainment.robot import find_driver
 from gait_entrainment_bringup.checklist import Point, points
 from gait_entrainment_bringup.operator_console import keys_at_once
 from gait_entrainment_bringup.run_options import add_run_options, checked_run
-from gait_entrainment_bringup.signals import stop_on_signals
 from gait_entrainment_drivers.proof import keep_preflight
+from gait_entrainment_drivers.signals import stop_on_signals
 
 DESCRIPTION = (
     "Go through the checklist before a session: what the protocol asks for and what limits it, the"

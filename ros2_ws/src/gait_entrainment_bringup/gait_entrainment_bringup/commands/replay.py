@@ -15,8 +15,8 @@ from gait_entrainment_bags.commands.record_options import add_record_options, to
 from gait_entrainment_bags.recorded_run import RecordedRun, read_run
 from gait_entrainment_bringup.node_list import MOVED, parameter_arguments, replay_parameters
 from gait_entrainment_bringup.run_options import check_output, is_utf8
-from gait_entrainment_bringup.signals import stop_on_signals
 from gait_entrainment_bringup.supervisor import supervised
+from gait_entrainment_drivers.signals import stop_on_signals
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 
 DESCRIPTION = "Play a bag to the gait analyzer, and compare with what was recorded live."

@@ -27,8 +27,8 @@ from gait_entrainment_bringup.run_options import (
     chosen_parameters,
     claimed_folder,
 )
-from gait_entrainment_bringup.signals import stop_on_signals
 from gait_entrainment_bringup.supervisor import supervised
+from gait_entrainment_drivers.signals import stop_on_signals
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 
 DESCRIPTION = "Start the nodes, conduct a protocol, record a bag, print the outcome."

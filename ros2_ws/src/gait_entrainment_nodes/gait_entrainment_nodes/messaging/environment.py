@@ -118,8 +118,8 @@ def come_before_others() -> None:
     system leaves to such processes, and hold up the loop that times the torque with it. Niceness
     would not do: it counts within a session only.
     """
-    with suppress(OSError):  # not permitted: then it takes its turn like others
-        for thread in Path("/proc/self/task").iterdir():
+    for thread in Path("/proc/self/task").iterdir():
+        with suppress(OSError):  # not permitted: it takes its turn like others; or ended meanwhile
             os.sched_setscheduler(int(thread.name), os.SCHED_RR, os.sched_param(_PRIORITY))
 
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Signals that stop a run: whatever a terminal, a shell or an operating system sends."""
+"""Signals that stop what drives a robot: whatever a terminal, a shell or a system sends."""
 
 import signal
 from collections.abc import Iterator

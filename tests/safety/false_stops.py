@@ -1,0 +1,65 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Whether anything ends the torque without a cause: docs/safety.md.
+
+    python tests/safety/false_stops.py --minutes 30 --busy 8
+
+One `entrain run --real-time` on an emulated motor, beside busy processes. Prints how long it went
+on, how many pulses the motor gave and, if it ended, what it said; then exits with 1.
+"""
+
+import argparse
+import subprocess
+import sys
+import tempfile
+from itertools import pairwise
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+from time_to_zero import HEIGHT, MOTORS, WALK, busy, emulated_motor, rows_of
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "system"))
+from harness import entrain_run
+
+
+def pulses(trace: Path) -> int:
+    """Return how many pulses an emulated motor gave."""
+    torques = [torque for _, _, torque in rows_of(trace)]
+    return sum(before < 0.5 * HEIGHT <= after for before, after in pairwise(torques))
+
+
+def main() -> int:
+    """Walk for so long, unless something ends the run; print what came of it."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
+    parser.add_argument("--minutes", type=float, default=30.0)
+    parser.add_argument("--busy", type=int, default=8, help="busy processes beside it")
+    parser.add_argument("--motor", choices=MOTORS, default="ak")
+    options = parser.parse_args()
+    program, driver = MOTORS[options.motor]
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        trace = folder / "trace"
+        with emulated_motor(program, trace) as port, busy(options.busy):
+            words = f"{driver}:interface=udp_multicast,channel=239.74.163.2,port={port}"
+            with entrain_run(folder / "bag", f"--driver={words}", *WALK) as run:
+                run.find_nodes()
+                for minute in range(1, int(options.minutes) + 1):
+                    try:
+                        run.process.wait(60)
+                    except subprocess.TimeoutExpired:
+                        print(f"{minute} of {options.minutes:g} min", file=sys.stderr, flush=True)
+                        continue
+                    break
+                stopped = run.process.poll() is not None
+                print(f"{pulses(trace)} pulses beside {options.busy} busy processes")
+                if stopped:
+                    print(f"ended in minute {minute}: {run.text}")
+                else:
+                    print(f"no stop in {options.minutes:g} min")
+    return int(stopped)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
