@@ -157,7 +157,7 @@ def test_a_broken_promise_is_exit_code_1(capsys, monkeypatch):
     [
         (["nobody"], "'nobody' is unknown; allowed: .*ideal"),
         (["ideal:x=1"], "option 'x=1'; allowed: none"),
-        (["ideal", "--torque", "nan"], "--torque: nan"),
+        (["ideal", "--torque", "nan"], "--torque: 'nan'"),
         (["ak_mit_can"], "applies real torque.*--arm"),
         (["ak_mit_can:motor=AK1", "--arm"], "motor: 'AK1'; allowed: AK60-6"),
         (["ak_mit_can:channel=nosuchcan7", "--arm"], "nosuchcan7 cannot be opened"),

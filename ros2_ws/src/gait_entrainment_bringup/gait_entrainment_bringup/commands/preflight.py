@@ -9,12 +9,14 @@ from collections.abc import Iterator
 
 from gait_entrainment.errors import UsageError
 from gait_entrainment.robot import find_driver
+from gait_entrainment.settings import Setting
 from gait_entrainment_bringup.checklist import Point, points
 from gait_entrainment_bringup.operator_console import keys_at_once
 from gait_entrainment_bringup.run_options import add_run_options, checked_run
 from gait_entrainment_drivers.proof import keep_preflight
 from gait_entrainment_drivers.signals import stop_on_signals
 
+_TIMEOUT = Setting("how long to wait for the stop", unit="s", least=0.0, most=3600.0)
 DESCRIPTION = (
     "Go through the checklist before a session: what the protocol asks for and what limits it, the"
     " device's own watchdog, the stop, the loop that times the torque, the record, the clocks of"
@@ -37,9 +39,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="compare the clock of this node's host, on which it runs already; repeatable",
     )
-    parser.add_argument(
-        "--timeout", type=float, default=60.0, help="how long to wait for the stop [s] (60)"
-    )
+    parser.add_argument("--timeout", default="60", help=f"{_TIMEOUT.meaning} [s] (60)")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
@@ -47,6 +47,7 @@ def run(options: argparse.Namespace) -> int:
     """Go through the checklist; 1 if a point of it fails."""
     # However it is ended, the robot is brought to rest, as in a run.
     stop_on_signals()
+    timeout = _TIMEOUT.parse("--timeout", options.timeout)
     options.real_time = options.unproved = True  # a lacking proof is a point that fails
     protocol, bag = checked_run(options)
     if find_driver(protocol.driver).simulated:
@@ -54,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
             f"driver: {protocol.driver} applies no real torque; allowed: a real robot"
         )
     with keys_at_once():
-        found = list(_told(points(protocol, bag, options.elsewhere, options.timeout), options))
+        found = list(_told(points(protocol, bag, options.elsewhere, timeout), options))
     failed = ", ".join(point.name for point in found if not point.passed)
     keep_preflight(protocol.driver, failed)
     if options.json:

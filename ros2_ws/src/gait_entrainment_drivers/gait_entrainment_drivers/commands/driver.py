@@ -14,7 +14,7 @@ from typing import Any
 from gait_entrainment.conventions import Side
 from gait_entrainment.errors import EntrainmentError
 from gait_entrainment.robot import DeviceError, LimitError, driver_names, find_driver
-from gait_entrainment.settings import settings_of
+from gait_entrainment.settings import Setting, settings_of
 from gait_entrainment_drivers.conformance.bench import DriverBench, Result, Tolerances, run_check
 from gait_entrainment_drivers.conformance.checks import CHECKS, silent_host
 from gait_entrainment_drivers.proof import keep_proof
@@ -22,6 +22,7 @@ from gait_entrainment_drivers.signals import stop_on_signals
 
 # Where the check of a running node is found: it needs ROS, which this package does not know.
 NODE_CHECK = "gait_entrainment.node_check"
+_TORQUE = Setting("height of the pulses", unit="N m", least=0, most=30, least_excluded=True)
 DESCRIPTION = "Ankle robot drivers: NAME, or NAME:OPTION=VALUE,OPTION=VALUE."
 EXAMPLES = """examples:
   entrain driver list                       every driver, with its options
@@ -87,9 +88,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         )
         action.add_argument(
             "--torque",
-            type=float,
-            default=8.0,
-            help="height of the pulses [N m], up to 30 (default 8)",
+            default="8",
+            help=f"{_TORQUE.meaning} [N m], up to {_TORQUE.most:g} (default 8)",
         )
 
 
@@ -146,9 +146,7 @@ def prove_driver(options: argparse.Namespace) -> int:
 
 
 def _tolerances(options: argparse.Namespace) -> Tolerances:
-    if not 0 < options.torque <= 30:
-        raise LimitError(f"--torque: {options.torque:g} N m; allowed: above 0 and at most 30")
-    return Tolerances(torque=options.torque)
+    return Tolerances(torque=_TORQUE.parse("--torque", options.torque))
 
 
 def _check_driver(

@@ -7,9 +7,11 @@ import argparse
 import sys
 from contextlib import suppress
 
+from gait_entrainment.settings import Setting
 from gait_entrainment_nodes.messaging.domain import wanted_domain
 from gait_entrainment_nodes.messaging.environment import set_environment
 
+_TIMEOUT = Setting("how long to wait", unit="s", least=0.0, most=3600.0)
 DESCRIPTION = (
     "Ask ~/ready of nodes in ROS_DOMAIN_ID. Exit code 0 once each has answered that it is "
     "ready, 1 if one has not: the reason is on standard error."
@@ -19,11 +21,12 @@ DESCRIPTION = (
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     parser.add_argument("nodes", nargs="+", metavar="NODE", help="such as walker_sim")
-    parser.add_argument("--timeout", type=float, default=5.0, help="how long to wait [s] (5)")
+    parser.add_argument("--timeout", default="5", help=f"{_TIMEOUT.meaning} [s] (5)")
 
 
 def run(options: argparse.Namespace) -> int:
     """Ask every node until all are ready; 1 if they are not in time."""
+    timeout = _TIMEOUT.parse("--timeout", options.timeout)
     set_environment(wanted_domain() or 0)
     # Not at the top: they load ROS, which is to find an environment that it can start in.
     from gait_entrainment_msgs.srv import Ready
@@ -32,7 +35,7 @@ def run(options: argparse.Namespace) -> int:
     with Client("entrain_ready") as client:
         asked = [client.ask(Ready, f"{n}/ready", accept=lambda a: a.ready) for n in options.nodes]
         with suppress(KeyboardInterrupt):  # what is known by then is told
-            client.wait(lambda: all_answered(asked), options.timeout)
+            client.wait(lambda: all_answered(asked), timeout)
     for node, question in zip(options.nodes, asked, strict=True):
         if not question.accepted:
             latest = question.latest
