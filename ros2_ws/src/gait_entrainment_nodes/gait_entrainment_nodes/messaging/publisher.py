@@ -11,6 +11,7 @@ from typing import Any
 import rclpy
 from rclpy.duration import Duration
 
+from gait_entrainment_nodes.messaging.delays import unmatched_by_delay
 from gait_entrainment_nodes.messaging.raw_messages import serialize
 from gait_entrainment_nodes.messaging.topics import (
     EVERY_MESSAGE,
@@ -34,8 +35,8 @@ class CountedPublisher:
     """
     A publisher that counts, and that waits for a slow reader rather than lose a message.
 
-    Its node has an attribute ``stopping``, which ends the waiting, and one ``real_time``, in which
-    it waits for nobody.
+    Its node, a Participant, has an attribute ``stopping``, which ends the waiting, and one
+    ``real_time``, in which it waits for nobody.
     """
 
     def __init__(self, node: Any, topic: Topic, *, counted: bool = True) -> None:
@@ -43,7 +44,10 @@ class CountedPublisher:
         qos = topic.qos
         if qos is EVERY_MESSAGE and node.real_time:
             qos = EVERY_MESSAGE_IN_REAL_TIME
-        self._publisher = node.create_publisher(topic.type, topic.name, qos)
+        name = node.name_of(topic)
+        self._publisher = node.create_publisher(
+            topic.type, name, **node.quality_of(name, "publisher", qos)
+        )
         self.count = 0
 
     @property
@@ -54,7 +58,8 @@ class CountedPublisher:
     @property
     def matched(self) -> int:
         """Number of subscriptions that will receive what is published from now on."""
-        return int(self._publisher.get_subscription_count())
+        late = unmatched_by_delay(self._node, self.topic_name, time.time())
+        return max(int(self._publisher.get_subscription_count()) - late, 0)
 
     @property
     def unmatched(self) -> int:

@@ -38,6 +38,7 @@ from gait_entrainment_bags import QosProfile as OfferedQos
 from gait_entrainment_msgs.msg import Progress, PublishedCounts
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.raw_messages import message_class
+from gait_entrainment_nodes.nodes.late import raw_reader
 from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.parameters import texts
 from gait_entrainment_nodes.nodes.participant import Participant
@@ -178,7 +179,7 @@ class BagRecorder(Participant):
         qos = topics.quality(reliable=reliable, lasting=lasting)
         record = self._writer_for(name, definition)
         if name != self._progress_topic:
-            self._readers.append((RawReader(self, message_type, name, qos), record))
+            self._readers.append((raw_reader(self, message_type, name, qos), record))
             return
 
         def record_progress(data: bytes) -> None:
@@ -187,7 +188,7 @@ class BagRecorder(Participant):
             record(data, received)
             self._take_messages()
 
-        self.create_subscription(message_type, name, record_progress, qos, raw=True)
+        self.subscribe(topics.Topic(name, message_type, qos), record_progress, raw=True)
 
     def _take_messages(self) -> None:
         """Record what has come, in the order in which it came."""

@@ -115,9 +115,9 @@ class Experiment(Participant):
         self.subscribe_to_run(topics.TORQUE_PROFILE, Run.take_profile)
         self.subscribe_to_run(topics.RECORDER_PROGRESS, Run.take_recorder_progress)
         self.subscribe(topics.TROUBLE, self._on_trouble)
-        self._start = self.create_client(StartRun, f"{WALKER}/start")
-        self._change_state = self.create_client(ChangeState, f"{PERTURBATOR}/change_state")
-        self._get_state = self.create_client(GetState, f"{PERTURBATOR}/get_state")
+        self._start = self.client(StartRun, f"{WALKER}/start")
+        self._change_state = self.client(ChangeState, f"{PERTURBATOR}/change_state")
+        self._get_state = self.client(GetState, f"{PERTURBATOR}/get_state")
         self._deliver = ActionClient(self, DeliverPulseTrain, f"{PERTURBATOR}/deliver_pulse_train")
         self._participants = Participants(self, self.settings.participants, self._waiting)
         self._server = OneGoalServer(
@@ -125,7 +125,8 @@ class Experiment(Participant):
             RunProtocol,
             "~/run_protocol",
             accept=lambda _: not self._waiting.busy,
-            begin=lambda goal: self._waiting.begin(self._conduct_goal(goal.protocol)),
+            # A text, if only of one line: no goal names a file of this host.
+            begin=lambda goal: self._waiting.begin(self._conduct_goal(f"{goal.protocol}\n")),
         )
         if self.settings.protocol:
             self._waiting.begin(self._conduct_own())

@@ -24,6 +24,8 @@ from rclpy.utilities import remove_ros_args
 from gait_entrainment.errors import EntrainmentError, UsageError
 from gait_entrainment_bags import NothingToPlayError
 from gait_entrainment_nodes.messaging.environment import come_before_others
+from gait_entrainment_nodes.nodes.late import PERIOD
+from gait_entrainment_nodes.nodes.parameters import HELP, HelpRequestedError
 
 # The longest time [s] that the loop sleeps in the executor, so that a signal is soon obeyed.
 LONGEST_SLEEP = 0.1
@@ -62,6 +64,9 @@ def run_node(make_node: Callable[[], Any]) -> int:
             node.get_logger().info(f"started in ROS domain {domain}")
             if node.real_time:
                 come_before_others()
+        except HelpRequestedError as answer:
+            print(answer)
+            return 0
         except (EntrainmentError, ParameterException, ValueError, RuntimeError) as error:
             print(f"{name}: {' '.join(str(error).split())}", file=sys.stderr)
             return 1 if isinstance(error, NothingToPlayError) else 2
@@ -92,9 +97,9 @@ def _join_ros() -> None:
         rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # one of several errors that rclpy does not export
         raise UsageError(f"the ROS arguments cannot be read: {error}") from None
-    if extra := remove_ros_args(sys.argv)[1:]:
+    if (extra := remove_ros_args(sys.argv)[1:]) and extra[0] not in HELP:
         raise UsageError(
-            f"unknown argument {extra[0]!r}; allowed: --ros-args -p PARAMETER:=VALUE ..."
+            f"unknown argument {extra[0]!r}; allowed: --help, --ros-args -p PARAMETER:=VALUE ..."
         )
 
 
@@ -104,12 +109,16 @@ def _serve_once(executor: Any, node: Any) -> None:
     sleep = LONGEST_SLEEP
     if deadline is not None:
         sleep = min(max(deadline - time.monotonic(), 0.0), LONGEST_SLEEP)
+    if node.late:
+        sleep = min(sleep, PERIOD)
     try:
         executor.spin_once(timeout_sec=sleep)
     except RuntimeError as error:  # rclpy's RCLError, which it does not export
         # Whoever asked a service has gone, or is not matched yet and asks again.
         if "client will not receive response" not in str(error):
             raise
+    for late in node.late:
+        late.deliver()
     node.publish_state()
     deadline = node.next_deadline()
     if deadline is not None and time.monotonic() >= deadline:

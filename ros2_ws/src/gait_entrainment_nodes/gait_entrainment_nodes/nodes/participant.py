@@ -13,18 +13,25 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
 
 from gait_entrainment.errors import EntrainmentError
 from gait_entrainment.settings import SettingError
 from gait_entrainment_msgs.msg import PublishedCounts
 from gait_entrainment_msgs.srv import Ready
+from gait_entrainment_nodes.messaging.delays import delay_between, delays_wanted
 from gait_entrainment_nodes.messaging.publisher import CountedPublisher, StopRequestedError
 from gait_entrainment_nodes.messaging.stamps import header, to_time
 from gait_entrainment_nodes.messaging.topics import DIAGNOSTICS, PUBLISHED_COUNTS, Topic
+from gait_entrainment_nodes.nodes.late import LateClient, LateSubscription, raw_reader
 from gait_entrainment_nodes.nodes.parameters import (
+    answer_help,
+    chosen_quality,
     declare_settings,
+    of_rclpy,
     read_settings,
     warn_of_unknown_parameters,
+    warn_of_unused_quality,
 )
 
 # How often a node publishes its state on /diagnostics [s]; rqt calls it stale after 5 s.
@@ -45,6 +52,11 @@ class Participant(Node):
     failure: str | None = None  # why the node must end with exit code 1
     finished = False  # set to end the loop with exit code 0
     run: Any = None  # the run that goes on, with its ``number``; None between runs
+    late: tuple[LateSubscription | LateClient, ...] = ()  # what hears late, in tests
+
+    def __init__(self, node_name: str, **options: Any) -> None:
+        self._own = f"{node_name}/"  # how the names of its own topics begin in the table
+        super().__init__(node_name, **options)
 
     @property
     def real_time(self) -> bool:
@@ -61,6 +73,7 @@ class Participant(Node):
         Raises EntrainmentError if a value is not allowed, or the values do not fit each other.
         """
         groups = {n: s if isinstance(s, tuple) else (s, "") for n, s in settings.items()}
+        answer_help(self, groups.values())
         for group, prefix in groups.values():
             declare_settings(self, group, prefix, fixed)
         warn_of_unknown_parameters(self)
@@ -111,7 +124,7 @@ class Participant(Node):
         values = {change.name: change.value for change in changes}
         try:
             for name, value in values.items():
-                reason = self.why_fixed(name)
+                reason = "" if of_rclpy(name) else self.why_fixed(name)
                 if name == "use_sim_time":
                     reason = "which clock counts is decided when the node starts"
                 if reason:
@@ -122,6 +135,15 @@ class Participant(Node):
         return SetParametersResult(successful=True)
 
     # Topics
+
+    def name_of(self, topic: Topic) -> str:
+        """Return the name of a topic for this node: what is under its name follows its name."""
+        own = topic.name.startswith(self._own)
+        return f"~/{topic.name.removeprefix(self._own)}" if own else topic.name
+
+    def quality_of(self, name: str, end: str, qos: QoSProfile) -> dict[str, Any]:
+        """Return the quality of a topic's end as ROS takes it; see `chosen_quality`."""
+        return chosen_quality(self, name, end, qos)
 
     def offer(self, topic: Topic, *, counted: bool = True) -> CountedPublisher:
         """Create a publisher, for ``publish``; the recorder is told what a counted one sent."""
@@ -134,9 +156,25 @@ class Participant(Node):
         """Publish a message, or its bytes, on a topic that was offered."""
         self._publisher_of[topic.name].publish(message)
 
-    def subscribe(self, topic: Topic, callback: Callable[[Any], None]) -> None:
-        """Create a subscription with the quality of service of its topic."""
-        self.create_subscription(topic.type, topic.name, callback, topic.qos)
+    def subscribe(
+        self, topic: Topic, callback: Callable[[Any], None], *, raw: bool = False
+    ) -> None:
+        """Create a subscription with the quality of service of its topic; ``raw``: to bytes."""
+        name = self.name_of(topic)
+        if delays_wanted():
+            reader = raw_reader(self, topic.type, name, topic.qos)
+            self.late += (LateSubscription(reader, None if raw else topic.type, callback),)
+            return
+        qos = self.quality_of(name, "subscription", topic.qos)
+        self.create_subscription(topic.type, name, callback, raw=raw, **qos)
+
+    def client(self, service_type: Any, name: str) -> Any:
+        """Create a client of a service of another node, which its name begins with."""
+        client: Any = self.create_client(service_type, name)
+        if delays_wanted():
+            client = LateClient(client, delay_between(name.partition("/")[0], self.get_name()))
+            self.late += (client,)
+        return client
 
     def subscribe_to_run(self, topic: Topic, callback: Callable[[Any, Any], None]) -> None:
         """Have each message of the run that goes on handed to a callback, behind the run."""
@@ -169,6 +207,7 @@ class Participant(Node):
         Discovery announces the endpoints of a node in the order in which they were made: whoever
         sees this service knows all of the node's subscriptions.
         """
+        warn_of_unused_quality(self)
         self.create_service(Ready, "~/ready", self._on_ready)
 
     @property

@@ -68,7 +68,7 @@ class Participants:
     def __init__(self, node: Participant, names: Sequence[str], waiting: Waiting) -> None:
         self.names = tuple(names)
         self._node, self._waiting = node, waiting
-        self._clients = {name: node.create_client(Ready, f"{name}/ready") for name in names}
+        self._clients = {name: node.client(Ready, f"{name}/ready") for name in names}
 
     async def check(self, longest_clock_offset: float) -> None:
         """
