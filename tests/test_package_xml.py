@@ -42,6 +42,7 @@ NOT_IMPORTED = {
     "sensor_msgs": "message definitions for the tests of bags",
     "std_msgs": "message definitions for the tests of bags",
     "ros2launch": "what starts the launch files",
+    "rviz2": "what rviz:=true starts",
     "python3-pytest": "what runs the tests",
     "gait_entrainment_drivers": "the plugin of pytest that checks an example's driver",
     "ament_flake8": "test_linters.py",
@@ -80,6 +81,17 @@ def test_package_is_valid_and_named_by_rep_144(package):
     assert re.fullmatch(r"[a-z](_?[a-z0-9]+)+", package.name)
     assert Path(package.filename).parent.name == package.name
     assert package.licenses == ["Apache-2.0"]
+
+
+def test_package_has_what_ros_conventions_ask_for(package):
+    folder = Path(package.filename).parent
+    if folder.parent.name == "examples":
+        return
+    assert all(person.email for person in [*package.maintainers, *package.authors])
+    assert package.urls
+    title = f"Changelog for package {package.name}"
+    assert (folder / "CHANGELOG.rst").read_text().splitlines()[1] == title
+    assert "](../QUALITY_DECLARATION.md)" in (folder / "README.md").read_text()
 
 
 def test_dependencies_are_what_is_imported(package):
