@@ -21,6 +21,7 @@ from gait_entrainment.simulation import simulate
 from gait_entrainment_bags import BagReader
 from gait_entrainment_bringup.node_list import (
     NODES,
+    RECORDER,
     STOP_ORDER,
     parameter_arguments,
     parameters,
@@ -293,10 +294,11 @@ class Session:
         real_time: bool,
         participants: Sequence[str] = (),
         strangers: bool = False,
+        recorded: bool = True,
     ) -> None:
         self.bag = folder / "bag"
         self.protocol = protocol_of(*options)
-        given = parameters(self.protocol, self.bag, real_time=real_time)
+        given = parameters(self.protocol, self.bag if recorded else None, real_time=real_time)
         del given["bag_recorder"]["publishers"]  # it records until it is stopped
         if participants:
             given["experiment"]["participants"] = list(participants)
@@ -345,7 +347,8 @@ def session(
     If ``strangers`` may ask for pulses, the perturbator knows no protocol that these must be of.
     """
     with claimed_domain() as domain:
-        running = Session(folder, domain, options, real_time, participants, strangers)
+        recorded = RECORDER in nodes
+        running = Session(folder, domain, options, real_time, participants, strangers, recorded)
         try:
             running.start(*nodes)
             yield running

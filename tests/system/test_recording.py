@@ -12,26 +12,45 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
-from harness import PATIENCE, Probe, probe
+import yaml
+from harness import PATIENCE, Probe, probe, session
 from rcl_interfaces.msg import ParameterEvent
-from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
 
-from gait_entrainment_bags import BagReader, BagWriter, UnreadableBagError, check, recover
+from gait_entrainment.simulation import simulate
+from gait_entrainment_bags import (
+    BagReader,
+    BagWriter,
+    TopicInfo,
+    UnreadableBagError,
+    check,
+    find_definition,
+    recover,
+)
+from gait_entrainment_bags.recorded_run import read_run
+from gait_entrainment_bringup.node_list import NODES
+from gait_entrainment_msgs.action import RunProtocol
 from gait_entrainment_msgs.msg import Progress, PublishedCounts
+from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.domain import claimed_domain
+from gait_entrainment_nodes.messaging.environment import shared_file
 from gait_entrainment_nodes.messaging.stamps import header, to_time
 from gait_entrainment_nodes.messaging.topics import (
     CLOCK,
     EVERY_MESSAGE,
+    LATEST_STATE,
     PUBLISHED_COUNTS,
     RECORDER_PROGRESS,
     WALKER_PROGRESS,
+    Topic,
 )
 
 SECOND = 10**9
@@ -313,3 +332,75 @@ def test_what_was_lost_is_counted_and_written_down(tmp_path: Path) -> None:
     assert "the record is incomplete: 2 of /left lost" in process.text
     with BagReader(process.bag) as bag:
         assert json.loads(bag.custom_data["messages_lost"]) == {"/left": 2}
+
+
+def test_another_recorder_hears_a_whole_run_in_lock_step(tmp_path: Path) -> None:
+    file = shared_file("gait_entrainment_bringup", "config/ros2_bag_record.yaml")
+    chosen = {
+        name: QoSProfile(
+            history=HistoryPolicy.get_from_short_key(quality["history"]),
+            reliability=ReliabilityPolicy.get_from_short_key(quality["reliability"]),
+            durability=DurabilityPolicy.get_from_short_key(quality["durability"]),
+        )
+        for name, quality in yaml.safe_load(file.read_text()).items()
+    }
+    types = {f"/{topic.name.lstrip('/')}": topic.type for topic in every_topic()}
+    options = ("--baseline=3", "--pulses=4", "--washout=1")
+    others = [name for name in NODES if name != "bag_recorder"]
+    with (
+        session(tmp_path, *options, nodes=others, real_time=False) as nodes,
+        BagWriter(tmp_path / "theirs", ros_distro="jazzy", custom_data={}) as bag,
+    ):
+        ended: dict[str, int] = {}
+
+        def record(name: str, data: bytes) -> None:
+            bag.write(name, data, time.time_ns(), time.time_ns())
+            if name == "/published_counts":
+                counts = deserialize_message(data, PublishedCounts)
+                ended.update(zip(counts.topics, counts.counts, strict=True))
+
+        for name, quality in chosen.items():
+            kind = types[name]
+            definition = find_definition(f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}")
+            bag.add_topic(
+                TopicInfo(name, definition.type, definition.schema_text, definition.type_hash)
+            )
+            nodes.probe.node.create_subscription(
+                kind, name, partial(record, name), quality, raw=True
+            )
+        handle = nodes.conduct()
+        result = nodes.probe.client.result(handle, PATIENCE).result
+        assert result.outcome == RunProtocol.Result.FINISHED, result.message
+        nodes.probe.until(
+            lambda: (
+                ended.get("/experiment/horizon")
+                and all(bag.counts[name] >= n for name, n in ended.items() if name in chosen)
+            ),
+            "the final counts",
+        )
+    run = read_run(tmp_path / "theirs", protocol=nodes.protocol)
+    assert run.differences == ()
+    start = run.events[0].stamp
+    simulated = simulate(nodes.protocol).events
+    assert [e.stamp - start for e in run.events] == [e.stamp for e in simulated]
+
+
+def test_another_recorder_is_told_of_every_topic_that_counts() -> None:
+    file = shared_file("gait_entrainment_bringup", "config/ros2_bag_record.yaml")
+    assert yaml.safe_load(file.read_text()) == {
+        f"/{topic.name.lstrip('/')}": {
+            "history": "keep_all",
+            "reliability": "reliable",
+            "durability": topic.qos.durability.short_key,
+        }
+        for topic in every_topic()
+        if topic.qos in (EVERY_MESSAGE, LATEST_STATE)
+    }
+
+
+def every_topic() -> Iterator[Topic]:
+    for value in vars(topics).values():
+        if isinstance(value, Topic):
+            yield value
+        elif isinstance(value, tuple) and value and isinstance(value[0], Topic):
+            yield from value

@@ -26,7 +26,8 @@ from gait_entrainment_bringup.provenance import provenance
 from gait_entrainment_nodes.messaging.environment import shared_file
 
 # In the order in which they are started. Executable and node have the same name.
-NODES = ("bag_recorder", "walker_sim", "perturbator", "gait_analyzer", "experiment")
+RECORDER = "bag_recorder"
+NODES = (RECORDER, "walker_sim", "perturbator", "gait_analyzer", "experiment")
 # Only looks on: started if somebody wants to see the walk, waited for by nobody.
 DISPLAY = "walker_display"
 # In the order in which they are stopped: torque first, the record last.
@@ -83,7 +84,7 @@ def settings_file() -> Path:
 
 def parameters(
     protocol: Protocol,
-    bag: Path,
+    bag: Path | None,
     *,
     real_time: bool = False,
     armed: bool = False,
@@ -92,7 +93,7 @@ def parameters(
     lead_time: float = LEAD_TIME,
 ) -> Parameters:
     """
-    Return the parameters of every node for a run that is recorded into the folder ``bag``.
+    Return the parameters of every node for a run that is recorded into the folder ``bag``, if any.
 
     If ``armed``, a real robot may deliver torque without another word, even one whose watchdog is
     ``unproved`` (`gait_entrainment_drivers.proof`); ``onset`` is when the analyzer takes a pulse
@@ -105,7 +106,7 @@ def parameters(
             **asdict(protocol.walker),
             "first_heel_strike": side,
             "real_time": real_time,
-            "acknowledged": not real_time,
+            "acknowledged": bag is not None and not real_time,
             "presentation_delay": MEASURED_DELAY if measured else 0.0,
         },
         "perturbator": {
@@ -120,9 +121,11 @@ def parameters(
             **{f"limits.{name}": value for name, value in said_limits(protocol).items()},
         },
         "gait_analyzer": {"side": side, "onset": onset},
-        "experiment": {"participants": [node for node in NODES if node != "experiment"]},
+        "experiment": {
+            "participants": [n for n in NODES if n != "experiment" and (bag or n != RECORDER)]
+        },
         "bag_recorder": {
-            "output": str(bag.absolute()),
+            "output": str(bag.absolute()) if bag else "",
             "publishers": list(PUBLISHERS),
             "custom_data": json.dumps(provenance(protocol, real_time=real_time, onset=onset)),
         },

@@ -6,19 +6,23 @@ Conduct one protocol over the nodes and record it: `entrain run` as a launch fil
 
 Nodes and parameters are those of `entrain run`. The experiment brings the perturbator up, and the
 launch ends with the experiment: exit code 0 and the outcome once it is over and recorded, 1 if it
-failed. What would make it fail from the first is found before a node is started.
+failed. What would make it fail from the first is found before a node is started. Somebody else
+may record it, with a delay in which he finds the topics (docs/bags.md).
 """
 
 from pathlib import Path
 
 from launch import Action, LaunchContext, LaunchDescription
-from launch.actions import EmitEvent, OpaqueFunction
+from launch.actions import EmitEvent, OpaqueFunction, TimerAction
 from launch.events import Shutdown
 
 from gait_entrainment.protocol import read_protocol, write_protocol
+from gait_entrainment.settings import Setting
 from gait_entrainment_bringup import launch_nodes as shared
-from gait_entrainment_bringup.node_list import NODES, bag_folder, parameters
+from gait_entrainment_bringup.node_list import NODES, RECORDER, bag_folder, parameters
 from gait_entrainment_bringup.run_options import check_output, check_robot
+
+DELAY = Setting("from the start of the other nodes to that of the experiment", float, "s", 0, 600)
 
 
 def nodes(context: LaunchContext) -> list[Action]:
@@ -28,20 +32,28 @@ def nodes(context: LaunchContext) -> list[Action]:
     arming = {"armed": "arm", "unproved": "unproved"}
     switches = {name: shared.is_true(context, argument) for name, argument in arming.items()}
     onset = shared.choice(context, "onset", "commanded", "measured")
-    bag = Path(shared.value(context, "bag") or bag_folder(protocol)).absolute()
+    recorded = shared.choice(context, "recorder", RECORDER, "none") == RECORDER
+    delay = DELAY.parse("start_delay", shared.value(context, "start_delay"))
+    bag = None
+    if recorded:
+        bag = Path(shared.value(context, "bag") or bag_folder(protocol)).absolute()
+        check_output(bag, "bag")
+    elif shared.value(context, "bag"):
+        raise shared.LaunchError("bag: makes none with recorder:=none; leave one of them out")
     protocol.limits.check_pulse(protocol.pulse_torque, protocol.pulses.width)
     check_robot(protocol, real_time=real_time, **switches)
-    check_output(bag, "bag")
     given = parameters(protocol, bag, real_time=real_time, onset=onset, **switches)
     given["experiment"]["protocol"] = write_protocol(protocol)
     namespace = shared.value(context, "namespace")
-    made = [shared.make_node(context, name, namespace, given[name]) for name in NODES]
-    over = [
-        OpaqueFunction(function=tell, args=[bag]),
-        EmitEvent(event=Shutdown(reason="the experiment is over and recorded")),
-    ]
-    ending = shared.ended_by(made, {"experiment", "bag_recorder"}, over, bag)
-    return [*ending, *shared.rviz(context, namespace, given), *made]
+    names = [name for name in NODES if recorded or name != RECORDER]
+    made = [shared.make_node(context, name, namespace, given[name]) for name in names]
+    over: list[Action] = [EmitEvent(event=Shutdown(reason="the experiment is over"))]
+    if recorded:
+        over.insert(0, OpaqueFunction(function=tell, args=[bag]))
+    ending = shared.ended_by(made, {"experiment", RECORDER} & set(names), over, bag)
+    *others, experiment = made  # as in the list of nodes
+    later = TimerAction(period=delay, actions=[experiment]) if delay else experiment
+    return [*ending, *shared.rviz(context, namespace, given), *others, later]
 
 
 def tell(_: LaunchContext, bag: Path) -> None:
@@ -61,6 +73,8 @@ def generate_launch_description() -> LaunchDescription:
         ("arm", "false", "let a real ankle robot deliver torque at once: see safety.md"),
         ("unproved", "false", "even one whose own watchdog was not proved on this computer"),
         ("onset", "commanded", "when the analyzer takes a pulse to begin: or measured"),
+        ("recorder", RECORDER, "or none: somebody else records, such as ros2 bag record"),
+        ("start_delay", "0", "seconds in which another recorder finds topics, before the run"),
         ("bag", "", "folder of the bag; empty: bags/<time>_<name>"),
         shared.NAMESPACE,
         shared.PARAMETERS_FILE,
