@@ -10,7 +10,7 @@ export PYTHON
 
 in_env = source ./env.bash &&
 
-.PHONY: help demo test lint format bench docs setup build lock clean distclean
+.PHONY: help demo test lint format bench figures docs setup build lock clean distclean
 
 help: ## list the targets
 	@grep -E '^[a-z]+:.*##' Makefile | sed -E 's/^([a-z]+):.*## /\1\t/' | expand -t 12
@@ -29,6 +29,9 @@ format: setup ## let ruff rewrite the sources
 
 bench: build ## measure the speeds in the README, each beside its baseline
 	@$(in_env) pytest -s -m benchmark tests/benchmarks
+
+figures: build ## draw the pictures in docs that take seconds anew
+	@$(in_env) python scripts/make_figures.py
 
 docs: build ## HTML of the public names: docs/api/index.html
 	@$(in_env) python scripts/make_api_pages.py

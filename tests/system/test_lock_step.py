@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 from harness import (
@@ -21,7 +22,11 @@ from harness import (
 )
 
 from gait_entrainment_bags import BagReader, check
+from gait_entrainment_bags.figures import draw_figures
 from gait_entrainment_bags.recorded_run import read_run
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "scripts"))
+import make_figures
 
 # Pulses later than the strides: the last of them are on, or still to come, when the run ends.
 UNFINISHED = ("--side=left", "--period-offset=0.04", "--washout=0", "--initial-phase=0.9")
@@ -93,6 +98,15 @@ def test_no_message_of_the_promised_topics_lacks_a_stamp_as_log_time(paper_examp
             assert raw.log_time == stamp_of(message.header)
         assert reader.counts["/joint_states"] == reader.counts["/ground_reaction/left"]
         assert reader.counts["/joint_states"] > 200 * 80 * 1.8
+
+
+def test_picture_in_the_readme_is_what_is_drawn_of_it(paper_example, tmp_path):
+    known = make_figures.DOCS / make_figures.RUN
+    if not make_figures.drawn_by_this_matplotlib(known):
+        pytest.skip("the picture was drawn by another version of matplotlib")
+    bag, _ = paper_example
+    draw_figures(read_run(bag), tmp_path)
+    assert make_figures.same(known, tmp_path / known.name), "make figures"
 
 
 def test_load_and_delayed_processes_change_no_byte(paper_example, tmp_path):

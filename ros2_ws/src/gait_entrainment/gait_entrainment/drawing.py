@@ -3,10 +3,14 @@
 
 """Figures of the questions asked of the model: one size, one look, PNG and SVG."""
 
+import argparse
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+
+from gait_entrainment.settings import Setting
 
 # Colours of Okabe and Ito (2008); lines also differ in their dashes.
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#777777"
@@ -17,6 +21,8 @@ DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 2)))
 # Where a legend goes that would hide something inside the axes.
 BESIDE = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
 BELOW = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.13)}
+
+_DPI = Setting("resolution of a figure", int, "1", 50, 1200)
 
 
 def new_figure(
@@ -53,9 +59,33 @@ def mark_instant(axes: Any, place: float, name: str, height: float = 0.0, lift: 
 
 
 def save_figure(figure: Any, folder: Path, name: str) -> list[Path]:
-    """Write a figure as PNG and SVG into a folder, made if need be; return the paths."""
+    """
+    Write a figure as PNG and SVG into a folder, made if need be; return the paths.
+
+    The PNG has 130 dots per inch, or as many as matplotlib's ``savefig.dpi`` says.
+    """
+    from matplotlib import rcParams
+
+    given = rcParams["savefig.dpi"]
     folder.mkdir(parents=True, exist_ok=True)
     paths = [folder / (name + ending) for ending in (".png", ".svg")]
     for path in paths:
-        figure.savefig(path, dpi=130)
+        figure.savefig(path, dpi=130 if given == "figure" else given)
     return paths
+
+
+def add_dpi_option(parser: argparse.ArgumentParser) -> None:
+    """Add the option for the resolution of figures, for `chosen_dpi`."""
+    told = "of figures as PNG, default 130; beside each is an SVG"
+    parser.add_argument("--dpi", metavar="INT", help=told)
+
+
+def chosen_dpi(options: argparse.Namespace) -> AbstractContextManager[None]:
+    """
+    Return a context in which figures have the resolution of the option, if that is given.
+
+    Raises SettingError if it is not allowed.
+    """
+    from matplotlib import rc_context
+
+    return rc_context(options.dpi and {"savefig.dpi": _DPI.parse("dpi", options.dpi)})

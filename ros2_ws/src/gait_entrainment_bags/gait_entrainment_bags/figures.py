@@ -9,7 +9,16 @@ from typing import Any
 import numpy as np
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind
-from gait_entrainment.drawing import BLACK, BLUE, GREEN, GREY, ORANGE, add_legend, new_figure
+from gait_entrainment.drawing import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    add_legend,
+    new_figure,
+    save_figure,
+)
 from gait_entrainment.gait import Verdict
 from gait_entrainment.outcome import holes_of, timing_outcome, timing_summary
 from gait_entrainment.robot.timing import distribution, lateness_ms
@@ -21,17 +30,15 @@ _DOTTED_LINE = {"color": BLUE, "marker": ".", "lw": 0.8}
 
 def draw_figures(run: RecordedRun, folder: Path) -> list[Path]:
     """
-    Draw the figures of a run as PNG files into a folder; return their paths.
+    Draw the figures of a run as PNG and SVG files into a folder; return their paths.
 
     Of a robot whose pulses all begin at their command there is no figure of their timing.
     """
-    figures = {"stride_period.png": _stride_period(run), "phase_lag.png": _phase_lag(run)}
+    figures = {"stride_period": _stride_period(run), "phase_lag": _phase_lag(run)}
     if timing_summary(timing_outcome(run.timings, run.measured_period)):
-        figures["pulse_timing.png"] = _pulse_timing(run)
-    figures["ankle_torque.png"] = _ankle_torque(run)
-    for name, figure in figures.items():
-        figure.savefig(folder / name, dpi=130)
-    return [folder / name for name in figures]
+        figures["pulse_timing"] = _pulse_timing(run)
+    figures["ankle_torque"] = _ankle_torque(run)
+    return [path for name, one in figures.items() for path in save_figure(one, folder, name)]
 
 
 def _new_figure(

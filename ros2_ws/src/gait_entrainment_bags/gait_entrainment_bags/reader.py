@@ -216,8 +216,9 @@ def bag_files(path: Path) -> list[Path]:
     storage = description.get("storage_identifier", "mcap")
     if storage != "mcap":
         raise UnreadableBagError(
-            f"{path}: stored as {storage}, not as MCAP; `ros2 bag convert -i {path} -o FILE` makes "
-            "it one, if FILE holds {output_bags: [{uri: NEW, storage_id: mcap, all_topics: true}]}"
+            f"{path}: stored as {storage}, not as MCAP; `ros2 bag convert -i {path} -o FILE` "
+            "makes it one, if FILE holds "
+            "{output_bags: [{uri: NEW, storage_id: mcap, all_topics: true}]}"
         )
     listed = description.get("relative_file_paths")
     if isinstance(listed, list) and listed:

@@ -8,6 +8,7 @@ import json
 from pathlib import Path
 
 from gait_entrainment.commands.outcome_options import add_outcome_options
+from gait_entrainment.drawing import add_dpi_option, chosen_dpi
 from gait_entrainment.outcome import summary, timing_summary
 from gait_entrainment_bags.commands.record_options import add_record_options, told_of_record
 from gait_entrainment_bags.figures import draw_figures
@@ -18,7 +19,7 @@ EXAMPLES = """examples:
   entrain analyze bags/paper_example            outcome of a recorded run
   entrain analyze bags/paper_example --json     one JSON object, as of entrain simulate
   entrain analyze bags/mine --onset measured    pulses begin where the measured torque rises
-  entrain analyze bags/mine --figures out       draws the figures into the folder out
+  entrain analyze bags/mine --figures out --dpi 300    draws the figures into the folder out
   entrain analyze theirs --protocol mine.yaml   recorded by ros2 bag record
 """
 
@@ -27,6 +28,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     add_record_options(parser)
     parser.add_argument("--figures", type=Path, metavar="FOLDER", help="draw figures into it")
+    add_dpi_option(parser)
     add_outcome_options(parser, onset=None)
 
 
@@ -37,8 +39,8 @@ def run(options: argparse.Namespace) -> int:
     recorded = read_run(options.bag, torques=drawn, onset=options.onset, **told)
     figures: list[Path] = []
     if drawn:
-        options.figures.mkdir(parents=True, exist_ok=True)
-        figures = draw_figures(recorded, options.figures)
+        with chosen_dpi(options):
+            figures = draw_figures(recorded, options.figures)
     differences = recorded.differences
     outcome = recorded_outcome(recorded, options.bag) | {
         "ended_early": recorded.ended_early or None,

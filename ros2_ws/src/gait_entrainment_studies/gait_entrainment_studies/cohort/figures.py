@@ -22,6 +22,9 @@ _COLOURS = {
     "flew off": PINK,
 }
 
+# Mean and standard deviation over the subjects of the human study [% of the stride].
+_HUMANS = (6.7, 3.6)
+
 
 def draw_cohort(study: Study, folder: Path) -> list[Path]:
     """Draw the share of each verdict, and each subject's basin without noise."""
@@ -31,9 +34,9 @@ def draw_cohort(study: Study, folder: Path) -> list[Path]:
         _draw_basins(study, right)
     else:
         right.set_axis_off()
-    for axes in (left, right):
+    for axes, columns in ((left, 4), (right, 2)):
         axes.locator_params(axis="y", integer=True)
-        drawing.add_legend(axes, loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=4)
+        drawing.add_legend(axes, loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=columns)
     return drawing.save_figure(figure, folder, "cohort")
 
 
@@ -53,8 +56,14 @@ def _draw_verdicts(study: Study, axes: Any) -> None:
 def _draw_basins(study: Study, axes: Any) -> None:
     percent = np.sort(study.basin_widths)
     axes.plot(percent, np.arange(1, percent.size + 1), "o", color=BLUE, ms=4)
-    axes.axvline(percent.mean(), color=BLUE, ls="--", lw=1, label=f"mean {percent.mean():.2f} %")
-    axes.axvspan(6.7 - 3.6, 6.7 + 3.6, color=ORANGE, alpha=0.15, lw=0, label="human 6.7 ± 3.6 %")
-    axes.axvline(6.7, color=ORANGE, lw=1)
+    ours = percent.mean(), percent.std(ddof=1) if percent.size > 1 else 0.0
+    for who, (mean, deviation), colour, dash in (
+        ("subjects", ours, BLUE, "--"),
+        ("humans", _HUMANS, ORANGE, "-"),
+    ):
+        axes.axvline(mean, color=colour, ls=dash, lw=1.2, label=f"mean of the {who} {mean:.2f} %")
+        shade = {"color": colour, "alpha": 0.15, "lw": 0}
+        span = mean - deviation, mean + deviation
+        axes.axvspan(*span, **shade, label=f"± standard deviation {deviation:.2f} %")
     axes.set(xlabel="basin of entrainment [% of the stride]", ylabel="subjects, sorted", xlim=0)
     axes.set_title("basins without noise, solved", fontsize=10)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
+from gait_entrainment.drawing import add_dpi_option, chosen_dpi
 from gait_entrainment.errors import UsageError
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.settings import Setting, setting, settings_of
@@ -109,6 +110,7 @@ def add_output_options(
 ) -> None:
     """Add the folder of figures, which `out` describes, and the form of the answer."""
     parser.add_argument("--out", type=Path, default=default, metavar="DIR", help=out)
+    add_dpi_option(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
@@ -121,7 +123,10 @@ def answer(
 ) -> int:
     """Print the answer, write its files if a folder is given and print their paths; return 0."""
     print(json.dumps(outcome) if options.json else text)
-    for path in write(options.out) if options.out is not None else ():
-        if not options.json:
-            print(f"{label}{path}")
+    if options.out is None:
+        return 0
+    with chosen_dpi(options):
+        written = write(options.out)
+    for path in written if not options.json else ():
+        print(f"{label}{path}")
     return 0

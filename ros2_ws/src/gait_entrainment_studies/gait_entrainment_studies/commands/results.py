@@ -25,7 +25,7 @@ EXAMPLES = "examples:\n  entrain results --out docs"
 
 TEMPLATE = Path(__file__).with_suffix(".md")
 COMMAND = re.compile(r"^    entrain (.*)\n", re.MULTILINE)
-_FIGURE = re.compile(r"\]\(results/(\d+_(.*)\.png)\)")
+FIGURE = re.compile(r"\]\(results/(\d+_(.*)\.png)\)")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -50,7 +50,7 @@ def run(options: argparse.Namespace) -> int:
             if status != 0:
                 raise EntrainmentError(f"entrain {command} failed")
             page += f"    entrain {command}\n\n{_shown(output.getvalue())}\n{text}"
-            for drawn, name in _FIGURE.findall(text):
+            for drawn, name in FIGURE.findall(text):
                 shutil.copyfile(Path(folder) / f"{name}.png", figures / drawn)
     (options.out / "results.md").write_text(page, encoding="utf-8")
     print(f"written          {options.out / 'results.md'}")

@@ -4,15 +4,14 @@
 """For which stiffness and leg angle a period-one gait exists, as a picture."""
 
 from collections.abc import Sequence
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from gait_entrainment import drawing
-from gait_entrainment.drawing import BLUE, GREY, ORANGE, SKY
+from gait_entrainment.drawing import BELOW, BLUE, GREY, ORANGE, SKY
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment_studies.existence.stiffness_range import StiffnessRange
+from gait_entrainment_studies.existence.stiffness_range import StiffnessRange, switches
 
 
 def draw_existence(
@@ -20,6 +19,8 @@ def draw_existence(
 ) -> list[Path]:
     """Draw the range of stiffness along the leg angle, and where the walker lies in it."""
     figure, axes = drawing.new_figure()
+    corners = switches(walker, ranges)  # between the points of the map, where its lines bend
+    ranges = sorted([*ranges, *corners], key=lambda one: one.leg_angle)
     angles = np.degrees([r.leg_angle for r in ranges])
     least = np.array([r.just_vault_over for r in ranges])
     most = np.array([r.just_fly_off for r in ranges])
@@ -28,11 +29,10 @@ def draw_existence(
     axes.plot(angles, most, color=ORANGE, ls="--", lw=1.8, label="just flies off: above it, lifts")
     here = np.degrees(walker.leg_angle)
     axes.plot([here], [walker.ankle_stiffness], "*", color="black", ms=11, label="this walker")
-    for angle, (before, after) in zip(angles[1:], pairwise(ranges), strict=True):
-        if before.falls_at is not after.falls_at or before.flies_off_at is not after.flies_off_at:
-            axes.axvline(angle, color=GREY, ls=":", lw=0.8)
+    for corner in corners:
+        axes.axvline(np.degrees(corner.leg_angle), color=GREY, ls=":", lw=0.8)
     axes.plot([], [], color=GREY, ls=":", lw=0.8, label="another instant decides")
     axes.set(xlabel="leg angle at heel strike [deg]", ylabel="ankle stiffness [N m/rad]", ylim=0)
     axes.set_title("Where a period-one gait exists", fontsize=11)
-    drawing.add_legend(axes, loc="upper left")
+    drawing.add_legend(axes, **BELOW, ncols=2)
     return drawing.save_figure(figure, folder, "existence")

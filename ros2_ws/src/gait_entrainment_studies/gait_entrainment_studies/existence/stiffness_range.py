@@ -9,13 +9,18 @@ leg would have to pull. Both are closed forms but for a search over double stanc
 """
 
 import math
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from enum import Enum
+from itertools import pairwise
 
 import numpy as np
 
 from gait_entrainment.parameters import ParameterError, WalkerParameters
+
+# Leg angles [rad] that are one: no range differs visibly between them.
+_SAME_ANGLE = 1e-9
 
 
 class Limit(str, Enum):
@@ -36,6 +41,11 @@ class StiffnessRange:
     just_fly_off: float
     falls_at: Limit
     flies_off_at: Limit
+
+    @property
+    def limits(self) -> tuple[Limit, Limit]:
+        """Where in the gait its two ends are felt."""
+        return self.falls_at, self.flies_off_at
 
     @property
     def exists(self) -> bool:
@@ -80,6 +90,21 @@ def stiffness_range(
     """
     angle = parameters.leg_angle if leg_angle is None else leg_angle
     return _AnyStiffness(**asdict(parameters) | {"leg_angle": angle}).range()
+
+
+def switches(
+    parameters: WalkerParameters, ranges: Sequence[StiffnessRange]
+) -> list[StiffnessRange]:
+    """Return the ranges at the leg angles between these at which another instant decides."""
+    found = []
+    for before, after in pairwise(ranges):
+        low, high = before, after
+        while low.limits != high.limits and high.leg_angle - low.leg_angle > _SAME_ANGLE:
+            middle = stiffness_range(parameters, (low.leg_angle + high.leg_angle) / 2)
+            low, high = (middle, high) if middle.limits == low.limits else (low, middle)
+        if low.limits != high.limits:
+            found.append(high)
+    return found
 
 
 def existence_map(parameters: WalkerParameters, points: int = 200) -> list[StiffnessRange]:

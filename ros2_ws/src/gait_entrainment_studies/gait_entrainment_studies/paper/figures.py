@@ -59,23 +59,33 @@ def _convergence(p: WalkerParameters) -> Any:
 
 
 def _entrainment(p: WalkerParameters) -> Any:
-    """Fig. 5: stride period against stride number, entrained and not."""
-    figure, panels = drawing.new_figure(2, size=(7.2, 7.0), sharex=True, sharey=True)
+    """Fig. 5: stride period against stride number, entrained and, one below another, not."""
+    shares = [4.0] + [1.0] * len(_NOT_ENTRAINED)
+    figure, (above, *below) = drawing.new_figure(
+        len(shares), size=(7.2, 9.0), sharex=True, height_ratios=shares
+    )
     period = paper_pulses(p).unperturbed_period
-    titles = ("(a) entrained", "(b) not entrained")
-    for axes, offsets, title in zip(panels, (_ENTRAINED, _NOT_ENTRAINED), titles, strict=True):
+    panels = [above] * len(_ENTRAINED) + below
+    lines = zip(_ENTRAINED + _NOT_ENTRAINED, 2 * COLOURS[:5], 2 * DASHES[:5], strict=True)
+    for axes, (offset, colour, dash) in zip(panels, lines, strict=True):
+        strides = paper_walk(p, offset * 1e-3, 0.9, 110).stride_periods[:100]
+        label = rf"$\tau_p = 2\tau_0 {offset:+d}$ ms"
+        number = np.arange(1, strides.size + 1)
+        style = {"ls": dash} if axes is above else {}
+        axes.plot(number, strides, color=colour, lw=1.3, label=label, **style)
+    for axes in (above, *below):
+        axes.set_ylim(period - 0.085, period + 0.004)
         axes.axhline(period, color=GREY, lw=0.8, ls="--")
-        for offset, colour, dash in zip(offsets, COLOURS, DASHES, strict=False):
-            strides = paper_walk(p, offset * 1e-3, 0.9, 110).stride_periods[:100]
-            label = rf"$\tau_p = 2\tau_0 {offset:+d}$ ms"
-            number = np.arange(1, strides.size + 1)
-            axes.plot(number, strides, color=colour, ls=dash, lw=1.3, label=label)
-        axes.set(ylabel="stride period [s]", title=title)
         drawing.add_legend(axes, **BESIDE)
-    panels[0].annotate(
+    above.annotate(
         r"$2\tau_0$", (100, period), textcoords="offset points", xytext=(2, 3), color=GREY
     )
-    panels[1].set_xlabel("stride")
+    above.set(ylabel="stride period [s]", title="(a) entrained")
+    below[0].set_title("(b) not entrained")
+    for axes in below:
+        axes.locator_params(axis="y", nbins=3)
+    below[len(below) // 2].set_ylabel("stride period [s]")
+    below[-1].set_xlabel("stride")
     figure.suptitle("Fig. 5: entrainment with a finite basin", fontsize=11)
     return figure
 

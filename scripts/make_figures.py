@@ -1,0 +1,92 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Draw anew the pictures in docs that take seconds: the run in README.md, and what is solved.
+
+    python scripts/make_figures.py        into docs, saying which of them have changed
+
+Pictures of sweeps and cohorts walk for minutes: `entrain results` draws them with their numbers.
+docs/figures/display.png shows RViz's scene and is not drawn here.
+"""
+
+import contextlib
+import io
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.image import imread
+from PIL import Image
+
+from gait_entrainment.commands import main as entrain
+from gait_entrainment_studies.commands.results import COMMAND, FIGURE, TEMPLATE
+from gait_entrainment_studies.paper.figures import draw_figures
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+RUN = Path("figures/ankle_torque.png")
+SOLVED = ("paper", "lock", "existence", "phase-response")
+# Of the pixels. A line moved by its own width changes more.
+_MAY_DIFFER = 0.0005
+
+
+def draw_run(out: Path) -> dict[Path, Path]:
+    """Run the paper's example over the nodes; return its picture by the one in docs."""
+    subprocess.run(["entrain", "run", "--out", out / "run"], check=True, stdout=subprocess.DEVNULL)
+    return {RUN: out / "run/ankle_torque.png"}
+
+
+def draw_solved(out: Path) -> dict[Path, Path]:
+    """Draw what `entrain results` shows of the solvers; return each picture by the one in docs."""
+    drawn = {}
+    _, *page = COMMAND.split(TEMPLATE.read_text(encoding="utf-8"))
+    for command, text in zip(page[::2], page[1::2], strict=True):
+        name, figures = command.split()[0], FIGURE.findall(text)
+        if name not in SOLVED or not figures:
+            continue
+        if name == "paper":  # without its table, which takes longer than its figures
+            draw_figures(out / name)
+        else:
+            entrain([*command.split(), "--out", str(out / name)])
+        drawn |= {Path("results") / place: out / name / f"{file}.png" for place, file in figures}
+    return drawn
+
+
+def same(picture: Path, other: Path) -> bool:
+    """
+    Return whether two pictures show the same.
+
+    matplotlib brings its own font and renderer, so one version draws the same pixels everywhere
+    but for the last bits of its arithmetic: few pixels may differ.
+    """
+    one, two = imread(picture), imread(other)
+    return one.shape == two.shape and np.mean(abs(one - two).max(axis=2) > 0.1) <= _MAY_DIFFER
+
+
+def drawn_by_this_matplotlib(picture: Path) -> bool:
+    """Return whether a picture was drawn by the version that is here."""
+    with Image.open(picture) as opened:
+        return f"version{matplotlib.__version__}," in opened.info["Software"]
+
+
+def main() -> int:
+    """Draw all of them; return the exit code."""
+    with tempfile.TemporaryDirectory() as folder:
+        drawn = draw_run(Path(folder))
+        with contextlib.redirect_stdout(io.StringIO()):
+            drawn |= draw_solved(Path(folder))
+        for place, picture in drawn.items():
+            known = DOCS / place
+            if known.exists() and drawn_by_this_matplotlib(known) and same(known, picture):
+                continue
+            shutil.copyfile(picture, known)
+            print(f"changed  docs/{place}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,44 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+The pictures in docs are what the code draws now; that of a run is compared in test_lock_step.py.
+
+They are held to it by the version of matplotlib that has drawn them, which each of them names.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+from PIL import Image
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
+from make_figures import DOCS, draw_solved, drawn_by_this_matplotlib, same
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory):
+    return draw_solved(tmp_path_factory.mktemp("docs"))
+
+
+def test_pictures_are_what_the_code_draws(drawn):
+    assert len(drawn) == 8
+    if not all(drawn_by_this_matplotlib(DOCS / place) for place in drawn):
+        pytest.skip("the pictures were drawn by another version of matplotlib")
+    old = [str(place) for place, picture in drawn.items() if not same(DOCS / place, picture)]
+    assert old == [], "make figures"
+
+
+def test_a_short_line_elsewhere_is_another_picture(drawn, tmp_path):
+    for number, picture in enumerate(drawn.values()):
+        pixels = (255 * imread(picture)[:, :, :3]).round().astype(np.uint8)
+        plain, other = (tmp_path / f"{name}{number}.png" for name in ("plain", "other"))
+        Image.fromarray(pixels).save(plain)
+        width = pixels.shape[1]
+        pixels[100:102, width // 4 : 3 * width // 4] = 200, 30, 30
+        Image.fromarray(pixels).save(other)
+        assert same(plain, plain)
+        assert not same(plain, other)
