@@ -174,6 +174,15 @@ def test_nodes_of_an_experiment_are_as_ros_users_expect(tmp_path):
         handle.cancel_goal_async()
         assert listener.result(handle).result.outcome == RunProtocol.Result.CANCELLED
         listener.until(lambda: of["experiment"].put(longest_lookahead=0.3) == [""], "the end")
+        # A goal is a text, if only of one line, and names no file of the host.
+        for goal, reason in {
+            "{baseline: 0}": "baseline: 0; allowed",
+            str(BAG / "protocol.yaml"): "must be a mapping",
+        }.items():
+            kind, request = RunProtocol, RunProtocol.Goal(protocol=goal)
+            handle = listener.send_goal(kind, "experiment/run_protocol", request)
+            result = listener.result(handle).result
+            assert (result.outcome, reason in result.message) == (result.FAILED, True)
         assert graph(listener) == BLOCK.search(README.read_text())[0], (
             "python tests/system/graph.py"
         )

@@ -1,0 +1,101 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a user may say to any node as ROS has it: names, qualities of service, --help."""
+
+import sys
+from contextlib import contextmanager
+
+import pytest
+import rclpy
+
+from gait_entrainment.settings import SettingError, settings_of
+from gait_entrainment_nodes.messaging import topics
+from gait_entrainment_nodes.nodes import experiment, gait_analyzer, walker_sim
+from gait_entrainment_nodes.nodes.experiment import Experiment
+from gait_entrainment_nodes.nodes.gait_analyzer import GaitAnalyzerNode
+from gait_entrainment_nodes.nodes.parameters import HelpRequestedError
+from gait_entrainment_nodes.nodes.walker_sim import WalkerSim
+
+
+@contextmanager
+def node(make, *arguments):
+    """Make a node as a process with these arguments would."""
+    rclpy.init(args=["--ros-args", *arguments])
+    made = None
+    try:
+        made = make()
+        yield made
+    finally:
+        if made is not None:
+            made.destroy_node()
+        rclpy.shutdown()
+
+
+def names(made):
+    """Return the names of a node's topics, without those that every node has."""
+    found = made.get_publisher_names_and_types_by_node(made.get_name(), made.get_namespace())
+    return {name for name, _ in found}
+
+
+def test_topics_under_a_nodes_name_follow_its_name():
+    with node(Experiment, "-r", "__node:=trial", "-r", "__ns:=/lab") as made:
+        assert {"/lab/trial/state", "/lab/trial/horizon", "/diagnostics"} <= names(made)
+        assert not any("experiment" in name for name in names(made))
+
+
+def test_a_quality_is_taken_where_a_run_allows_it():
+    chosen = "qos_overrides./diagnostics.publisher"
+    with node(
+        Experiment, "-p", f"{chosen}.depth:=7", "-p", f"{chosen}.history:=keep_last"
+    ) as made:
+        assert made.get_parameter(f"{chosen}.depth").value == 7
+    assert topics.VIEWED.depth == 100  # of the other nodes in this process
+    state = "qos_overrides./gait/entrainment.publisher"
+    with node(GaitAnalyzerNode, "-p", f"{state}.depth:=2000") as made:
+        (info,) = made.get_publishers_info_by_topic("/gait/entrainment")
+        assert info.qos_profile.durability == topics.LATEST_STATE.durability
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "/gait/strides.publisher.reliability:=best_effort",
+        "/gait/strides.publisher.history:=keep_last",
+        "/gait/entrainment.publisher.depth:=5",
+        "/gait_events.subscription.reliability:=best_effort",
+    ],
+)
+def test_a_quality_by_which_a_run_would_lose_messages_is_refused(said):
+    simulated = ("-p", "use_sim_time:=true")
+    with (
+        pytest.raises(SettingError, match=r"is refused: a run depends on this topic") as caught,
+        node(GaitAnalyzerNode, *simulated, "-p", f"qos_overrides.{said}"),
+    ):
+        pass
+    topic = said.rpartition(".")[0]
+    assert str(caught.value).startswith(f"qos_overrides.{topic}: ")
+    assert "allowed: history keep_" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_quality_of_no_topic_is_warned_of(capfd):
+    with node(Experiment, "-p", "qos_overrides./nowhere.publisher.depth:=7") as made:
+        made.offer_ready()
+    assert "does not take: qos_overrides./nowhere.publisher.depth" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("make", "module"),
+    [(Experiment, experiment), (GaitAnalyzerNode, gait_analyzer), (WalkerSim, walker_sim)],
+)
+def test_help_says_what_a_node_takes(make, module, monkeypatch):
+    name = module.__name__.rpartition(".")[2]
+    monkeypatch.setattr(sys, "argv", [name, "--help"])
+    with pytest.raises(HelpRequestedError) as caught, node(make):
+        pass
+    text = str(caught.value)
+    assert text.startswith(f"usage: {name} [--ros-args ")
+    assert module.__doc__.strip().splitlines()[0] in text
+    for setting, told in settings_of(module.Settings).items():
+        assert f"\n  {setting}: {told.meaning}" in text
