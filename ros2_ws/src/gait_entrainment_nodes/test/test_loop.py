@@ -9,7 +9,7 @@ import pytest
 
 from gait_entrainment_nodes.nodes.loop import _serve_once
 
-NODE = SimpleNamespace(next_deadline=lambda: None, publish_state=lambda: None)
+NODE = SimpleNamespace(next_deadline=lambda: None, publish_state=lambda: None, late=())
 
 
 def executor_that_raises(text):
