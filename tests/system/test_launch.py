@@ -114,6 +114,25 @@ def test_experiment_ends_the_launch_with_success(tmp_path):
     assert (run.lost, run.differences) == (0, ())
 
 
+def test_somebody_else_may_record_a_run_that_begins_later(tmp_path):
+    file = short_protocol(tmp_path, "theirs", 4)
+    arguments = (f"protocol:={file}", "recorder:=none", "start_delay:=3")
+    others = [name for name in NODES if name != "bag_recorder"]
+    with (
+        claimed_domain() as domain,
+        launched("experiment.launch.py", tmp_path / "out", domain, *arguments) as launch,
+    ):
+        with probe(domain) as listener:
+            listener.client.wait_to_be_known("perturbator")
+            assert "experiment" not in listener.node.get_node_names()
+            events = listener.listen(GAIT_EVENTS)
+            listener.until(lambda: events, "the run")
+        launch.find_nodes(others)
+        assert launch.wait() == 0, launch.text
+    assert "\nbag  " not in launch.text
+    assert events[0].step == 0
+
+
 def stand_in_for_rviz(prefix):
     """Make a package rviz2 whose program writes down its arguments and waits; return the file."""
     index = prefix / "share/ament_index/resource_index/packages"
@@ -299,6 +318,8 @@ def test_device_is_brought_up_and_its_end_ends_the_launch(tmp_path):
         ("experiment", "protocol:=nowhere.yaml", "nowhere.yaml: cannot be read"),
         ("experiment", "params_file:=nowhere.yaml", "nowhere.yaml: no such file"),
         ("experiment", "onset:=felt", "onset: 'felt'; allowed: commanded, measured"),
+        ("experiment", "recorder:=nobody", "recorder: 'nobody'; allowed: bag_recorder, none"),
+        ("experiment", "start_delay:=soon", "start_delay: 'soon'; allowed: 0 to 600 s"),
         ("replay", "bag:=nowhere", "nowhere: no such file"),
         ("replay", "rate:=fast", "rate: 'fast'; allowed: at least 0"),
         ("device_only", "driver:=nosuch", "'nosuch' is unknown; allowed: "),

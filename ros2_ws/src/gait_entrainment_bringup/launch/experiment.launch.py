@@ -39,7 +39,7 @@ def nodes(context: LaunchContext) -> list[Action]:
         bag = Path(shared.value(context, "bag") or bag_folder(protocol)).absolute()
         check_output(bag, "bag")
     elif shared.value(context, "bag"):
-        raise shared.LaunchError("bag: makes none with recorder:=none; leave one of them out")
+        raise shared.LaunchError("bag: there is none with recorder:=none; leave one of them out")
     protocol.limits.check_pulse(protocol.pulse_torque, protocol.pulses.width)
     check_robot(protocol, real_time=real_time, **switches)
     given = parameters(protocol, bag, real_time=real_time, onset=onset, **switches)
