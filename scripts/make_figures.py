@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Draw anew the pictures in docs that take seconds: the run in README.md, and what is solved.
+Draw anew the pictures in docs that take seconds: the run in README.md, and the results but sweeps.
 
     python scripts/make_figures.py        into docs, saying which of them have changed
 
-Pictures of sweeps and cohorts walk for minutes: `entrain results` draws them with their numbers.
+Sweeps walk for longer: `entrain results` draws them with their numbers.
 docs/figures/display.png shows RViz's scene and is not drawn here.
 """
 
@@ -16,6 +16,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import matplotlib
@@ -29,7 +30,8 @@ from gait_entrainment_studies.paper.figures import draw_figures
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 RUN = Path("figures/ankle_torque.png")
-SOLVED = ("paper", "lock", "existence", "phase-response")
+# Commands whose pictures take seconds.
+QUICK = ("paper", "lock", "existence", "phase-response", "cohort")
 # Of the pixels. A line moved by its own width changes more.
 _MAY_DIFFER = 0.0005
 
@@ -40,13 +42,13 @@ def draw_run(out: Path) -> dict[Path, Path]:
     return {RUN: out / "run/ankle_torque.png"}
 
 
-def draw_solved(out: Path) -> dict[Path, Path]:
-    """Draw what `entrain results` shows of the solvers; return each picture by the one in docs."""
+def draw_results(out: Path, commands: Sequence[str] = QUICK) -> dict[Path, Path]:
+    """Draw what `entrain results` shows of some commands; return each by the picture in docs."""
     drawn = {}
     _, *page = COMMAND.split(TEMPLATE.read_text(encoding="utf-8"))
     for command, text in zip(page[::2], page[1::2], strict=True):
         name, figures = command.split()[0], FIGURE.findall(text)
-        if name not in SOLVED or not figures:
+        if name not in commands or not figures:
             continue
         if name == "paper":  # without its table, which takes longer than its figures
             draw_figures(out / name)
@@ -78,7 +80,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         drawn = draw_run(Path(folder))
         with contextlib.redirect_stdout(io.StringIO()):
-            drawn |= draw_solved(Path(folder))
+            drawn |= draw_results(Path(folder))
         for place, picture in drawn.items():
             known = DOCS / place
             if known.exists() and drawn_by_this_matplotlib(known) and same(known, picture):

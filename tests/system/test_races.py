@@ -73,11 +73,6 @@ def test_acknowledgements_wait_until_the_walker_hears(live):
     assert events_since_start(live) == simulated_events(live)
 
 
-def test_promises_wait_until_they_are_heard(tmp_path):
-    bag = run_late(tmp_path, "perturbator>walker_sim", *SHORT)
-    assert events_since_start(bag) == simulated_events(bag)
-
-
 def test_a_walk_in_real_time_waits_until_it_is_heard(tmp_path):
     bag = run_late(tmp_path, "walker_sim>experiment", "--real-time", *QUICK, *SHORT)
     with BagReader(bag) as reader:

@@ -61,9 +61,9 @@ def _draw_basins(study: Study, axes: Any) -> None:
         ("subjects", ours, BLUE, "--"),
         ("humans", _HUMANS, ORANGE, "-"),
     ):
-        axes.axvline(mean, color=colour, ls=dash, lw=1.2, label=f"mean of the {who} {mean:.2f} %")
+        axes.axvline(mean, color=colour, ls=dash, lw=1.2, label=f"mean of the {who} {mean:.3g} %")
         shade = {"color": colour, "alpha": 0.15, "lw": 0}
         span = mean - deviation, mean + deviation
-        axes.axvspan(*span, **shade, label=f"± standard deviation {deviation:.2f} %")
+        axes.axvspan(*span, **shade, label=f"± standard deviation {deviation:.2g} %")
     axes.set(xlabel="basin of entrainment [% of the stride]", ylabel="subjects, sorted", xlim=0)
     axes.set_title("basins without noise, solved", fontsize=10)
