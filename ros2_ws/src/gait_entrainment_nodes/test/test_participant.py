@@ -8,6 +8,7 @@ from contextlib import contextmanager
 
 import pytest
 import rclpy
+import yaml
 
 from gait_entrainment.settings import SettingError, settings_of
 from gait_entrainment_nodes.messaging import topics
@@ -99,3 +100,17 @@ def test_help_says_what_a_node_takes(make, module, monkeypatch):
     assert module.__doc__.strip().splitlines()[0] in text
     for setting, told in settings_of(module.Settings).items():
         assert f"\n  {setting}: {told.meaning}" in text
+
+
+@pytest.mark.parametrize("make", [Experiment, GaitAnalyzerNode, WalkerSim])
+def test_what_a_node_was_dumped_with_starts_it_again_without_a_word(make, tmp_path, capfd):
+    with node(make) as made:
+        values = {n: p.value for n, p in made._parameters.items() if not n.startswith("qos")}
+        name = made.get_fully_qualified_name()
+    file = tmp_path / "dumped.yaml"
+    file.write_text(yaml.safe_dump({name: {"ros__parameters": values}}))
+    capfd.readouterr()
+    with node(make, "--params-file", str(file)) as made:
+        made.offer_ready()
+        assert {n: made.get_parameter(n).value for n in values} == values
+    assert capfd.readouterr().err == ""
