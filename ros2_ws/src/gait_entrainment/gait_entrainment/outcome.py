@@ -5,13 +5,24 @@
 
 import math
 import statistics
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, replace
+from itertools import chain
 from typing import Any
 
-from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind
-from gait_entrainment.gait import Analysis, GaitEvent, Hole, Reason, Stride, Verdict
-from gait_entrainment.protocol import Protocol
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
+from gait_entrainment.experiment import BlockRun
+from gait_entrainment.gait import (
+    Analysis,
+    GaitEvent,
+    Hole,
+    Reason,
+    Stride,
+    Verdict,
+    VerdictSettings,
+    analyze,
+)
+from gait_entrainment.protocol import Block, Protocol, content_of
 from gait_entrainment.robot import PulseTiming
 from gait_entrainment.robot.timing import distribution
 
@@ -31,6 +42,80 @@ _MEANINGS = {
 }
 
 
+def settings_for(
+    plans: Iterable[Block], settings: VerdictSettings | None = None
+) -> VerdictSettings | None:
+    """
+    Return the settings of a verdict about pulses that some blocks plan.
+
+    Pulses by phase follow the gait: that their lag stays put shows nothing, whatever their period.
+    """
+    if not any(plan.pulses.phase is not None for plan in plans):
+        return settings
+    return replace(settings or VerdictSettings(), smallest_difference=1.0)
+
+
+@dataclass(frozen=True)
+class JudgedBlock:
+    """One block of a run, analyzed by itself, against its own baseline."""
+
+    name: str
+    first_stride: int
+    last_stride: int | None  # None if it did not end
+    measured_period: float  # mean stride period over its baseline [s]; NaN if unknown
+    pulse_period: float  # as planned [s]; NaN if unknown, or by phase
+    analysis: Analysis
+
+
+def analyze_blocks(
+    blocks: Sequence[BlockRun],
+    events: Sequence[GaitEvent],
+    onsets: Sequence[int],
+    side: Side,
+    settings: VerdictSettings | None = None,
+    unknown: Sequence[tuple[int, int]] = (),
+) -> tuple[Analysis, tuple[JudgedBlock, ...]]:
+    """
+    Analyze a run, and each of its blocks, unless its protocol is one of fixed length.
+
+    As ``analyze``; ``blocks`` are those of a conductor that has seen the events. With
+    blocks, pulses, verdicts and holes of the run are those of its blocks.
+    """
+    plans = [block.plan for block in blocks]
+    whole = analyze(events, onsets, side, settings_for(plans, settings), unknown)
+    if len(blocks) <= 1 and not any(block.plan.open_ended for block in blocks):
+        return whole, ()
+    judged = []
+    for block in blocks:
+        start = block.start or 0
+        end = math.inf if block.end is None else block.end
+        analysis = analyze(
+            [event for event in events if start <= event.stamp <= end],
+            [onset for onset in onsets if start <= onset < end],
+            side,
+            settings_for([block.plan], settings),
+            [hole for hole in unknown if start < hole[1] and hole[0] < end],
+            block.strides_before,
+        )
+        strides = [stride.number for stride in analysis.strides if stride.end == end]
+        judged.append(
+            JudgedBlock(
+                name=block.plan.name,
+                first_stride=block.strides_before + 1,
+                last_stride=strides[0] if strides else None,
+                measured_period=block.measured_period,
+                pulse_period=block.pulse_period,
+                analysis=analysis,
+            )
+        )
+    parts = [block.analysis for block in judged]
+    pulses, entrainments, holes = (
+        tuple(chain.from_iterable(getattr(part, name) for part in parts))
+        for name in ("pulses", "entrainments", "holes")
+    )
+    return replace(whole, pulses=pulses, entrainments=entrainments, holes=holes), tuple(judged)
+
+
 @dataclass(frozen=True)
 class Run:
     """What a simulated and a recorded run have in common; stamps are integer nanoseconds."""
@@ -42,11 +127,14 @@ class Run:
     measured_period: float  # mean stride period before the pulses [s]; NaN if unknown
     pulse_period: float  # as planned, without a protocol as seen [s]; NaN if unknown
     analysis: Analysis
+    blocks: tuple[JudgedBlock, ...]  # none if the protocol is one of a fixed number of strides
 
     @property
     def strides(self) -> list[Stride]:
         """The strides of the protocol, which more may follow; without a protocol, all."""
         last = math.inf if self.protocol is None else self.protocol.strides
+        if self.blocks:
+            last = self.blocks[-1].last_stride or math.inf
         return [stride for stride in self.analysis.strides if stride.number <= last]
 
 
@@ -54,56 +142,75 @@ def outcome_of(run: Run) -> dict[str, Any]:
     """Return what ``--json`` prints; times in seconds, None for what is not known."""
     analysis, strides = run.analysis, run.strides
     start = strides[0].start if strides else 0
+
+    def seconds(stamp: int) -> float:
+        return max(stamp - start, 0) / NANOSECONDS_PER_SECOND
+
+    outcome: dict[str, Any] = {
+        "unperturbed_stride_period": run.measured_period,
+        "perturbation_period": run.pulse_period,
+        "stride_period": [stride.period for stride in strides],
+        "pulses": [
+            {
+                "onset": (pulse.onset - start) / NANOSECONDS_PER_SECOND,
+                "phase": pulse.phase,
+                "phase_lag": pulse.phase_lag,
+            }
+            for pulse in analysis.pulses
+            if strides and pulse.stride <= strides[-1].number
+        ],
+        **_judgement(analysis, run.events),
+        "stretches": [
+            {"last_stride": e.stride, "verdict": e.verdict.name.lower()}
+            for e in {e.stretch: e for e in analysis.entrainments}.values()
+        ],
+        "holes": [
+            {"start": seconds(h.start), "end": seconds(h.end), "missing": h.missing}
+            for h in holes_of(run)
+        ],
+        "gait_events": asdict(analysis.event_counts),
+        "parameters": run.protocol and _parameters(run.protocol),
+    }
+    if run.blocks:
+        outcome["blocks"] = [
+            {
+                "name": block.name,
+                "first_stride": block.first_stride,
+                "last_stride": block.last_stride,
+                "unperturbed_stride_period": block.measured_period,
+                "perturbation_period": block.pulse_period,
+                "pulses": len(block.analysis.pulses),
+                **_judgement(block.analysis, run.events),
+            }
+            for block in run.blocks
+        ]
+    told: dict[str, Any] = _without_nan(outcome)
+    return told
+
+
+def _judgement(analysis: Analysis, events: Sequence[GaitEvent]) -> dict[str, Any]:
+    """Return the last verdict, since when it has held, and where the pulses came to lie."""
     last = analysis.entrainments[-1] if analysis.entrainments else None
     verdict = last.verdict if last else Verdict.UNDECIDED
     reason = last.reason if last else Reason.FEW_PULSES
     entrained = verdict is Verdict.ENTRAINED
     placed = [p for p in analysis.pulses if p.toe_off is not None]  # the others have no lag
     lags = [p.phase_lag for p in placed[-FINAL_PULSES:]]
-
-    def seconds(stamp: int) -> float:
-        return max(stamp - start, 0) / NANOSECONDS_PER_SECOND
-
-    outcome: dict[str, Any] = _without_nan(
-        {
-            "unperturbed_stride_period": run.measured_period,
-            "perturbation_period": run.pulse_period,
-            "stride_period": [stride.period for stride in strides],
-            "pulses": [
-                {
-                    "onset": (pulse.onset - start) / NANOSECONDS_PER_SECOND,
-                    "phase": pulse.phase,
-                    "phase_lag": pulse.phase_lag,
-                }
-                for pulse in analysis.pulses
-                if strides and pulse.stride <= strides[-1].number
-            ],
-            "verdict": verdict.name.lower(),
-            "reason": reason.name.lower() if reason else None,
-            "entrained": entrained,
-            "entrained_since_stride": last.entrained_since_stride if last and entrained else None,
-            "final_phase_lag": statistics.median(lags) if lags else math.nan,
-            "double_stance": _double_stance(run.events, placed[-1].toe_off if placed else None),
-            "stretches": [
-                {"last_stride": e.stride, "verdict": e.verdict.name.lower()}
-                for e in {e.stretch: e for e in analysis.entrainments}.values()
-            ],
-            "holes": [
-                {"start": seconds(h.start), "end": seconds(h.end), "missing": h.missing}
-                for h in holes_of(run)
-            ],
-            "gait_events": asdict(analysis.event_counts),
-            "parameters": run.protocol and _parameters(run.protocol),
-        }
-    )
-    return outcome
+    return {
+        "verdict": verdict.name.lower(),
+        "reason": reason.name.lower() if reason else None,
+        "entrained": entrained,
+        "entrained_since_stride": last.entrained_since_stride if last and entrained else None,
+        "final_phase_lag": statistics.median(lags) if lags else math.nan,
+        "double_stance": _double_stance(events, placed[-1].toe_off if placed else None),
+    }
 
 
 def _parameters(protocol: Protocol) -> dict[str, Any]:
-    """Return a protocol with its side as a word and its torque in N m, however it was given."""
-    parameters = asdict(protocol)
-    parameters["side"] = protocol.side.name.lower()
-    parameters["pulses"]["torque"] = protocol.pulse_torque
+    """Return a protocol with its torque in N m, however it was given."""
+    parameters = content_of(protocol)
+    for said, block in zip(parameters.get("blocks", [parameters]), protocol.sequence, strict=True):
+        said["pulses"]["torque"] = block.torque(protocol.walker)
     return parameters
 
 
@@ -111,15 +218,20 @@ def holes_of(run: Run) -> list[Hole]:
     """Return what the record of a run lacks; its last strides too, whether walked or not."""
     holes, strides = list(run.analysis.holes), run.analysis.strides
     if strides and run.protocol is not None:
-        end = strides[-1].end
-        if (missing := run.protocol.strides - strides[-1].number) > 0:
+        end, missing = strides[-1].end, run.protocol.strides - strides[-1].number
+        if run.blocks:  # how many strides there would be is not known before
+            ended = [block.last_stride for block in run.blocks]
+            complete = len(ended) == len(run.protocol.sequence) and ended[-1] is not None
+            missing = 0 if complete else max(missing, 1)
+        if missing > 0:
             holes.append(Hole(end, end, f"the last {missing} strides"))
     return holes
 
 
 def summary(outcome: dict[str, Any]) -> str:
     """Return the outcome in a few lines."""
-    plan = outcome["parameters"] and outcome["parameters"]["pulses"]
+    parameters = outcome["parameters"] or {}
+    plan = parameters.get("pulses")
     strides, pulses = outcome["stride_period"], outcome["pulses"]
     unperturbed, period = outcome["unperturbed_stride_period"], outcome["perturbation_period"]
     lines = [f"strides          {len(strides)}, pulses placed in them: {len(pulses)}"]
@@ -127,6 +239,11 @@ def summary(outcome: dict[str, Any]) -> str:
         lines[0] += f" of {plan['count']}"
         if not outcome["holes"]:
             lines[0] += "; the train is longer than the run: add washout strides"
+    if "blocks" in outcome:
+        plans = parameters.get("blocks", [parameters])
+        for number, (block, said) in enumerate(zip(outcome["blocks"], plans, strict=False), 1):
+            lines += _block_lines(number, block, said["pulses"])
+        return "\n".join([*lines, *_doubt_lines(outcome)])
     if strides:
         measured = "not measured" if unperturbed is None else f"{unperturbed:.4f} s"
         lines.append(f"stride period    {measured} unperturbed, {strides[-1]:.4f} s last")
@@ -134,24 +251,49 @@ def summary(outcome: dict[str, Any]) -> str:
         shape = f"{plan['torque']:.2f} N m for {plan['width']:g} s " if plan else ""
         offset = "" if unperturbed is None else f" ({(period - unperturbed) * 1e3:+.1f} ms)"
         lines.append(f"pulses           {shape}every {period:.4f} s{offset}")
-    verdict = outcome["verdict"]
-    if outcome["entrained"]:
-        verdict += f" since stride {outcome['entrained_since_stride']}"
-    else:
-        verdict += f": {_MEANINGS[outcome['reason'] or verdict]}"
-    lines.append(f"verdict          {verdict}")
+    lines.append(f"verdict          {_verdict(outcome)}")
     for stretch in outcome["stretches"][:-1]:
         lines.append(f"  until stride {stretch['last_stride']:<3} {stretch['verdict']}")
+    lines += _doubt_lines(outcome)
+    lag, double_stance = outcome["final_phase_lag"], outcome["double_stance"]
+    if lag is not None and outcome["entrained"]:
+        lines.append(f"final phase lag  {lag * 1e3:+.1f} ms: {_place(lag, double_stance)}")
+    return "\n".join(lines)
+
+
+def _verdict(judged: dict[str, Any]) -> str:
+    """Return the verdict with since when it has held, or why nothing is claimed."""
+    if judged["entrained"]:
+        return f"{judged['verdict']} since stride {judged['entrained_since_stride']}"
+    return f"{judged['verdict']}: {_MEANINGS[judged['reason'] or judged['verdict']]}"
+
+
+def _block_lines(number: int, block: dict[str, Any], plan: dict[str, Any]) -> list[str]:
+    """Return what was done in a block, and what came of it."""
+    last = block["last_stride"] or "the end"
+    unperturbed, period = block["unperturbed_stride_period"], block["perturbation_period"]
+    told = f"block {number:<11}{block['name']}: strides {block['first_stride']} to {last}"
+    if not plan["count"]:
+        return [f"{told}, no pulses"]
+    timing = "" if period is None else f" every {period:.4f} s"
+    if period is not None and unperturbed is not None:
+        timing += f" ({(period - unperturbed) * 1e3:+.1f} ms)"
+    if plan.get("phase") is not None:
+        timing = f" at phase {plan['phase']:g}"
+    pulses = f"{block['pulses']} pulses of {plan['torque']:.2f} N m{timing}"
+    return [f"{told}, {pulses}", f"{'':17}{_verdict(block)}"]
+
+
+def _doubt_lines(outcome: dict[str, Any]) -> list[str]:
+    """Return what the record lacks, and what of it was not believed."""
+    lines = []
     if holes := [f"{hole['missing']} at {hole['start']:.1f} s" for hole in outcome["holes"]]:
         more = f", {len(holes) - 3} more" if len(holes) > 3 else ""
         lines.append(f"holes            {', '.join(holes[:3])}{more}: not in the record")
     doubts = [f"{n} {fate}" for fate, n in [*outcome["gait_events"].items()][1:] if n]
     if doubts:
         lines.append(f"gait events      {', '.join(doubts).replace('_', ' ')}")
-    lag, double_stance = outcome["final_phase_lag"], outcome["double_stance"]
-    if lag is not None and outcome["entrained"]:
-        lines.append(f"final phase lag  {lag * 1e3:+.1f} ms: {_place(lag, double_stance)}")
-    return "\n".join(lines)
+    return lines
 
 
 def _place(lag: float, double_stance: float | None) -> str:

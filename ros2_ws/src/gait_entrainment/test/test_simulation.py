@@ -31,10 +31,10 @@ def test_the_papers_example_entrains_at_the_end_of_double_stance(default):
     assert default.ending is None
     strides = [s for s in default.analysis.strides if s.number <= 80]
     assert len(strides) == 80
-    assert default.train.period == default.measured_period - 0.05
+    assert default.pulse_period == default.measured_period - 0.05
     # Locked: the stride takes as long as the pulses' period, to the nanosecond's rounding.
     locked = [s.period for s in strides if 55 <= s.number <= 64]
-    assert locked == pytest.approx([default.train.period] * len(locked), abs=2e-9)
+    assert locked == pytest.approx([default.pulse_period] * len(locked), abs=2e-9)
     # The pulse meets toe-off: it begins before, and would end after it.
     for pulse in default.analysis.pulses[-10:]:
         assert -0.1 < pulse.phase_lag < 0
@@ -82,9 +82,9 @@ def test_the_same_as_one_walk_over_the_whole_torque(phase, offset):
     end = cut.events[-1].stamp
     train = cut.train
     times, torques = [0], [0.0]
-    for n in range(train.count):
-        times += [train.onset(n), train.end(n)]
-        torques += [train.torque, 0.0]
+    for pulse in train.pulses:
+        times += [pulse.onset, pulse.end]
+        torques += [pulse.torque, 0.0]
     walker = Walker(protocol.walker, protocol.side)
     walker.extend_torque(
         protocol.side, np.array(times), np.array(torques), max(end, times[-1]) + 1

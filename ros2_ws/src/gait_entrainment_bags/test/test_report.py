@@ -53,7 +53,9 @@ def test_a_slow_passage_is_not_taken_for_a_lock_and_says_so():
 def test_what_is_not_known_is_null_in_json():
     protocol = Protocol(baseline=2, washout=0, pulses=PulsePlan(count=1))
     nothing = analyze([], [], Side.RIGHT)
-    told = outcome_of(Simulation(protocol, (), (), (), math.nan, math.nan, nothing, None, None))
+    told = outcome_of(
+        Simulation(protocol, (), (), (), math.nan, math.nan, nothing, (), None, None)
+    )
     text = json.dumps(told, allow_nan=False)
     assert json.loads(text)["unperturbed_stride_period"] is None
     assert json.loads(text)["verdict"] == "undecided"
@@ -70,8 +72,9 @@ def test_the_figures_are_drawn(simulation, tmp_path):
         events=simulation.events,
         onsets=simulation.onsets,
         measured_period=simulation.measured_period,
-        pulse_period=simulation.train.period,
+        pulse_period=simulation.pulse_period,
         analysis=simulation.analysis,
+        blocks=(),
         timings=simulation.timings,
         torques=AnkleTorques(stamps, zeros + 50, zeros, zeros),
         messages=0,

@@ -72,7 +72,7 @@ def checked_run(
     for name, told in _NUMBERS.items():
         if (text := getattr(options, name)) is not None:
             setattr(options, name, told.parse(_option(name), text))
-    protocol.limits.check_pulse(protocol.pulse_torque, protocol.pulses.width)
+    protocol.check_limits()
     if drives:
         switches = {"armed": options.arm, "unproved": options.unproved}
         check_robot(protocol, real_time=options.real_time, **switches)

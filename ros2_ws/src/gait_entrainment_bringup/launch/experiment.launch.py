@@ -29,7 +29,7 @@ def nodes(context: LaunchContext) -> list[Action]:
     switches = {name: shared.is_true(context, argument) for name, argument in arming.items()}
     onset = shared.choice(context, "onset", "commanded", "measured")
     bag = Path(shared.value(context, "bag") or bag_folder(protocol)).absolute()
-    protocol.limits.check_pulse(protocol.pulse_torque, protocol.pulses.width)
+    protocol.check_limits()
     check_robot(protocol, real_time=real_time, **switches)
     check_output(bag, "bag")
     given = parameters(protocol, bag, real_time=real_time, onset=onset, **switches)

@@ -14,7 +14,7 @@ from gait_entrainment_nodes.messaging.topics import PULSES, TORQUE_PROFILE
 from gait_entrainment_nodes.nodes.perturbator_run import Result, Run
 
 SECOND = 10**9
-TRAIN = PulseTrain(
+TRAIN = PulseTrain.periodic(
     side=Side.RIGHT, first_onset=3 * SECOND, period=1.0, count=2, torque=5.0, duration=0.1
 )
 
@@ -71,7 +71,7 @@ def test_train_is_delivered_once_its_last_pulse_is_promised(bench):
 
 
 def test_train_beyond_the_limits_is_refused_and_changes_nothing(bench):
-    too_much = PulseTrain(
+    too_much = PulseTrain.periodic(
         side=Side.RIGHT, first_onset=3 * SECOND, period=1.0, count=1, torque=1e3, duration=0.1
     )
     with pytest.raises(LimitError, match="torque"):

@@ -51,7 +51,7 @@ def conduct(conductor, events):
             train = conductor.add_event(rest.pop(0))
             if train is not None:
                 planned_at = reached
-                assert train.first_onset >= reached, "an onset inside what was promised"
+                assert train.onsets[0] >= reached, "an onset inside what was promised"
 
 
 @settings(derandomize=True, deadline=None, max_examples=150)
@@ -70,12 +70,14 @@ def test_no_promise_covers_an_onset_that_is_not_planned(baseline, periods, phase
     conduct(conductor, events)
     measured = statistics.fmean(round(p * 1e9) / 1e9 for p in periods[: baseline - 1])
     strikes = [e.stamp for e in events if e.kind is EventKind.HEEL_STRIKE and e.side is Side.RIGHT]
-    train = conductor.train
-    assert conductor.measured_period == pytest.approx(measured, abs=2e-9)
+    train = conductor.block.train
+    assert conductor.block.measured_period == pytest.approx(measured, abs=2e-9)
     # The definition, from the strike that starts the last baseline stride.
-    onset = strikes[baseline - 1] + math.floor((1 + phase) * conductor.measured_period * 1e9) + 1
-    assert train.first_onset == onset
-    assert train.period == conductor.measured_period - 0.05
+    onset = (
+        strikes[baseline - 1] + math.floor((1 + phase) * conductor.block.measured_period * 1e9) + 1
+    )
+    assert train.onsets[0] == onset
+    assert conductor.block.pulse_period == conductor.block.measured_period - 0.05
 
 
 @settings(derandomize=True, deadline=None, max_examples=50)
@@ -104,7 +106,7 @@ def test_first_pulse_of_a_constant_gait_is_never_before_the_stride_after_the_bas
     strikes = [round((start + k * period) * 1e9) for k in range(baseline + 1)]
     for k, stamp in enumerate(strikes):
         conductor.add_event(GaitEvent(stamp, EventKind.HEEL_STRIKE, Side.RIGHT, 2 * k))
-    assert 0 <= conductor.train.first_onset - strikes[baseline] <= 2
+    assert 0 <= conductor.block.train.onsets[0] - strikes[baseline] <= 2
 
 
 def test_an_absolute_period_needs_no_measurement():
@@ -115,8 +117,8 @@ def test_an_absolute_period_needs_no_measurement():
     )
     conductor = Conductor(protocol)
     conduct(conductor, walk([1.4] * 4))
-    assert conductor.train.first_onset == round(1.25 * 1.5e9)
-    assert conductor.train.period == 1.5
+    assert conductor.block.train.onsets[0] == round(1.25 * 1.5e9)
+    assert conductor.block.pulse_period == 1.5
 
 
 def test_phases_follow_the_plan():
@@ -126,13 +128,13 @@ def test_phases_follow_the_plan():
     assert conductor.part(0) is Part.BASELINE
     for event in events[:9]:
         conductor.add_event(event)
-    train = conductor.train
-    assert conductor.part(train.first_onset - 1) is Part.BASELINE
-    assert conductor.part(train.first_onset) is Part.PULSES
-    assert conductor.part(train.end(1)) is Part.WASHOUT
+    train = conductor.block.train
+    assert conductor.part(train.onsets[0] - 1) is Part.BASELINE
+    assert conductor.part(train.onsets[0]) is Part.PULSES
+    assert conductor.part(train.end) is Part.WASHOUT
     for event in events[9:]:
         conductor.add_event(event)
-    assert conductor.part(train.end(1)) is Part.FINISHED
+    assert conductor.part(train.end) is Part.FINISHED
 
 
 def test_a_baseline_without_a_complete_stride_says_so():

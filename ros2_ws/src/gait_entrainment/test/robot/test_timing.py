@@ -62,7 +62,7 @@ def test_the_audit_of_an_emulated_robot_finds_its_delay_and_lag():
     robot.configure()
     robot.activate()
     robot.begin(0)
-    robot.schedule(PulseTrain(Side.LEFT, 500 * MS, 1.0, 3, 10.0, 0.2))
+    robot.schedule(PulseTrain.periodic(Side.LEFT, 500 * MS, 1.0, 3, 10.0, 0.2))
     onsets = MeasuredOnsets()
     for until in range(100 * MS, 4000 * MS, 130 * MS):
         promised = robot.promise(until).onsets
