@@ -65,6 +65,7 @@ class PulseTiming:
     commanded: int
     sent: int | None
     measured: int | None
+    sham: bool = False  # announced without torque: no state can show it
 
     @property
     def onset(self) -> int:
@@ -146,9 +147,10 @@ class MeasuredOnsets:
     def _judge(self) -> PulseTiming:
         """Take the next pulse from those named, and return its timing."""
         onset = self._named.pop(0)
+        announced = onset in self._announced
         height, width = self._announced.pop(onset, (0.0, 0.0))
-        if height == 0:  # a sham, or never announced: no state can show it
-            return PulseTiming(onset, None, None)
+        if height == 0:
+            return PulseTiming(onset, None, None, sham=announced)
         end = self._end(onset, width, self._named[:1])
         self._forget_states_before(onset)
         seen = [state for state in self._states if state.stamp <= end]
@@ -194,7 +196,7 @@ def distribution(
     unknown = math.isnan(stride)
     return {
         "pulses": len(late),
-        "missing": len(timings) - len(late),
+        "missing": sum(not timing.sham for timing in timings) - len(late),
         **{f"{name}_ms": ms for name, ms in figures.items()},
         **{f"{n}_percent": None if unknown else ms / stride / 10 for n, ms in figures.items()},
     }
