@@ -22,7 +22,7 @@ def pages(tmp_path_factory):
 
 
 def test_fields_have_their_units(pages):
-    assert "mean stride period before the pulses [s]" in pages["gait_entrainment/outcome.html"]
+    assert "mean stride period before the pulses [s]" in pages["gait_entrainment/run.html"]
 
 
 @pytest.mark.parametrize(

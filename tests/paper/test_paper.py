@@ -7,7 +7,7 @@ import json
 
 import pytest
 
-from gait_entrainment.commands import main
+from gait_entrainment_commands import main
 from gait_entrainment_studies.paper.comparison import compare, explain
 
 

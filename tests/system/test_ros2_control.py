@@ -14,9 +14,9 @@ from pathlib import Path
 
 import pytest
 
-from gait_entrainment.commands import main
 from gait_entrainment.conventions import Side
 from gait_entrainment.robot import DeviceError, LimitError, PulseTrain, find_driver
+from gait_entrainment_commands import main
 from gait_entrainment_drivers.conformance.bench import DriverBench, Tolerances, run_check
 from gait_entrainment_drivers.conformance.checks import CHECKS
 from gait_entrainment_drivers.proof import proof_of

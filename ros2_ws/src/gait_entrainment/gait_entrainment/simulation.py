@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 from gait_entrainment.experiment import Conductor
 from gait_entrainment.gait import GaitEvent, VerdictSettings
-from gait_entrainment.outcome import Run, analyze_blocks
 from gait_entrainment.protocol import Protocol
 from gait_entrainment.robot import LimitError, MeasuredOnsets, PulseTrain, find_driver
+from gait_entrainment.run import Run, analyze_blocks
 from gait_entrainment.walker import Ending, Walker
 
 

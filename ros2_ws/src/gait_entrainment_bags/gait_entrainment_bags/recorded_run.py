@@ -25,9 +25,9 @@ from gait_entrainment.conventions import Side
 from gait_entrainment.experiment import BlockRun, Conductor, GaitError
 from gait_entrainment.gait import Analysis, GaitEvent, Stride, VerdictSettings, analyze
 from gait_entrainment.gait.analyzer import Result
-from gait_entrainment.outcome import Run, analyze_blocks, outcome_of, settings_for, timing_outcome
 from gait_entrainment.protocol import Protocol, ProtocolError, read_protocol
 from gait_entrainment.robot import MeasuredOnsets, TorqueProfile
+from gait_entrainment.run import Run, analyze_blocks, settings_for
 from gait_entrainment_bags import messages, topic_names
 from gait_entrainment_bags.decoding import decoder_for
 from gait_entrainment_bags.errors import BagError
@@ -36,6 +36,7 @@ from gait_entrainment_bags.mcap_records import BagMessage
 from gait_entrainment_bags.reader import BagReader
 from gait_entrainment_bags.recovery import RECOVERY_KEY
 from gait_entrainment_bags.writer import ENDED_EARLY
+from gait_entrainment_commands.outcome import outcome_of, timing_outcome
 
 # Strides of which the ankle torque is drawn: more would not be told apart in a figure. Those while
 # a lock forms are drawn one by one, the latest of them if they are many.

@@ -13,7 +13,6 @@ import pytest
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.gait import analyze
-from gait_entrainment.outcome import outcome_of, summary
 from gait_entrainment.protocol import Protocol, PulsePlan
 from gait_entrainment.robot import PulseTiming
 from gait_entrainment.simulation import Simulation, simulate
@@ -24,6 +23,7 @@ from gait_entrainment_bags.recorded_run import (
     RecordedRun,
     drawn_strides,
 )
+from gait_entrainment_commands.outcome import outcome_of, summary
 
 
 @pytest.fixture(scope="module")

@@ -18,9 +18,9 @@ import yaml
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.gait import GaitLimits
-from gait_entrainment.outcome import settings_for
 from gait_entrainment.protocol import Protocol, said_limits, write_protocol
 from gait_entrainment.robot import find_driver
+from gait_entrainment.run import settings_for
 from gait_entrainment_bags import BagError, BagReader
 from gait_entrainment_bags.recorded_run import protocol_and_side
 from gait_entrainment_bringup.provenance import provenance

@@ -11,13 +11,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from gait_entrainment.commands.outcome_options import add_onset_option
-from gait_entrainment.commands.protocol_options import add_protocol_options, chosen_protocol
 from gait_entrainment.errors import UsageError
 from gait_entrainment.protocol import Protocol
 from gait_entrainment.robot import LimitError, find_driver
 from gait_entrainment.settings import Setting
 from gait_entrainment_bringup.node_list import LEAD_TIME, Parameters, bag_folder, parameters
+from gait_entrainment_commands.outcome_options import add_onset_option
+from gait_entrainment_commands.protocol_options import add_protocol_options, chosen_protocol
 from gait_entrainment_drivers.proof import require_proof
 
 _SWITCHES = {

@@ -15,9 +15,9 @@ from types import SimpleNamespace
 import pytest
 from misbehaving_device import MisbehavingOptions, MisbehavingRobot
 
-from gait_entrainment.commands import main
 from gait_entrainment.robot import AnkleRobot, find_driver
 from gait_entrainment.robot.drivers import OWN_DRIVERS, Driver
+from gait_entrainment_commands import main
 from gait_entrainment_drivers.conformance import checks
 from gait_entrainment_drivers.conformance.bench import DriverBench, Tolerances, run_check
 from gait_entrainment_drivers.conformance.checks import CHECKS

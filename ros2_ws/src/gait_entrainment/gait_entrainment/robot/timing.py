@@ -14,7 +14,6 @@ from bisect import bisect_left, insort
 from collections.abc import Sequence
 from dataclasses import dataclass
 from operator import attrgetter
-from typing import Any
 
 from gait_entrainment.conventions import nanoseconds
 from gait_entrainment.robot.contract import RobotState
@@ -179,27 +178,6 @@ class MeasuredOnsets:
 def lateness_ms(timings: Sequence[PulseTiming], kind: str) -> list[float]:
     """Return by how many ms pulses were "sent" or "measured" after their command, ascending."""
     return sorted(late for timing in timings if (late := timing.late_ms(kind)) is not None)
-
-
-def distribution(
-    timings: Sequence[PulseTiming], kind: str, stride: float
-) -> dict[str, Any] | None:
-    """
-    Return how late the "sent" or "measured" onsets came; None if no pulse shows one.
-
-    Percentages are of a stride [s], None if that is NaN: unknown.
-    """
-    late = lateness_ms(timings, kind)
-    if not late:
-        return None
-    figures = {"median": quantile(late, 0.5), "p99": quantile(late, 0.99), "worst": late[-1]}
-    unknown = math.isnan(stride)
-    return {
-        "pulses": len(late),
-        "missing": sum(not timing.sham for timing in timings) - len(late),
-        **{f"{name}_ms": ms for name, ms in figures.items()},
-        **{f"{n}_percent": None if unknown else ms / stride / 10 for n, ms in figures.items()},
-    }
 
 
 def quantile(ascending: Sequence[float], share: float) -> float:

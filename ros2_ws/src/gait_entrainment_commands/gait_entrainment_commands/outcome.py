@@ -5,26 +5,16 @@
 
 import math
 import statistics
-from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, replace
-from itertools import chain
+from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
-from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
-from gait_entrainment.experiment import BlockRun
-from gait_entrainment.gait import (
-    Analysis,
-    GaitEvent,
-    Hole,
-    Reason,
-    Stride,
-    Verdict,
-    VerdictSettings,
-    analyze,
-)
-from gait_entrainment.protocol import Block, Protocol, content_of
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind
+from gait_entrainment.gait import Analysis, GaitEvent, Hole, Reason, Verdict
+from gait_entrainment.protocol import Protocol, content_of
 from gait_entrainment.robot import PulseTiming
-from gait_entrainment.robot.timing import distribution
+from gait_entrainment.robot.timing import lateness_ms, quantile
+from gait_entrainment.run import Run
 
 # Pulses whose lags make up the final one: the paper's locked gait repeats itself exactly.
 FINAL_PULSES = 5
@@ -40,102 +30,6 @@ _MEANINGS = {
     "baseline_unknown": "fewer than two complete strides before the first pulse to compare with",
     "not_one_to_one": "only pulses at about one a stride are analyzed",
 }
-
-
-def settings_for(
-    plans: Iterable[Block], settings: VerdictSettings | None = None
-) -> VerdictSettings | None:
-    """
-    Return the settings of a verdict about pulses that some blocks plan.
-
-    Pulses by phase follow the gait: that their lag stays put shows nothing, whatever their period.
-    """
-    if not any(plan.pulses.phase is not None for plan in plans):
-        return settings
-    return replace(settings or VerdictSettings(), smallest_difference=1.0)
-
-
-@dataclass(frozen=True)
-class JudgedBlock:
-    """One block of a run, analyzed by itself, against its own baseline."""
-
-    name: str
-    first_stride: int
-    last_stride: int | None  # None if it did not end
-    measured_period: float  # mean stride period over its baseline [s]; NaN if unknown
-    pulse_period: float  # as planned [s]; NaN if unknown, or by phase
-    analysis: Analysis
-
-
-def analyze_blocks(
-    blocks: Sequence[BlockRun],
-    events: Sequence[GaitEvent],
-    onsets: Sequence[int],
-    side: Side,
-    settings: VerdictSettings | None = None,
-    unknown: Sequence[tuple[int, int]] = (),
-) -> tuple[Analysis, tuple[JudgedBlock, ...]]:
-    """
-    Analyze a run, and each of its blocks, unless its protocol is one of fixed length.
-
-    As ``analyze``; ``blocks`` are those of a conductor that has seen the events. With
-    blocks, pulses, verdicts and holes of the run are those of its blocks.
-    """
-    plans = [block.plan for block in blocks]
-    whole = analyze(events, onsets, side, settings_for(plans, settings), unknown)
-    if len(blocks) <= 1 and not any(block.plan.open_ended for block in blocks):
-        return whole, ()
-    judged = []
-    for block in blocks:
-        start = block.start or 0
-        end = math.inf if block.end is None else block.end
-        analysis = analyze(
-            [event for event in events if start <= event.stamp <= end],
-            [onset for onset in onsets if start <= onset < end],
-            side,
-            settings_for([block.plan], settings),
-            [hole for hole in unknown if start < hole[1] and hole[0] < end],
-            block.strides_before,
-        )
-        strides = [stride.number for stride in analysis.strides if stride.end == end]
-        judged.append(
-            JudgedBlock(
-                name=block.plan.name,
-                first_stride=block.strides_before + 1,
-                last_stride=strides[0] if strides else None,
-                measured_period=block.measured_period,
-                pulse_period=block.pulse_period,
-                analysis=analysis,
-            )
-        )
-    parts = [block.analysis for block in judged]
-    pulses, entrainments, holes = (
-        tuple(chain.from_iterable(getattr(part, name) for part in parts))
-        for name in ("pulses", "entrainments", "holes")
-    )
-    return replace(whole, pulses=pulses, entrainments=entrainments, holes=holes), tuple(judged)
-
-
-@dataclass(frozen=True)
-class Run:
-    """What a simulated and a recorded run have in common; stamps are integer nanoseconds."""
-
-    protocol: Protocol | None  # None if nobody told it
-    events: tuple[GaitEvent, ...]  # in the order in which they came
-    onsets: tuple[int, ...]  # of the pulses
-    timings: tuple[PulseTiming, ...]  # commanded, sent and measured onset of each pulse
-    measured_period: float  # mean stride period before the pulses [s]; NaN if unknown
-    pulse_period: float  # as planned, without a protocol as seen [s]; NaN if unknown
-    analysis: Analysis
-    blocks: tuple[JudgedBlock, ...]  # none if the protocol is one of a fixed number of strides
-
-    @property
-    def strides(self) -> list[Stride]:
-        """The strides of the protocol, which more may follow; without a protocol, all."""
-        last = math.inf if self.protocol is None else self.protocol.strides
-        if self.blocks:
-            last = self.blocks[-1].last_stride or math.inf
-        return [stride for stride in self.analysis.strides if stride.number <= last]
 
 
 def outcome_of(run: Run) -> dict[str, Any]:
@@ -331,6 +225,27 @@ def timing_outcome(timings: Sequence[PulseTiming], stride: float) -> dict[str, A
         "each_ms": [
             {kind: timing.late_ms(kind) for kind in ("sent", "measured")} for timing in timings
         ],
+    }
+
+
+def distribution(
+    timings: Sequence[PulseTiming], kind: str, stride: float
+) -> dict[str, Any] | None:
+    """
+    Return how late the "sent" or "measured" onsets came; None if no pulse shows one.
+
+    Percentages are of a stride [s], None if that is NaN: unknown.
+    """
+    late = lateness_ms(timings, kind)
+    if not late:
+        return None
+    figures = {"median": quantile(late, 0.5), "p99": quantile(late, 0.99), "worst": late[-1]}
+    unknown = math.isnan(stride)
+    return {
+        "pulses": len(late),
+        "missing": sum(not timing.sham for timing in timings) - len(late),
+        **{f"{name}_ms": ms for name, ms in figures.items()},
+        **{f"{n}_percent": None if unknown else ms / stride / 10 for n, ms in figures.items()},
     }
 
 
