@@ -171,8 +171,8 @@ class Conductor:
         the promise before was made, and no lookahead is longer than the shortest stride that
         entered the measured period: so no promise covers an onset that is not yet planned. If the
         latest stride was that short and changes the mean, the onset is put off to the promise's
-        end. A pulse at phase P lies P predicted periods after its strike; the lookahead is P times
-        the shortest period that can be predicted there, as far as strides are believed at all.
+        end. A pulse at phase P lies P predicted periods after its strike, and no lookahead is longer
+        than the least that this can be, as far as strides are believed at all.
         The run ends at a fixed distance after its closing strike, which no promise made before
         that strike can have passed: the end does not depend on how the run was cut into grants.
 
@@ -183,9 +183,7 @@ class Conductor:
         walking = self.block.train is not None and self._resting_until is None
         if walking and (stopped := self._tracker.watch.stopped(known_until)):
             raise GaitError(stopped)
-        lookahead, phase = self._lookahead, self.block.plan.pulses.phase
-        if phase is not None and self.block.baseline and self.block.pulses_left:
-            lookahead = min(lookahead, phase * self._least_prediction())
+        lookahead = min(self._lookahead, self._lookahead_by_phase())
         self._promised = max(self._promised, known_until + nanoseconds(lookahead))
         return Horizon(known_until + nanoseconds(lookahead), last=False)
 
@@ -274,13 +272,19 @@ class Conductor:
         """Return the stride periods [s] whose mean is the prediction of the next one."""
         return list(self._recent)[-PREDICTED_FROM:]
 
-    def _least_prediction(self) -> float:
-        """Return the shortest period [s] that can be predicted once another stride is believed."""
-        periods = self._predicted()
-        if not periods:
-            return self._shortest
-        share = self._limits.stride_change / min(len(periods) + 1, PREDICTED_FROM)
-        return min(periods) * (1 - share)
+    def _lookahead_by_phase(self) -> float:
+        """Return how far [s] a promise may go, so that it covers no pulse by phase to come."""
+        phase = self.block.plan.pulses.phase
+        if phase is None or not self.block.pulses_left:
+            return math.inf
+        periods = self._predicted() or [self._shortest]
+        # The next stride, as short as can be believed, changes the mean by its share.
+        change, share = self._limits.stride_change, 1 / min(len(periods) + 1, PREDICTED_FROM)
+        lookahead = phase * min(periods) * (1 - change * share)
+        if self.block.baseline:
+            return lookahead
+        # The strike that ends the baseline is not known: a whole stride lies before the pulse.
+        return max(lookahead, (1 + phase) * min(periods) * (1 - change))
 
     def _plan_by_phase(self, strike: int) -> PulseTrain:
         """Plan the pulse of the stride that starts with a strike [ns]."""

@@ -127,7 +127,7 @@ def summary(outcome: dict[str, Any]) -> str:
     parameters = outcome["parameters"] or {}
     plan = parameters.get("pulses")
     strides, pulses = outcome["stride_period"], outcome["pulses"]
-    unperturbed, period = outcome["unperturbed_stride_period"], outcome["perturbation_period"]
+    unperturbed = outcome["unperturbed_stride_period"]
     lines = [f"strides          {len(strides)}, pulses placed in them: {len(pulses)}"]
     if plan and len(pulses) != plan["count"]:
         lines[0] += f" of {plan['count']}"
@@ -141,10 +141,9 @@ def summary(outcome: dict[str, Any]) -> str:
     if strides:
         measured = "not measured" if unperturbed is None else f"{unperturbed:.4f} s"
         lines.append(f"stride period    {measured} unperturbed, {strides[-1]:.4f} s last")
-    if period is not None:
-        shape = f"{plan['torque']:.2f} N m for {plan['width']:g} s " if plan else ""
-        offset = "" if unperturbed is None else f" ({(period - unperturbed) * 1e3:+.1f} ms)"
-        lines.append(f"pulses           {shape}every {period:.4f} s{offset}")
+    if timing := _timing(outcome, plan or {}):
+        shape = f"{plan['torque']:.2f} N m for {plan['width']:g} s" if plan else ""
+        lines.append(f"pulses           {shape}{timing if plan else timing.lstrip()}")
     lines.append(f"verdict          {_verdict(outcome)}")
     for stretch in outcome["stretches"][:-1]:
         lines.append(f"  until stride {stretch['last_stride']:<3} {stretch['verdict']}")
@@ -165,17 +164,23 @@ def _verdict(judged: dict[str, Any]) -> str:
 def _block_lines(number: int, block: dict[str, Any], plan: dict[str, Any]) -> list[str]:
     """Return what was done in a block, and what came of it."""
     last = block["last_stride"] or "the end"
-    unperturbed, period = block["unperturbed_stride_period"], block["perturbation_period"]
     told = f"block {number:<11}{block['name']}: strides {block['first_stride']} to {last}"
     if not plan["count"]:
         return [f"{told}, no pulses"]
-    timing = "" if period is None else f" every {period:.4f} s"
-    if period is not None and unperturbed is not None:
-        timing += f" ({(period - unperturbed) * 1e3:+.1f} ms)"
-    if plan.get("phase") is not None:
-        timing = f" at phase {plan['phase']:g}"
-    pulses = f"{block['pulses']} pulses of {plan['torque']:.2f} N m{timing}"
+    pulses = f"{block['pulses']} pulses of {plan['torque']:.2f} N m{_timing(block, plan)}"
     return [f"{told}, {pulses}", f"{'':17}{_verdict(block)}"]
+
+
+def _timing(judged: dict[str, Any], plan: dict[str, Any]) -> str:
+    """Return when the pulses of a run or a block came, after a blank; empty if that is unknown."""
+    unperturbed, period = judged["unperturbed_stride_period"], judged["perturbation_period"]
+    if plan.get("phase") is not None:
+        return f" at phase {plan['phase']:g}"
+    if period is None:
+        return ""
+    offset = "" if unperturbed is None else f" ({(period - unperturbed) * 1e3:+.1f} ms)"
+    sweep = f", changing by {plan['sweep'] * 1e3:+g} ms" if plan.get("sweep") else ""
+    return f" every {period:.4f} s{offset}{sweep}"
 
 
 def _doubt_lines(outcome: dict[str, Any]) -> list[str]:

@@ -188,8 +188,9 @@ def _merged(entries: Mapping[str, _Entry], replacing: Mapping[str, _Entry]) -> d
 def _build(kind: type[_B], entries: Mapping[str, _Entry]) -> _B:
     """Return a block or a whole protocol from what is said of it."""
     sections: dict[str, dict[str, Any]] = {"": {}}
+    rules = BLOCK_FIELDS if kind is Block else FIELDS
     for key, (value, where) in entries.items():
-        rule, (section, _, name) = FIELDS[key], key.rpartition(".")
+        rule, (section, _, name) = rules[key], key.rpartition(".")
         try:
             # YAML 1.1 reads 1e-3, which has no dot, as a text.
             read = rule.parse(key, value) if isinstance(value, str) else rule.check(key, value)
