@@ -198,7 +198,7 @@ class Block:
     time has passed and until the strides are steady.
     """
 
-    name: str = setting("", "name of the block")
+    name: str = setting("block", "name of the block", plain=True)
     baseline: int = setting(15, "unperturbed strides before the pulses", within=(1, _MOST))
     pulses: PulsePlan = field(default_factory=PulsePlan)
     washout: int = setting(15, "strides after the strides of the pulses", within=(0, _MOST))
