@@ -38,4 +38,4 @@ def test_pages_show_an_example(pages, page, program):
 
 
 def test_nothing_else_is_public(pages):
-    assert not [page for page in pages if "commands" in page or "walker" in page]
+    assert not [page for page in pages if "options" in page or "walker" in page]

@@ -172,7 +172,9 @@ class Conductor:
         entered the measured period: so no promise covers an onset that is not yet planned. If the
         latest stride was that short and changes the mean, the onset is put off to the promise's
         end. A pulse at phase P lies P predicted periods after its strike, and no lookahead is
-        longer than the least that this can be, as far as strides are believed at all. The run ends at a fixed distance after its closing strike, which no promise made before
+        longer than the least that this can be, as far as strides are believed at all.
+
+        The run ends at a fixed distance after its closing strike, which no promise made before
         that strike can have passed: the end does not depend on how the run was cut into grants.
 
         Raises GaitError if pulses are planned and nobody walks any more.

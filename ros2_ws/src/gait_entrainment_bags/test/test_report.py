@@ -118,6 +118,7 @@ def test_a_run_without_pulses_or_strides_can_be_drawn_too(tmp_path):
         measured_period=math.nan,
         pulse_period=math.nan,
         analysis=analyze([], [], Side.RIGHT),
+        blocks=(),
         timings=(),
         torques=AnkleTorques(empty.astype(np.int64), empty, empty, empty),
         messages=0,
