@@ -14,7 +14,7 @@ from gait_entrainment_drivers.emulated import EmulatedAnkleRobot
 
 @dataclass(frozen=True)
 class OptionsWithoutMeaning:
-    speed: float = 1.0
+    rate: float = 1000.0
 
 
 def changed(train, changes):
@@ -255,7 +255,7 @@ class Hangs(IdealAnkleRobot):
 # Each with the checks that must catch it, and a word of the sentence.
 BROKEN = [
     (NoPeakTorque, "construction", "peak_torque is 0"),
-    (UnexplainedOptions, "construction", "speed does not tell its meaning"),
+    (UnexplainedOptions, "construction", "rate does not tell its meaning"),
     (CannotReconnect, "lifecycle", "port is still open"),
     (CannotReconnect, "reconnecting", "port is still open"),
     (FailsToDeactivate, "lifecycle", "Deactivating failed: driver_failed"),
