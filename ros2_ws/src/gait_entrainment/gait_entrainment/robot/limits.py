@@ -66,16 +66,16 @@ class DeviceLimits:
     duration: float = setting(0.5, "longest duration of a pulse", "s", (0.001, 10.0))
     rate: float = setting(
         0.0,
-        "steepest flank of a pulse, which becomes a ramp; 0 leaves it square",
+        "steepest flank of a pulse; a square one gets such flanks; 0 leaves it square",
         "N m/s",
         (0.0, 1e6),
     )
     impulse: float = setting(15.0, "largest angular impulse within a stride", "N m s", (0.0, 1e3))
     rising: int = setting(
-        0, "first pulses of a train, which rise in equal steps to its height", "1", (0, 1000)
+        0, "first pulses after a pause, which rise in equal steps to their height", "1", (0, 1000)
     )
     pulses_per_minute: float = setting(
-        600.0, "most pulses in a minute, by the period of a train", "1/min", (1.0, 6000.0)
+        600.0, "most pulses in a minute, by the interval of two", "1/min", (1.0, 6000.0)
     )
     session_pulses: int = setting(
         _NO_LIMIT, "most pulses from when the node was started", "1", (0, _NO_LIMIT)
