@@ -22,12 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.experiment import Conductor, GaitError
+from gait_entrainment.experiment import BlockRun, Conductor, GaitError
 from gait_entrainment.gait import Analysis, GaitEvent, Stride, VerdictSettings, analyze
 from gait_entrainment.gait.analyzer import Result
-from gait_entrainment.outcome import Run, outcome_of, timing_outcome
 from gait_entrainment.protocol import Protocol, ProtocolError, read_protocol
 from gait_entrainment.robot import MeasuredOnsets, TorqueProfile
+from gait_entrainment.run import Run, analyze_blocks, settings_for
 from gait_entrainment_bags import messages, topic_names
 from gait_entrainment_bags.decoding import decoder_for
 from gait_entrainment_bags.errors import BagError
@@ -36,6 +36,7 @@ from gait_entrainment_bags.mcap_records import BagMessage
 from gait_entrainment_bags.reader import BagReader
 from gait_entrainment_bags.recovery import RECOVERY_KEY
 from gait_entrainment_bags.writer import ENDED_EARLY
+from gait_entrainment_commands.outcome import outcome_of, timing_outcome
 
 # Strides of which the ankle torque is drawn: more would not be told apart in a figure. Those while
 # a lock forms are drawn one by one, the latest of them if they are many.
@@ -109,11 +110,14 @@ def read_run(
             raise BagError(f"{path}: its onset is {live_onset!r}; allowed: {', '.join(onsets)}")
         live_side = _side_in(bag, topic_names.STRIDES)
         live_side = side if live_side is None else live_side
-        live, analysis = (
-            analyze(record.events, onsets[kind], leg, settings, record.unknown)
-            for kind, leg in ((live_onset, live_side), (onset or live_onset, side))
+        told = settings_for(protocol.sequence if protocol else (), settings)
+        live = analyze(record.events, onsets[live_onset], live_side, told, record.unknown)
+        blocks = _conducted(protocol, record.events) if protocol else ()
+        begun = onsets[onset or live_onset]
+        analysis, judged = analyze_blocks(
+            blocks, record.events, begun, side, settings, record.unknown
         )
-        measured_period, pulse_period = _periods(protocol, record.events, analysis)
+        measured_period, pulse_period = _periods(blocks, analysis)
         run = RecordedRun(
             protocol=protocol,
             name=Path(path).stem if protocol is None else protocol.name,
@@ -123,6 +127,7 @@ def read_run(
             measured_period=measured_period,
             pulse_period=pulse_period,
             analysis=analysis,
+            blocks=judged,
             timings=tuple(record.timings),
             onset=live_onset,
             differences=record.differences_from(live, live_side),
@@ -173,20 +178,23 @@ def _side_in(bag: BagReader, relative: str) -> Side | None:
     return None
 
 
-def _periods(
-    protocol: Protocol | None, events: Sequence[GaitEvent], analysis: Analysis
-) -> tuple[float, float]:
-    """Return unperturbed and pulse period [s]: as a protocol plans them, else as analyzed."""
-    if protocol is None:
-        last = analysis.entrainments[-1] if analysis.entrainments else None
-        return (last.unperturbed_period, last.pulse_period) if last else (math.nan, math.nan)
+def _conducted(protocol: Protocol, events: Sequence[GaitEvent]) -> Sequence[BlockRun]:
+    """Return the blocks of a protocol, as they were planned on a walk."""
     conductor = Conductor(protocol)
     try:
         for event in events:
             conductor.add_event(event)
     except (GaitError, ProtocolError):
         pass  # too few events are left to plan by: the periods stay unknown
-    return conductor.measured_period, conductor.pulse_period
+    return conductor.blocks
+
+
+def _periods(blocks: Sequence[BlockRun], analysis: Analysis) -> tuple[float, float]:
+    """Return unperturbed and pulse period [s]: as a protocol plans them, else as analyzed."""
+    if blocks:
+        return blocks[-1].measured_period, blocks[-1].pulse_period
+    last = analysis.entrainments[-1] if analysis.entrainments else None
+    return (last.unperturbed_period, last.pulse_period) if last else (math.nan, math.nan)
 
 
 def _lost(bag: BagReader) -> int | None:

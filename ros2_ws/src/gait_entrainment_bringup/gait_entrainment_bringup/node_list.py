@@ -20,6 +20,7 @@ from gait_entrainment.conventions import Side
 from gait_entrainment.gait import GaitLimits
 from gait_entrainment.protocol import Protocol, said_limits, write_protocol
 from gait_entrainment.robot import find_driver
+from gait_entrainment.run import settings_for
 from gait_entrainment_bags import BagError, BagReader
 from gait_entrainment_bags.recorded_run import protocol_and_side
 from gait_entrainment_bringup.provenance import provenance
@@ -115,12 +116,10 @@ def parameters(
             "seed": protocol.seed,
             "armed": armed,
             "unproved": unproved,
-            "planned.torque": abs(protocol.pulse_torque),
-            "planned.duration": protocol.pulses.width,
-            "planned.count": protocol.pulses.count,
+            **{f"planned.{name}": value for name, value in asdict(protocol.planned).items()},
             **{f"limits.{name}": value for name, value in said_limits(protocol).items()},
         },
-        "gait_analyzer": {"side": side, "onset": onset},
+        "gait_analyzer": {"side": side, "onset": onset, **_verdict(protocol)},
         "experiment": {
             "participants": [n for n in NODES if n != "experiment" and (bag or n != RECORDER)]
         },
@@ -154,10 +153,19 @@ def gentle_limits(protocol: Protocol) -> dict[str, float]:
     # No two pulses closer than the shortest stride that is believed.
     most = 60 / GaitLimits().stride_least
     gentle: dict[str, float] = {"rising": RISING, "pulses_per_minute": most}
-    if protocol.pulse_torque:
-        rate = abs(protocol.pulse_torque) / (FLANK_SHARE * protocol.pulses.width)
-        gentle["rate"] = min(rate, 1e6)
+    rates = [
+        abs(block.torque(protocol.walker)) / (FLANK_SHARE * block.pulses.width)
+        for block in protocol.sequence
+    ]
+    if any(rates):
+        gentle["rate"] = min(max(rates), 1e6)
     return gentle | said_limits(protocol)
+
+
+def _verdict(protocol: Protocol | None) -> dict[str, Any]:
+    """Return what the analyzer must know of the protocol: whether there is something to test."""
+    told = settings_for(protocol.sequence if protocol else ())
+    return {"verdict.smallest_difference": told.smallest_difference} if told else {}
 
 
 def _drawn(protocol: Protocol) -> dict[str, Any]:
@@ -209,6 +217,7 @@ def replay_parameters(
             "side": side.name.lower(),
             "onset": onset,
             "use_sim_time": True,
+            **_verdict(protocol),
         },
     }
     if out is not None:

@@ -11,7 +11,7 @@ import tty
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from gait_entrainment.stop_channel import stop_all
+from gait_entrainment_drivers.stop_channel import stop_all
 from gait_entrainment_nodes.messaging.client import Client
 from gait_entrainment_nodes.messaging.errors import NodeError
 from gait_entrainment_nodes.messaging.topics import OPERATOR_HEARTBEAT

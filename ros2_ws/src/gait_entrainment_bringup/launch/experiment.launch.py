@@ -40,7 +40,7 @@ def nodes(context: LaunchContext) -> list[Action]:
         check_output(bag, "bag")
     elif shared.value(context, "bag"):
         raise shared.LaunchError("bag: there is none with recorder:=none; leave one of them out")
-    protocol.limits.check_pulse(protocol.pulse_torque, protocol.pulses.width)
+    protocol.check_limits()
     check_robot(protocol, real_time=real_time, **switches)
     given = parameters(protocol, bag, real_time=real_time, onset=onset, **switches)
     given["experiment"]["protocol"] = write_protocol(protocol)

@@ -7,12 +7,12 @@ import argparse
 import json
 from pathlib import Path
 
-from gait_entrainment.commands.outcome_options import add_outcome_options
-from gait_entrainment.drawing import add_dpi_option, chosen_dpi
-from gait_entrainment.outcome import summary, timing_summary
 from gait_entrainment_bags.commands.record_options import add_record_options, told_of_record
 from gait_entrainment_bags.figures import draw_figures
 from gait_entrainment_bags.recorded_run import messages_line, read_run, recorded_outcome
+from gait_entrainment_commands.drawing import add_dpi_option, chosen_dpi
+from gait_entrainment_commands.outcome import summary, timing_summary
+from gait_entrainment_commands.outcome_options import add_outcome_options
 
 DESCRIPTION = "Analyze a bag anew, and hold the result against what was published live."
 EXAMPLES = """examples:

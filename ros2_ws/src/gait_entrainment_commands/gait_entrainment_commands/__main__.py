@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The command ``entrain``, also ``python -m gait_entrainment``."""
+"""The command ``entrain``, also ``python -m gait_entrainment_commands``."""
 
 import gc
 import sys
 from collections.abc import Sequence
 
-from gait_entrainment import commands
+import gait_entrainment_commands
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -16,7 +16,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # while it is loaded and once more at the end, takes a sixth of a short command.
     gc.set_threshold(100_000)
     try:
-        return commands.main(arguments)
+        return gait_entrainment_commands.main(arguments)
     finally:
         gc.freeze()
 

@@ -28,8 +28,9 @@ from gait_entrainment.errors import EntrainmentError
 ENTRY_POINTS = "gait_entrainment.commands"
 COMMANDS = {
     "simulate": "the experiment in one process, without ROS",
-    "stop": "torque to zero, latched, for every ankle robot that this machine drives",
 }
+# Where to look first: to search all packages takes longer than these commands, and stop hurries.
+_FOUND_AT_ONCE = {"simulate": __name__, "stop": "gait_entrainment_drivers.commands"}
 _DESCRIPTION = "Rehearse, run and analyze entrainment experiments."
 
 
@@ -94,8 +95,10 @@ def make_parser(name: str = "") -> argparse.ArgumentParser:
     """Return the parser of the command line; only the command of this name is loaded."""
     parser = _Parser(prog="entrain", description=_DESCRIPTION)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    # A command of the core does not search the other packages: that takes longer than to run it.
-    packages = {__name__: COMMANDS} if name in COMMANDS else _find_packages()
+    package = _FOUND_AT_ONCE.get(name)
+    packages = (
+        {package: importlib.import_module(package).COMMANDS} if package else _find_packages()
+    )
     for package, found in packages.items():
         for command, purpose in found.items():
             options = commands.add_parser(command, help=purpose)
@@ -117,7 +120,7 @@ def add_command(parser: argparse.ArgumentParser, module_name: str) -> None:
 
 def _find_packages() -> dict[str, dict[str, str]]:
     """Return the commands with their purposes, by the package that they are in."""
-    # Loaded here: a command of the core does without, and entrain stop is in a hurry.
+    # Loaded here: what is found at once does without.
     from importlib.metadata import entry_points
 
     points = sorted(entry_points(group=ENTRY_POINTS), key=lambda point: point.name)

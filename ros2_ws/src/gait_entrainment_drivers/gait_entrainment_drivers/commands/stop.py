@@ -8,7 +8,7 @@ import json
 import sys
 from dataclasses import asdict
 
-from gait_entrainment.stop_channel import stop_all
+from gait_entrainment_drivers.stop_channel import stop_all
 
 DESCRIPTION = (
     "Bring the torque of every ankle robot that this machine drives to zero, latched, and say "

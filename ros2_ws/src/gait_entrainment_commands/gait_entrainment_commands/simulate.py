@@ -7,10 +7,10 @@ import argparse
 import json
 import sys
 
-from gait_entrainment.commands.outcome_options import add_outcome_options
-from gait_entrainment.commands.protocol_options import add_protocol_options, chosen_protocol
-from gait_entrainment.outcome import outcome_of, summary, timing_outcome, timing_summary
 from gait_entrainment.simulation import simulate
+from gait_entrainment_commands.outcome import outcome_of, summary, timing_outcome, timing_summary
+from gait_entrainment_commands.outcome_options import add_outcome_options
+from gait_entrainment_commands.protocol_options import add_protocol_options, chosen_protocol
 
 DESCRIPTION = "Conduct a protocol on the simulated walker, in one process."
 EXAMPLES = """examples:

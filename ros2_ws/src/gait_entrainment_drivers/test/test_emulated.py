@@ -27,7 +27,7 @@ def robot(options, seed=0):
 
 
 def train(count=1, period=0.5, torque=10.0, duration=0.2):
-    return PulseTrain(Side.LEFT, 100 * MS, period, count, torque, duration)
+    return PulseTrain.periodic(Side.LEFT, 100 * MS, period, count, torque, duration)
 
 
 def pieces(profiles):

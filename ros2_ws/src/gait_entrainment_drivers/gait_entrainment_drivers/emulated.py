@@ -104,8 +104,8 @@ class EmulatedAnkleRobot(SimulatedRobot):
     def schedule(self, train: PulseTrain) -> None:
         """Take over a train; how late each of its pulses will come is drawn here."""
         super().schedule(train)
-        late = self._jitter.random(train.count) * self._options.jitter
-        self._late = [round(seconds * 1e9) for seconds in late]
+        late = self._jitter.random(len(train.pulses)) * self._options.jitter
+        self._late += [round(seconds * 1e9) for seconds in late]
 
     def cancel(self) -> None:
         """Drop the train; the torque is zero at once."""
@@ -150,11 +150,9 @@ class EmulatedAnkleRobot(SimulatedRobot):
         number = train.latest(instant)
         if number < 0:
             return 0.0
-        elapsed = instant - train.onset(number) - self._late[number]
-        if elapsed < 0 and number > 0:  # the pulse before may come so late that it is still on
-            number -= 1
-            elapsed = instant - train.onset(number) - self._late[number]
-        return train.shape(number, elapsed)
+        if instant < train.onsets[number] + self._late[number] and number > 0:
+            number -= 1  # the pulse before may come so late that it is still on
+        return train.pulses[number].torque_at(instant - self._late[number])
 
 
 class _Draws:

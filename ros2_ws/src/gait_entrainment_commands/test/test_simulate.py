@@ -10,7 +10,7 @@ import sys
 
 import pytest
 
-from gait_entrainment.commands import main
+from gait_entrainment_commands import main
 
 KEYS = {
     "unperturbed_stride_period",
@@ -148,7 +148,7 @@ def test_a_fall_is_told_and_is_exit_code_1(capsys):
 def test_simulating_loads_neither_ros_nor_matplotlib():
     """They take longer than the simulation."""
     code = (
-        "import sys, gait_entrainment.commands as c;"
+        "import sys, gait_entrainment_commands as c;"
         "c.main(['simulate', '--pulses', '2', '--washout', '1', '--baseline', '2']);"
         "print(sorted({'rclpy', 'matplotlib', 'scipy.stats', 'pandas'} & set(sys.modules)))"
     )

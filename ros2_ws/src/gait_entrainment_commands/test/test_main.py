@@ -9,7 +9,7 @@ import sys
 WITHOUT_NUMBA = """
 import sys
 sys.modules["numba"] = None
-from gait_entrainment.__main__ import main
+from gait_entrainment_commands.__main__ import main
 sys.exit(main(["simulate"]))
 """
 
