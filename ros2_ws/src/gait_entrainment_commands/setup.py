@@ -20,7 +20,5 @@ setup(
     install_requires=["setuptools"],
     extras_require={"test": ["pytest"]},  # so that colcon test runs pytest
     zip_safe=False,
-    entry_points={
-        "console_scripts": [f"entrain = {NAME}.__main__:main"],
-    },
+    scripts=["scripts/entrain"],
 )
