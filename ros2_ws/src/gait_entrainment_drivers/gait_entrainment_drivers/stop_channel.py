@@ -25,6 +25,8 @@ from pathlib import Path
 PREFIX = "gait_entrainment/stop/"
 _SOCKETS = Path("/proc/net/unix")
 _LARGEST_ANSWER = 4096
+# What the script `entrain` has done: the descriptor of its socket, and whom it has asked.
+_ASKED = "GAIT_ENTRAINMENT_STOP_ASKED"
 
 
 @dataclass(frozen=True)
@@ -97,21 +99,19 @@ def stop_all(patience: float = 0.5) -> dict[str, StopAnswer | None]:
     """
     Ask every robot of this machine to bring its torque to zero.
 
+    The script ``entrain`` has asked already; then its socket is taken over, and the answers read.
     Returns the answers by name; None for a robot that did not answer within ``patience`` [s].
     """
-    asker = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-    asker.setblocking(False)
-    asker.bind("")  # the kernel chooses an abstract name
+    if asked := os.environ.pop(_ASKED, ""):
+        descriptor, *names = asked.split()
+        asker = socket.socket(fileno=int(descriptor))
+    else:
+        asker = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        asker.setblocking(False)
+        asker.bind("")  # the kernel chooses an abstract name
+        names = [name for name in listening() if _ask(asker, name)]
     with asker:
-        answers: dict[str, StopAnswer | None] = {}
-        for name in listening():
-            answers[name] = None
-            try:
-                asker.sendto(b"stop", f"\0{PREFIX}{name}")
-            except ConnectionRefusedError:  # it has ended in between, and its torque with it
-                del answers[name]
-            except BlockingIOError:  # its queue is full: it has not listened for long
-                continue
+        answers: dict[str, StopAnswer | None] = dict.fromkeys(names)
         give_up = time.monotonic() + patience
         while None in answers.values() and (left := give_up - time.monotonic()) > 0:
             if select.select([asker], [], [], left)[0]:
@@ -119,3 +119,14 @@ def stop_all(patience: float = 0.5) -> dict[str, StopAnswer | None]:
                 sender = (address if isinstance(address, bytes) else address.encode())[1:].decode()
                 answers[sender.removeprefix(PREFIX)] = StopAnswer(**json.loads(data))
         return answers
+
+
+def _ask(asker: socket.socket, name: str) -> bool:
+    """Ask one robot; False if it has ended in between, and its torque with it."""
+    try:
+        asker.sendto(b"stop", f"\0{PREFIX}{name}")
+    except ConnectionRefusedError:
+        return False
+    except BlockingIOError:  # its queue is full: it has not listened for long
+        pass
+    return True
