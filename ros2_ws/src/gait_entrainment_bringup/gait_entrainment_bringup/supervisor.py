@@ -43,10 +43,15 @@ class Supervisor:
         self.folder, self._method = folder, method
         self._environment = dict(environment)
         self._processes: dict[str, BaseProcess] = {}
+        self._onlookers: set[str] = set()
 
-    def start(self, node: str, arguments: Sequence[str]) -> None:
-        """Start a node of the package."""
-        module = f"{PACKAGE}.nodes.{node}"
+    def start(
+        self, node: str, arguments: Sequence[str], package: str = f"{PACKAGE}.nodes"
+    ) -> None:
+        """Start a node, a module of a package; one of another package than ours only looks on."""
+        module = f"{package}.{node}"
+        if package != f"{PACKAGE}.nodes":
+            self._onlookers.add(node)  # it may end when it will
         self._processes[node] = start_node(
             self._method, module, arguments, self._log(node), self._environment
         )
@@ -60,6 +65,8 @@ class Supervisor:
         """Return ``ended``; NodeError if one has failed, or is not one that may end."""
         ended = self.ended()
         for node, code in ended.items():
+            if node in self._onlookers:
+                continue
             if code != 0 or node not in may_end:
                 raise NodeError(f"{node} ended unexpectedly with exit code {code}", node)
         return ended
