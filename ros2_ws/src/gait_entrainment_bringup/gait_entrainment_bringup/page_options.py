@@ -5,7 +5,6 @@
 
 import argparse
 import os
-import sys
 from typing import Any
 
 from gait_entrainment.errors import UsageError
@@ -40,7 +39,7 @@ def add_page_options(parser: argparse.ArgumentParser) -> None:
 
 def checked_page(options: argparse.Namespace, protocol: Protocol | None) -> dict[str, Any]:
     """
-    Return the node's parameters, put its tokens into the environment, and tell its addresses.
+    Return the node's parameters, and put its tokens into the environment.
 
     Raises UsageError.
     """
@@ -58,8 +57,6 @@ def checked_page(options: argparse.Namespace, protocol: Protocol | None) -> dict
     with listen(options.host, port) as listener:
         port = listener.getsockname()[1]
     os.environ.update(access.environment)
-    for what, address in access.addresses(port):
-        print(f"{what}: {address}", file=sys.stderr, flush=True)
     return {
         "host": options.host,
         "port": port,

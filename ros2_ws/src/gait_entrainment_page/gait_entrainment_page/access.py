@@ -15,6 +15,7 @@ import ipaddress
 import os
 import secrets
 import socket
+import sys
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -80,6 +81,11 @@ class Access:
             return [("page", base)]
         what = {ACT: "page, to act", LOOK: "page, to look on"}
         return [(what[role], f"{base}?token={token}") for token, role in self.tokens.items()]
+
+    def tell(self, port: int) -> None:
+        """Tell people the addresses, on standard error."""
+        for what, address in self.addresses(port):
+            print(f"{what}: {address}", file=sys.stderr, flush=True)
 
     def role(self, token: str) -> str:
         """Return what a token permits; an empty text if nothing."""

@@ -31,7 +31,7 @@ def period_chart(view: View, *, blinded: bool) -> Options:
     if strides and view.state is not None:
         first, last = strides[0][0], strides[-1][0]
         for name, value, color, dash in (
-            ("mean of the baseline", view.state.measured_period, GREY, "dotted"),
+            ("baseline", view.state.measured_period, GREY, "dotted"),
             ("pulse period", view.state.pulse_period, VERMILLION, "dashed"),
         ):
             if not math.isnan(value) and not (blinded and name == "pulse period"):
@@ -57,9 +57,10 @@ def lag_chart(view: View, *, blinded: bool) -> Options:
         series[0]["markArea"] = _shade({"yAxis": -stance}, {"yAxis": 0})
     low, high = _range(values, least=100.0)
     chart = _chart("stride", "ms", series, (low, high))
-    if view.strides:
-        per_cent = 0.1 / statistics.median([p for _, p in [*view.strides][-10:]])
+    if not math.isnan(view.period):
+        per_cent = 0.1 / view.period
         right = _axis("%", low * per_cent, high * per_cent)
+        chart["grid"]["right"] = 62
         chart["yAxis"].append(right | {"splitLine": {"show": False}})
         # ECharts shows an axis that a series uses.
         chart["series"].append({"type": "line", "yAxisIndex": 1, "data": [], "name": ""})
@@ -94,7 +95,7 @@ def _line(name: str, data: Points, color: str, dash: str = "solid", **more: Any)
 
 
 def _shade(begin: Options, end: Options) -> Options:
-    label = {"show": True, "position": "insideTopLeft", "color": GREEN, "fontSize": _FONT - 2}
+    label = {"show": True, "position": "insideBottomLeft", "color": GREEN, "fontSize": _FONT - 2}
     area = [{"name": "double stance", **begin}, end]
     style = {"color": GREEN, "opacity": 0.18}
     return {"silent": True, "itemStyle": style, "label": label, "data": [area]}
@@ -102,6 +103,7 @@ def _shade(begin: Options, end: Options) -> Options:
 
 def _range(values: list[float], least: float) -> tuple[float, float]:
     """Return a range that holds values with a margin, and is not shorter than ``least``."""
+    values = [value for value in values if math.isfinite(value)]
     if not values:
         return 0.0, 1.0
     low, high = min(values), max(values)
@@ -130,7 +132,7 @@ def _chart(across: str, up: str, series: list[Options], within: tuple[float, flo
     text = {"fontSize": _FONT, "color": BLACK}
     return {
         "animation": False,
-        "grid": {"left": 70, "right": 62, "top": 58, "bottom": 52},
+        "grid": {"left": 70, "right": 24, "top": 58, "bottom": 52},
         "legend": {
             "top": 0,
             "textStyle": text,

@@ -42,7 +42,7 @@ _HEARTBEAT = (
 
 class Page:
     """
-    The page, served from when it is made until it is closed; ``addresses`` say where.
+    The page, served from when it is made until it is closed; it tells people where.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class Page:
         ui.page("/", title="gait_entrainment")(self._show)
         ui.run_with(app, show_welcome_message=False, binding_refresh_interval=None, tailwind=False)
         self._server = Server(app, listener, access)
-        self.addresses = access.addresses(self._server.port)
+        access.tell(self._server.port)
 
     def close(self) -> None:
         """Serve no more."""
@@ -200,7 +200,7 @@ class Shown:
     def _panel(self, title: str, width: str) -> Any:
         panel = ui.element("section").classes(f"panel {width}")
         with panel:
-            ui.html(f"<h2>{title}</h2>", sanitize=False, tag="div")
+            ui.label(title).classes("title")
         return panel
 
     def _chart(self, title: str, width: str) -> None:
@@ -312,6 +312,8 @@ class Shown:
         if self.page.blinded:
             verdict, figures = "hidden", "This session is blinded."
         self._set("verdict", verdict)
+        word = verdict.partition(" ")[0]
+        self.labels["verdict"].classes(replace=f"verdict {word}")
         self._set("figures", figures)
         self._set("lag", "" if self.page.blinded else f"lag {view.lag()}")
         alarm = state.message if view.part == "failed" else ""

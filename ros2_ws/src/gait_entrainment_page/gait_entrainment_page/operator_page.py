@@ -12,7 +12,6 @@ is the operator's heartbeat, it publishes a sign of life for as long as the page
 import importlib
 import os
 import queue
-import sys
 import threading
 import time
 from collections.abc import Callable
@@ -42,6 +41,8 @@ MOST_AT_ONCE = 1000
 ANSWER_TIMEOUT = 3.0
 # Beyond this pace, against the wall clock, samples are not looked at: nobody could follow.
 FASTEST = 4.0
+# While it loads, which takes seconds: a third of the share of who walks or records.
+_NICENESS = 5
 # Instants of a run that differ from the wall clock by more are simulated or recorded [ns].
 _ANOTHER_TIME = 60 * NANOSECONDS_PER_SECOND
 
@@ -56,11 +57,11 @@ LOOKED_AT = (
     topics.OPERATOR_NOTES,
     topics.DIAGNOSTICS,
 )
-SAMPLED = {
-    topics.ROBOT_STATE: topics.LOOKING_ON,
+SAMPLED = (
+    (topics.ROBOT_STATE, topics.LOOKING_ON),
     # Only the latest posture is drawn.
-    topics.JOINT_STATES: topics.quality(1, reliable=False),
-}
+    (topics.JOINT_STATES, topics.quality(1, reliable=False)),
+)
 SERVICES = {
     "arm": (Trigger, "perturbator/arm"),
     "pause": (SetBool, "session/pause"),
@@ -108,9 +109,9 @@ class OperatorPage(Participant):
         self.offer(topics.OPERATOR_NOTES)
         if settings.heartbeat:
             self.offer(topics.OPERATOR_HEARTBEAT)
-        self._clients = {n: self.create_client(k, s) for n, (k, s) in SERVICES.items()}
+        self._services_asked = {n: self.create_client(k, s) for n, (k, s) in SERVICES.items()}
         self._wishes: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
-        self._readers: dict[topics.Topic, RawReader] = {}
+        self._readers: dict[str, tuple[topics.Topic, RawReader]] = {}
         for topic in LOOKED_AT:
             # A writer of the latest state overwrites: a reader that hangs does not hold it up.
             lasting = topic.qos is topics.LATEST_STATE
@@ -132,21 +133,19 @@ class OperatorPage(Participant):
             blinded=settings.blinded,
             record=settings.record,
         )
-        for what, address in self.page.addresses:
-            print(f"{what}: {address}", file=sys.stderr, flush=True)
 
     # Looking
 
     def _look_at(self, topic: topics.Topic, qos: Any) -> None:
-        self._readers[topic] = RawReader(self, topic.type, topic.name, qos)
+        self._readers[topic.name] = topic, RawReader(self, topic.type, topic.name, qos)
 
     def _follow(self, wanted: bool) -> None:
         """Look at the samples, or no longer."""
-        for topic, qos in SAMPLED.items():
-            if wanted and topic not in self._readers:
+        for topic, qos in SAMPLED:
+            if wanted and topic.name not in self._readers:
                 self._look_at(topic, qos)
-            elif not wanted and topic in self._readers:
-                self._readers.pop(topic).destroy()
+            elif not wanted and topic.name in self._readers:
+                self._readers.pop(topic.name)[1].destroy()
 
     def next_deadline(self) -> float:
         """Return when to take messages."""
@@ -161,7 +160,7 @@ class OperatorPage(Participant):
             self._wishes.get()()
         taken = [
             (received, topic, data)
-            for topic, reader in self._readers.items()
+            for topic, reader in self._readers.values()
             for received, data in reader.take(MOST_AT_ONCE)
         ]
         taken.sort(key=lambda message: message[0])
@@ -189,7 +188,7 @@ class OperatorPage(Participant):
 
     def offered(self) -> set[str]:
         """Return which of arm, pause and repeat somebody answers."""
-        return {name for name, client in self._clients.items() if client.service_is_ready()}
+        return {name for name, client in self._services_asked.items() if client.service_is_ready()}
 
     def arm(self) -> str:
         """Arm the robot; return the answer."""
@@ -224,7 +223,7 @@ class OperatorPage(Participant):
             answered.set()
 
         def ask() -> None:
-            self._clients[name].call_async(request).add_done_callback(on_answer)
+            self._services_asked[name].call_async(request).add_done_callback(on_answer)
 
         self._wishes.put(ask)
         if not answered.wait(ANSWER_TIMEOUT):
@@ -240,8 +239,8 @@ class OperatorPage(Participant):
 
 
 def _load() -> None:
-    """Load the web server, and let everybody else come first meanwhile."""
-    os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), 19)  # of this thread alone
+    """Load the web server, and let who has work to do come first meanwhile."""
+    os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)  # of this thread alone
     importlib.import_module("gait_entrainment_page.layout")
 
 

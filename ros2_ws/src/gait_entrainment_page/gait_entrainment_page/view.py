@@ -8,6 +8,7 @@ Messages go in, whoever decoded them; out come figures, sentences and the points
 Every history is bounded, so that the ten-thousandth stride costs what the first one did.
 """
 
+import contextlib
 import math
 import statistics
 import threading
@@ -24,6 +25,7 @@ from gait_entrainment.conventions import (
 )
 from gait_entrainment.gait.verdict import Reason, Verdict
 from gait_entrainment.outcome import MEANINGS
+from gait_entrainment.robot import DeviceError, find_driver
 from gait_entrainment_bags import topic_names as names
 from gait_entrainment_bags.messages import MessageError, event_of, state_of
 
@@ -40,6 +42,8 @@ PARTS = ("waiting", "baseline", "pulses", "washout", "finished", "failed", "rest
 STATUSES = ("inactive", "active", "stopped", "fault")
 _LEVELS = ("ok", "warning", "error", "stale")
 JOINTS = ("l_hip", "r_hip", "l_ankle", "r_ankle")
+# Limits that are told, with what follows the number.
+_LIMITS = {"torque": " N m", "duration": " s", "rate": " N m/s", "rising": " pulses"}
 _NAN = math.nan
 
 
@@ -90,6 +94,7 @@ class View:
         self.verdict: Any = None  # latest Entrainment
         self.robot: Any = None  # latest AnkleRobotState
         self.setup: Any = None  # latest AnkleRobotSetup
+        self._simulated = False
         self.legs: tuple[float, ...] = ()  # hips and ankles, left and right [rad]
         self.event: Any = None  # latest GaitEvent
         self.events = 0
@@ -183,6 +188,8 @@ class View:
 
     def _on_setup(self, message: Any) -> None:
         self.setup, self.side = message, Side(message.side)
+        with contextlib.suppress(DeviceError):  # a driver that is not installed here
+            self._simulated = find_driver(message.driver).simulated
 
     def _on_trouble(self, message: Any) -> None:
         self.troubles.append(message.message)
@@ -208,6 +215,12 @@ class View:
         """Whether a run has begun and not ended."""
         return self.state is not None and self.part not in ("finished", "failed")
 
+    @property
+    def period(self) -> float:
+        """Median period of the last strides [s]; NaN if unknown."""
+        last = [period for _, period in [*self.strides][-10:] if not math.isnan(period)]
+        return statistics.median(last) if last else _NAN
+
     def part_words(self) -> str:
         """Return the part of the protocol, and the block by its neutral name if it has several."""
         if self.state is None:
@@ -219,10 +232,11 @@ class View:
 
     def time_left(self) -> float:
         """Return how long the rest takes at the period of the last strides [s]; NaN if unknown."""
-        if not self.strides or not self.going_on:
-            return 0.0 if self.state and not self.going_on else _NAN
-        period = statistics.median(period for _, period in [*self.strides][-10:])
-        return max(self.state.strides - self.state.stride, 0) * period
+        if self.part == "finished":
+            return 0.0
+        if not self.going_on:
+            return _NAN
+        return max(self.state.strides - self.state.stride, 0) * self.period
 
     def lag(self) -> str:
         """Return the latest phase lag, and where in the stride it lies."""
@@ -260,23 +274,25 @@ class View:
         if self.robot is None:
             return "nothing heard of the robot"
         torque = self.robot.measured_torque
-        return "not measured" if math.isnan(torque) else f"{torque:+.2f} N m"
+        if math.isnan(torque):
+            return "not measured"
+        return _torque(torque) + (" (simulated)" if self._simulated else "")
 
     def robot_words(self) -> list[tuple[str, str]]:
         """Return what there is to say of the robot: names and values."""
         rows = [("state", "not heard")]
         if self.robot is not None:
             rows = [("state", STATUSES[min(self.robot.status, 3)])]
-            rows.append(("commanded", f"{self.robot.commanded_torque:+.2f} N m"))
+            rows.append(("commanded", _torque(self.robot.commanded_torque)))
             rows.append(("measured", self.measured()))
             rows.append(("faults", ", ".join(self.robot.faults) or "none"))
         if (setup := self.setup) is not None:
             limits = dict(zip(setup.limit_names, setup.limits, strict=False))
-            told = ("torque", "duration", "rate", "rising")
             rows.append(("driver", setup.driver.partition(":")[0]))
             rows.append(("armed by", setup.armed_by or "nobody"))
             rows.append(("watchdog", setup.watchdog or "not proved"))
-            rows.append(("limits", ", ".join(f"{n} {limits[n]:g}" for n in told if n in limits)))
+            told = [f"{n} {limits[n]:.4g}{u}" for n, u in _LIMITS.items() if n in limits]
+            rows.append(("limits", ", ".join(told)))
         return rows
 
     def sensor_words(self) -> list[tuple[str, str]]:
@@ -292,8 +308,8 @@ class View:
                 ("source", event.source),
                 ("detector", "none: exact events" if exact else event.detector),
                 ("uncertainty", "exact" if exact else f"{1e3 * event.uncertainty:.1f} ms"),
-                ("known after", f"{known / 1e6:.0f} ms"),
             ]
+            rows += [] if exact else [("known after", f"{known / 1e6:.0f} ms")]
         if len(self._strikes) > 1:
             span = (self._strikes[-1] - self._strikes[0]) / NANOSECONDS_PER_SECOND
             if span > 0:
@@ -309,3 +325,7 @@ class View:
             level = "stale" if stale else state.level
             rows.append((name, level, f"silent for {silent:.0f} s" if stale else state.message))
         return rows
+
+
+def _torque(value: float) -> str:
+    return f"{round(value, 2) + 0.0:+.2f} N m"  # no negative zero

@@ -32,6 +32,7 @@ from gait_entrainment_bringup.run_options import (
 from gait_entrainment_bringup.supervisor import supervised
 from gait_entrainment_drivers.signals import stop_on_signals
 from gait_entrainment_nodes.messaging.domain import claimed_domain
+from gait_entrainment_page.access import Access
 
 DESCRIPTION = "Start the nodes, conduct a protocol, record a bag, print the outcome."
 EXAMPLES = """examples:
@@ -98,6 +99,8 @@ def run_experiment(
                 supervisor.start(node, arguments)
         if options.page:
             supervisor.start(PAGE, arguments, "gait_entrainment_page")
+            access = Access.of_environment(options.host)
+            access.tell(given[PAGE]["port"])  # its own words go to its log
         # Not at the top: it loads ROS, and a mistake in the options is answered without.
         from gait_entrainment_bringup.run_client import SILENCE_TIMEOUT, conduct
 
