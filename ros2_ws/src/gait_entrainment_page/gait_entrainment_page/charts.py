@@ -145,7 +145,7 @@ def _chart(across: str, up: str, series: list[Options], within: tuple[float, flo
             "nameLocation": "middle",
             "nameGap": 30,
             "nameTextStyle": text,
-            "axisLabel": text,
+            "axisLabel": text | {"showMaxLabel": False},
             "minInterval": 1 if across == "stride" else 0,
             "min": "dataMin" if across == "stride" else 0,
             "max": "dataMax" if across == "stride" else 1,

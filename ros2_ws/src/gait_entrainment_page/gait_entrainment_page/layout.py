@@ -101,8 +101,10 @@ class Page:
         return {"done": stopped.done, "lines": stopped.lines}
 
     async def _alive(self, request: Request) -> dict[str, float]:
-        _, browser = state_of(request)
+        role, browser = state_of(request)
         watching = (await request.body()) == b'{"watching":true}'
+        if watching and role == ACT:
+            self.seat.offer(browser)
         self.seat.heard(browser, watching=watching)
         return {"now": 1e3 * time.time()}
 
@@ -110,8 +112,6 @@ class Page:
 
     def _show(self, request: Request) -> None:
         role, browser = state_of(request)
-        if role == ACT:
-            self.seat.offer(browser)
         ui.add_head_html(_HEAD)
         shown = Shown(self, browser, may_act=role == ACT)
         shown.build()

@@ -174,7 +174,7 @@ def test_whatever_comes_can_be_shown(messages):
             view.take("experiment/state", state(number % 7, 7, phase=number % 8))
         else:
             message = Message(header=header(at), run=1, side=number % 2, number=number)
-            message.start, message.period = stamp(at - PERIOD), abs(one) or 1.0
+            message.start, message.period = stamp(at - PERIOD), abs(one) + 1e-3
             view.take("gait/strides", message)
     assert view.part
     assert view.lag()

@@ -55,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
             pass
     set_environment(domain, real_time=options.real_time)
     given = checked_page(options, protocol)
-    given |= {"command": words, "record": str(Path.cwd()), "use_sim_time": False}
+    given |= {"command": words or [""], "record": str(Path.cwd()), "use_sim_time": False}
     if options.open:
         open_browser(given["port"])
     with tempfile.TemporaryDirectory(prefix="entrain_") as folder:

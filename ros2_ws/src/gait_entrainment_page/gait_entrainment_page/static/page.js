@@ -64,7 +64,7 @@ const entrain = { heartbeat: false, acting: false };
     const draw = canvas.getContext("2d");
     draw.setTransform(ratio, 0, 0, ratio, 0, 0);
     draw.clearRect(0, 0, width, height);
-    const length = 0.74 * height, foot = 0.22 * length, ground = height - 16;
+    const length = 0.7 * height, foot = 0.22 * length, ground = height - 16;
     const legs = [0, 1].map((side) => {
       const hip = angles[side], pitch = angles[2 + side] - hip; // of the foot, toe down positive
       const heel = [length * Math.sin(hip), -length * Math.cos(hip)];
