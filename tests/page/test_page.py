@@ -14,7 +14,8 @@ from pathlib import Path
 from browser import chromium
 from harness import QUICK, entrain_run, probe
 from pages import Look, free_port, page, request, until_served
-from time_to_zero import GONE, HEIGHT, WALK, emulated_motor, rows_of, wait_for_pulse
+from test_drivers import emulated_motor
+from time_to_zero import GONE, HEIGHT, WALK, rows_of, wait_for_pulse
 
 from gait_entrainment_bags import BagReader
 from gait_entrainment_bringup.node_list import NODES, PAGE
@@ -56,9 +57,8 @@ def test_a_run_is_started_noted_shared_reloaded_and_followed_to_its_end(tmp_path
 
 
 def test_a_page_that_dies_harms_no_run_and_stop_on_the_next_one_ends_the_torque(tmp_path, browser):
-    trace, port = tmp_path / "trace", free_port()
-    with emulated_motor("ak_motor_emulator", trace) as bus:
-        driver = f"ak_mit_can:interface=udp_multicast,channel=239.74.163.2,port={bus}"
+    port = free_port()
+    with emulated_motor(tmp_path) as (driver, trace):
         options = (f"--driver={driver}", *WALK, "--page", f"--port={port}")
         with entrain_run(tmp_path / "bag", *options) as run:
             domain = run.domain()

@@ -16,7 +16,7 @@ from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.staticfiles import StaticFiles
-from nicegui import run, ui
+from nicegui import ui
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment_page.access import ACT, Access, Seat, one_line
@@ -242,7 +242,7 @@ class Shown:
 
         async def seek(event: Any) -> None:
             instant = bag.start + round(event.args * NANOSECONDS_PER_SECOND)
-            await run.io_bound(bag.show, min(instant, bag.end))
+            await asyncio.to_thread(bag.show, min(instant, bag.end))
 
         with ui.element("div").classes("seek"):
             slider = ui.slider(min=0, max=round(seconds, 2), step=0.05, value=round(seconds, 2))
@@ -258,7 +258,7 @@ class Shown:
         if not self.acts:
             self.answer = "Another browser is the operator: take over first."
             return
-        done, answer = await run.io_bound(attempted, action)
+        done, answer = await asyncio.to_thread(attempted, action)
         self.answer = answer if done else f"Refused: {answer}"
 
     def _take_over(self) -> None:

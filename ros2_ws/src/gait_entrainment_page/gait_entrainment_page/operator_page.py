@@ -92,7 +92,7 @@ class OperatorPage(Participant):
 
     settings: Settings
     # It waits for nobody, but its turn does not come before that of others.
-    real_time = False  # type: ignore[assignment]
+    real_time = False
 
     def __init__(self) -> None:
         super().__init__("operator_page")

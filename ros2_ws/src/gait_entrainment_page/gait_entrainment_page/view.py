@@ -236,7 +236,7 @@ class View:
             return 0.0
         if not self.going_on:
             return _NAN
-        return max(self.state.strides - self.state.stride, 0) * self.period
+        return float(max(self.state.strides - self.state.stride, 0) * self.period)
 
     def lag(self) -> str:
         """Return the latest phase lag, and where in the stride it lies."""
