@@ -24,24 +24,15 @@ class Stopped:
     lines: tuple[str, ...]
 
 
-def stop() -> Stopped:
-    """Bring every robot of this machine to zero torque, as `entrain stop` does."""
-    answers = stop_all()
-    lines = [f"{name}: {a.message if a else 'no answer'}" for name, a in answers.items()]
-    done = bool(answers) and all(answer and answer.done for answer in answers.values())
-    if not answers:
-        lines = ["no robot is driven by this machine"]
-    elif not done:
-        lines.append("not everybody confirmed the stop: cut the power")
-    return Stopped(done, tuple(lines))
-
-
 class ActionError(EntrainmentError):
     """An action from the page that cannot be done now, or nobody answered."""
 
 
 class Robot(Protocol):
     """What the page asks of the nodes; a bag offers none of it."""
+
+    def stop(self) -> str:
+        """Stop a robot that another machine drives, over ROS; return the answer."""
 
     def arm(self) -> str:
         """Arm the robot; return the answer."""
@@ -56,7 +47,26 @@ class Robot(Protocol):
         """Have the session walk its last block again."""
 
     def offered(self) -> set[str]:
-        """Return which of arm, pause and repeat somebody answers."""
+        """Return which of stop, arm, pause and repeat somebody answers."""
+
+
+def stop(robot: Robot | None = None) -> Stopped:
+    """
+    Bring every robot of this machine to zero torque, as `entrain stop` does.
+
+    If this machine drives none, the ``robot`` of another one is asked over ROS.
+    """
+    answers = stop_all()
+    lines = [f"{name}: {a.message if a else 'no answer'}" for name, a in answers.items()]
+    done = bool(answers) and all(answer and answer.done for answer in answers.values())
+    if not answers:
+        if robot is None or "stop" not in robot.offered():
+            return Stopped(False, ("no robot is driven by this machine",))
+        done, answer = attempted(robot.stop)
+        lines = [f"asked over ROS: {answer}"]
+    if not done:
+        lines.append("not everybody confirmed the stop: cut the power")
+    return Stopped(done, tuple(lines))
 
 
 class Command:

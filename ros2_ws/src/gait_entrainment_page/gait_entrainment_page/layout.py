@@ -97,7 +97,7 @@ class Page:
 
     async def _stop(self) -> dict[str, Any]:
         """Stop every robot of this machine; whoever may look may stop."""
-        stopped = await asyncio.to_thread(stop)
+        stopped = await asyncio.to_thread(stop, self.robot)
         return {"done": stopped.done, "lines": stopped.lines}
 
     async def _alive(self, request: Request) -> dict[str, float]:

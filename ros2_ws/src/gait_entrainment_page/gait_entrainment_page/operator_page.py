@@ -63,6 +63,7 @@ SAMPLED = (
     (topics.JOINT_STATES, topics.quality(1, reliable=False)),
 )
 SERVICES = {
+    "stop": (Trigger, "perturbator/stop"),
     "arm": (Trigger, "perturbator/arm"),
     "pause": (SetBool, "session/pause"),
     "repeat": (Trigger, "session/repeat"),
@@ -187,8 +188,12 @@ class OperatorPage(Participant):
     # Acting, from the threads of the web server
 
     def offered(self) -> set[str]:
-        """Return which of arm, pause and repeat somebody answers."""
+        """Return which of stop, arm, pause and repeat somebody answers."""
         return {name for name, client in self._services_asked.items() if client.service_is_ready()}
+
+    def stop(self) -> str:
+        """Stop a robot that another machine drives, over ROS; return the answer."""
+        return self._ask("stop", Trigger.Request())
 
     def arm(self) -> str:
         """Arm the robot; return the answer."""
