@@ -45,13 +45,11 @@ class Supervisor:
         self._processes: dict[str, BaseProcess] = {}
         self._onlookers: set[str] = set()
 
-    def start(
-        self, node: str, arguments: Sequence[str], package: str = f"{PACKAGE}.nodes"
-    ) -> None:
-        """Start a node, a module of a package; one of another package than ours only looks on."""
-        module = f"{package}.{node}"
-        if package != f"{PACKAGE}.nodes":
-            self._onlookers.add(node)  # it may end when it will
+    def start(self, node: str, arguments: Sequence[str], onlooker_of: str = "") -> None:
+        """Start a node of the package, or one of another that only looks on: it may end."""
+        module = f"{onlooker_of or f'{PACKAGE}.nodes'}.{node}"
+        if onlooker_of:
+            self._onlookers.add(node)
         self._processes[node] = start_node(
             self._method, module, arguments, self._log(node), self._environment
         )
