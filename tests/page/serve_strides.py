@@ -24,5 +24,5 @@ page = Page(lambda: view, Seat(1.0), Access("127.0.0.1"), listen("127.0.0.1", po
 sys.stdin.readline()
 for number in range(101, 10_001):
     with view.lock:
-        walk(view, number, number, 10_000)
+        walk(view, number, number, 10_000, readings=2)
 threading.Event().wait()

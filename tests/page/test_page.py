@@ -20,7 +20,7 @@ NOTE = "slowed <b>down</b> at the end"
 
 
 def test_a_run_is_started_noted_shared_reloaded_and_followed_to_its_end(tmp_path, browser):
-    walk = (*QUICK, "--real-time", "--baseline=4", "--pulses=24", "--washout=2")
+    walk = (*QUICK, "--real-time", "--baseline=4", "--pulses=14", "--washout=2")
     bag = tmp_path / "bag"
     with (
         page(tmp_path, *walk, f"--out={bag}") as served,
@@ -31,15 +31,15 @@ def test_a_run_is_started_noted_shared_reloaded_and_followed_to_its_end(tmp_path
         other = Look(tablet, served.port)
         other.until("Another browser is the operator")
         operator.click("Start")
-        operator.until("entrain run has started", "of 30", "pulses")
+        operator.until("entrain run has started", "of 20", "pulses")
         operator.note(NOTE)
         operator.until(NOTE)  # as text, not as what it says in HTML
         browser.refresh()
-        operator.until("You are the operator", "of 30", NOTE)
+        operator.until("You are the operator", "of 20", NOTE)
         other.click("Take over")
         other.until("You are the operator")
         operator.until("Another browser is the operator")
-        other.until("finished", "30 of 30")
+        other.until("finished", "20 of 20")
         other.until("entrain run has ended with exit code 0")
         assert "no verdict yet" not in other.text
     with BagReader(bag) as reader:

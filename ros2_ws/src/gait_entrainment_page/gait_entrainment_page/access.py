@@ -104,7 +104,8 @@ class Access:
         try:
             ipaddress.ip_address(name)
         except ValueError:
-            return name in {self.host, "localhost", socket.gethostname(), socket.getfqdn()}
+            own = socket.gethostname()
+            return name in {self.host, "localhost", own, f"{own}.local"}
         return True
 
 

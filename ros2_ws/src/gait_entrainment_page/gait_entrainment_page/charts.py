@@ -75,7 +75,8 @@ def torque_chart(view: View, *, blinded: bool) -> Options:
     measured: Points = [[at, m] for at, _, m in view.torque if not math.isnan(m)]
     series = [_line("commanded", commanded, BLACK, "dashed", step="end")]
     if measured or not commanded:
-        series.append(_line("measured", measured, BLUE, step=False))
+        name = "computed (simulated robot)" if view.simulated else "measured"
+        series.append(_line(name, measured, BLUE, step=False))
         series[-1]["lineStyle"]["width"] = 3
     else:
         series[0]["name"] = "commanded (this robot measures none)"

@@ -94,7 +94,7 @@ class View:
         self.verdict: Any = None  # latest Entrainment
         self.robot: Any = None  # latest AnkleRobotState
         self.setup: Any = None  # latest AnkleRobotSetup
-        self._simulated = False
+        self.simulated = False  # the robot: what it measures is computed
         self.legs: tuple[float, ...] = ()  # hips and ankles, left and right [rad]
         self.event: Any = None  # latest GaitEvent
         self.events = 0
@@ -189,7 +189,7 @@ class View:
     def _on_setup(self, message: Any) -> None:
         self.setup, self.side = message, Side(message.side)
         with contextlib.suppress(DeviceError):  # a driver that is not installed here
-            self._simulated = find_driver(message.driver).simulated
+            self.simulated = find_driver(message.driver).simulated
 
     def _on_trouble(self, message: Any) -> None:
         self.troubles.append(message.message)
@@ -244,8 +244,10 @@ class View:
             return "no pulse yet"
         stride, lag = self.lags[-1]
         period = dict(self.strides).get(stride) or (self.strides[-1][1] if self.strides else _NAN)
-        percent = "" if math.isnan(period) else f" = {100 * lag / period:+.1f} % of the stride"
-        return f"{1e3 * lag:+.0f} ms{percent}"
+        percent = (
+            "" if math.isnan(period) else f" = {_signed(100 * lag / period, 1)} % of the stride"
+        )
+        return f"{_signed(1e3 * lag, 0)} ms{percent}"
 
     def verdict_words(self) -> tuple[str, str]:
         """Return the verdict, and its figures in a sentence."""
@@ -256,15 +258,15 @@ class View:
         word = verdict.name.lower()
         if verdict is Verdict.ENTRAINED:
             return f"entrained since stride {found.entrained_since_stride}", (
-                f"Over {found.window} pulses the lag moves by {1e3 * found.drift:+.2f} ms a"
-                f" stride; strides last {found.mean_period:.4f} s, pulses come every"
+                f"Over {found.window} pulses the lag moves by {_signed(1e3 * found.drift, 2)} ms"
+                f" a stride; strides last {found.mean_period:.4f} s, pulses come every"
                 f" {found.pulse_period:.4f} s."
             )
         meaning = MEANINGS[word if reason is Reason.NONE else reason.name.lower()]
         figures = ""
         if not math.isnan(found.drift):
             figures = (
-                f" The lag moves by {1e3 * found.drift:+.1f} ms a stride, give or take"
+                f" The lag moves by {_signed(1e3 * found.drift, 1)} ms a stride, give or take"
                 f" {1e3 * found.drift_interval:.1f}, over {found.window} pulses."
             )
         return word, f"{meaning[0].upper()}{meaning[1:]}.{figures}"
@@ -276,7 +278,7 @@ class View:
         torque = self.robot.measured_torque
         if math.isnan(torque):
             return "not measured"
-        return _torque(torque) + (" (simulated)" if self._simulated else "")
+        return _torque(torque) + (" (simulated)" if self.simulated else "")
 
     def robot_words(self) -> list[tuple[str, str]]:
         """Return what there is to say of the robot: names and values."""
@@ -289,9 +291,10 @@ class View:
         if (setup := self.setup) is not None:
             limits = dict(zip(setup.limit_names, setup.limits, strict=False))
             rows.append(("driver", setup.driver.partition(":")[0]))
-            rows.append(("armed by", setup.armed_by or "nobody"))
-            rows.append(("watchdog", setup.watchdog or "not proved"))
-            told = [f"{n} {limits[n]:.4g}{u}" for n, u in _LIMITS.items() if n in limits]
+            if not self.simulated:
+                rows.append(("armed by", setup.armed_by or "nobody"))
+                rows.append(("watchdog", setup.watchdog or "not proved"))
+            told = [f"{n} {limits[n]:.4g}{u}" for n, u in _LIMITS.items() if limits.get(n)]
             rows.append(("limits", ", ".join(told)))
         return rows
 
@@ -328,4 +331,9 @@ class View:
 
 
 def _torque(value: float) -> str:
-    return f"{round(value, 2) + 0.0:+.2f} N m"  # no negative zero
+    return f"{_signed(value, 2)} N m"
+
+
+def _signed(value: float, digits: int) -> str:
+    """Return a number with its sign, and so many digits; no negative zero."""
+    return f"{round(value, digits) + 0.0:+.{digits}f}"
