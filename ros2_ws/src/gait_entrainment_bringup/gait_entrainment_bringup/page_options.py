@@ -27,7 +27,7 @@ def add_page_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--heartbeat",
         action="store_true",
-        help="closing it ends the torque of a real robot: it is the operator's sign of life",
+        help="the page, not a terminal, is the operator's sign of life: closed, it ends the torque",
     )
     group.add_argument(
         "--blinded", action="store_true", help="do not show what would tell the condition"
@@ -37,14 +37,19 @@ def add_page_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def check_heartbeat(options: argparse.Namespace, protocol: Protocol | None) -> None:
+    """Raise UsageError if the page is to be a heartbeat that nothing heeds."""
+    if options.heartbeat and (protocol is None or find_driver(protocol.driver).simulated):
+        raise UsageError("--heartbeat: only a real robot heeds it; leave it out")
+
+
 def checked_page(options: argparse.Namespace, protocol: Protocol | None) -> dict[str, Any]:
     """
     Return the node's parameters, and put its tokens into the environment.
 
     Raises UsageError.
     """
-    if options.heartbeat and (protocol is None or find_driver(protocol.driver).simulated):
-        raise UsageError("--heartbeat: only a real robot heeds it; leave it out")
+    check_heartbeat(options, protocol)
     access = Access.of(options.host, options.token)
     port = _PORT.parse("--port", options.port)
     foxglove = _PORT.parse("--foxglove", options.foxglove)

@@ -74,11 +74,12 @@ class Command:
     ``entrain run`` or ``entrain preflight`` with the options of the page, one at a time.
 
     It is a process of its own: a run outlives the page that started it. ``words`` are the options;
-    without any, there is nothing to start.
+    without any, there is nothing to start. A run whose ``heartbeat`` is the page has none itself.
     """
 
-    def __init__(self, words: Sequence[str]) -> None:
+    def __init__(self, words: Sequence[str], *, heartbeat: bool = False) -> None:
         self.words = tuple(words)
+        self._of_run = ("--heartbeat",) if heartbeat else ()
         self._process: subprocess.Popen[bytes] | None = None
         self._output = tempfile.TemporaryFile()  # noqa: SIM115, as long as the page
         self.name = ""
@@ -98,13 +99,11 @@ class Command:
         self._output.seek(0)
         self._output.truncate()
         self._process = subprocess.Popen(
-            ["entrain", name, *self.words],
+            ["entrain", name, *self.words, *(self._of_run if name == "run" else ())],
             stdin=subprocess.DEVNULL,
             stdout=self._output,
             stderr=subprocess.STDOUT,
             start_new_session=True,
-            # Not at the page's priority, nor its place in the queue.
-            env=dict(os.environ),
         )
         return f"entrain {name} has started"
 

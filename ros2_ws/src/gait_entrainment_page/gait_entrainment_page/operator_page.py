@@ -129,7 +129,7 @@ class OperatorPage(Participant):
             access,
             listener,
             robot=self,
-            command=Command(settings.command),
+            command=Command(settings.command, heartbeat=settings.heartbeat),
             heartbeat=settings.heartbeat,
             blinded=settings.blinded,
             record=settings.record,

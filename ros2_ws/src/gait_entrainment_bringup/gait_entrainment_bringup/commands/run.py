@@ -22,7 +22,7 @@ from gait_entrainment_bringup.node_list import (
     STOP_ORDER,
     parameter_arguments,
 )
-from gait_entrainment_bringup.page_options import add_page_options, checked_page
+from gait_entrainment_bringup.page_options import add_page_options, check_heartbeat, checked_page
 from gait_entrainment_bringup.run_options import (
     add_run_options,
     checked_run,
@@ -74,8 +74,7 @@ def run(options: argparse.Namespace) -> int:
     protocol, bag = checked_run(options)
     if options.elsewhere and "ROS_DOMAIN_ID" not in os.environ:
         raise UsageError("--elsewhere: set ROS_DOMAIN_ID, to the same number on every host")
-    if options.heartbeat and not options.page:
-        raise UsageError("--heartbeat: is the page's; add --page")
+    check_heartbeat(options, protocol)  # of a page that may have been started before
     options.page_parameters = checked_page(options, protocol) if options.page else {}
     exactly = options.out is not None
     with claimed_domain() as domain, claimed_folder(bag, exactly=exactly) as folder:
