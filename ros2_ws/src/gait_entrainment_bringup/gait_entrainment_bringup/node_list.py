@@ -31,8 +31,13 @@ RECORDER = "bag_recorder"
 NODES = (RECORDER, "walker_sim", "perturbator", "gait_analyzer", "experiment")
 # Only looks on: started if somebody wants to see the walk, waited for by nobody.
 DISPLAY = "walker_display"
+# The operator's page: looks on as well, and is what one looks at, so it outlives the torque.
+PAGE = "operator_page"
 # In the order in which they are stopped: torque first, the record last.
-STOP_ORDER = ("perturbator", "experiment", "walker_sim", "gait_analyzer", DISPLAY, "bag_recorder")
+STOP_ORDER = (
+    *("perturbator", "experiment", "walker_sim", "gait_analyzer", DISPLAY, PAGE),
+    "bag_recorder",
+)
 # Nodes that publish what is counted at the end of a run.
 PUBLISHERS = ("walker_sim", "perturbator", "gait_analyzer", "experiment")
 # In real time promises are short, so that more can be decided late, but longer than a hiccup [s].
@@ -129,6 +134,7 @@ def parameters(
             "custom_data": json.dumps(provenance(protocol, real_time=real_time, onset=onset)),
         },
         DISPLAY: _drawn(protocol),
+        PAGE: {"record": str(bag.absolute())},
     }
     if real_time:
         given["experiment"]["longest_lookahead"] = lead_time
@@ -230,6 +236,7 @@ def replay_parameters(
     if f"{recorded}/robot_description" not in topics:
         drawn = {} if protocol is None else _drawn(protocol)
         given[DISPLAY] = drawn | {"use_sim_time": True}
+    given[PAGE] = {"use_sim_time": True}
     return namespace, given
 
 

@@ -53,7 +53,8 @@ def nodes(context: LaunchContext) -> list[Action]:
     ending = shared.ended_by(made, {"experiment", RECORDER} & set(names), over, bag)
     *others, experiment = made  # as in the list of nodes
     later = TimerAction(period=delay, actions=[experiment]) if delay else experiment
-    return [*ending, *shared.rviz(context, namespace, given), *others, later]
+    seen = [*shared.rviz(context, namespace, given), *shared.page(context, namespace, given)]
+    return [*ending, *seen, *others, later]
 
 
 def tell(_: LaunchContext, bag: Path) -> None:
@@ -79,4 +80,5 @@ def generate_launch_description() -> LaunchDescription:
         shared.NAMESPACE,
         shared.PARAMETERS_FILE,
         shared.RVIZ,
+        shared.SHOW_PAGE,
     )

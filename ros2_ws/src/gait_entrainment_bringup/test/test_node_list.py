@@ -10,9 +10,11 @@ import rclpy
 import yaml
 
 from gait_entrainment.protocol import DEFAULT_PROTOCOL
+from gait_entrainment.settings import settings_of
 from gait_entrainment_bringup.node_list import (
     DISPLAY,
     NODES,
+    PAGE,
     PUBLISHERS,
     STOP_ORDER,
     parameter_arguments,
@@ -27,6 +29,7 @@ from gait_entrainment_nodes.nodes.gait_analyzer import GaitAnalyzerNode
 from gait_entrainment_nodes.nodes.perturbator import Perturbator
 from gait_entrainment_nodes.nodes.walker_display import WalkerDisplay
 from gait_entrainment_nodes.nodes.walker_sim import WalkerSim
+from gait_entrainment_page import operator_page
 
 BAG = Path(__file__).parents[4] / "bags" / "paper_example"
 CLASSES = (
@@ -78,6 +81,7 @@ def full_names(tree, prefix=""):
 
 def test_file_lists_what_a_user_may_set_at_its_default(tmp_path):
     file = yaml.safe_load(settings_file().read_text())
+    del file[f"/**/{PAGE}"]  # below
     listed = set(
         full_names({n.removeprefix("/**/"): p["ros__parameters"] for n, p in file.items()})
     )
@@ -97,10 +101,19 @@ def test_file_lists_what_a_user_may_set_at_its_default(tmp_path):
     assert listed == (set(found[0]) - elsewhere)
 
 
+def test_file_lists_what_a_user_may_set_of_the_page_at_its_default():
+    # Not by the node itself: it would serve.
+    file = yaml.safe_load(settings_file().read_text())
+    listed = file[f"/**/{PAGE}"]["ros__parameters"]
+    of_a_run = ("command", "record")
+    names = [name for name in settings_of(operator_page.Settings) if name not in of_a_run]
+    assert listed == {name: getattr(operator_page.Settings, name) for name in names}
+
+
 @pytest.mark.parametrize("real_time", [False, True])
 def test_parameters_are_given_to_every_node(real_time):
     given = parameters(DEFAULT_PROTOCOL, Path("/bag"), real_time=real_time)
-    assert set(given) == {*NODES, DISPLAY}
+    assert set(given) == {*NODES, DISPLAY, PAGE}
     walker = given["walker_sim"]
     assert walker["ankle_stiffness"] == 87.3
     assert walker["real_time"] is real_time
@@ -114,7 +127,7 @@ def test_parameters_are_given_to_every_node(real_time):
 
 
 def test_torque_is_stopped_first_and_the_record_last():
-    assert sorted(STOP_ORDER) == sorted([*NODES, DISPLAY])
+    assert sorted(STOP_ORDER) == sorted([*NODES, DISPLAY, PAGE])
     assert STOP_ORDER[0] == "perturbator"
     assert STOP_ORDER[-1] == "bag_recorder"
     assert set(PUBLISHERS) == set(NODES) - {"bag_recorder"}

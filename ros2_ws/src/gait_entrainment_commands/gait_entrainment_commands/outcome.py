@@ -19,7 +19,7 @@ from gait_entrainment.run import Run
 # Pulses whose lags make up the final one: the paper's locked gait repeats itself exactly.
 FINAL_PULSES = 5
 # What a verdict other than entrained, or the reason for claiming nothing, says to a person.
-_MEANINGS = {
+MEANINGS = {
     "drifting": "the pulses run through the stride",
     "lost": "the gait followed the pulses, then drifted",
     "few_pulses": "neither locked nor drifting for certain: too few pulses yet",
@@ -158,7 +158,7 @@ def _verdict(judged: dict[str, Any]) -> str:
     """Return the verdict with since when it has held, or why nothing is claimed."""
     if judged["entrained"]:
         return f"{judged['verdict']} since stride {judged['entrained_since_stride']}"
-    return f"{judged['verdict']}: {_MEANINGS[judged['reason'] or judged['verdict']]}"
+    return f"{judged['verdict']}: {MEANINGS[judged['reason'] or judged['verdict']]}"
 
 
 def _block_lines(number: int, block: dict[str, Any], plan: dict[str, Any]) -> list[str]:
