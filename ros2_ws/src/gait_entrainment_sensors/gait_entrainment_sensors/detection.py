@@ -21,6 +21,8 @@ from gait_entrainment.robot.drivers import read_options
 from gait_entrainment.settings import check_settings, setting
 
 ENTRY_POINTS = "gait_entrainment.detectors"
+# A walk of this length has shown what the signal reaches [s].
+_LONG_ENOUGH = 10.0
 # A signal that moves and reads the same for so long has met the end of its range [s].
 _HELD = 0.05
 
@@ -42,6 +44,12 @@ class DetectorSettings:
 
     longest_gap: float = setting(0.1, "longest time between two samples", "s", (1e-3, 1.0))
     longest_constant: float = setting(3.0, "longest time without change", "s", (0.1, 60.0))
+    heel_strike_bias: float = setting(
+        0.0, "measured against a reference, taken off each strike", "s", (-0.2, 0.2)
+    )
+    toe_off_bias: float = setting(
+        0.0, "measured against a reference, taken off each toe-off", "s", (-0.2, 0.2)
+    )
 
     def __post_init__(self) -> None:
         """Check every field."""
@@ -78,7 +86,8 @@ class Detector(ABC):
     """
     Finds the events of one foot in the samples of one sensor: causal, its state its own.
 
-    A detector of your own derives from this class: it names itself and its signals, says how long
+    Its docstring gives the reference, the latency, the uncertainty, and when it fails. A detector
+    of your own derives from this class: it names itself and its signals, says how long
     it may take, and does its work in `_take`. Samples come in order, at any spacing up to
     ``longest_gap``; what is not a number, or not later than the sample before, never reaches
     `_take`. `_restart` forgets what must not reach across a gap.
@@ -95,14 +104,19 @@ class Detector(ABC):
     moving: ClassVar[float] = math.inf
     # Magnitude [unit of the signals] that no person reaches, and what to say of it.
     impossible: ClassVar[float] = math.inf
+    # Magnitude that every walk reaches.
+    reached: ClassVar[float] = 0.0
     suspicion: ClassVar[str] = "check the units"
+    # Standard deviation of heel strikes and toe-offs [s].
+    uncertainty: ClassVar[tuple[float, float]]
 
     def __init__(self, side: Side, settings: Any = None) -> None:
         self.side = side
         self.settings = settings if settings is not None else self.Settings()
         self.counts = SignalCounts()
-        self._largest = 0.0  # magnitude seen
-        self._time = -math.inf  # of the latest sample
+        self._largest = 0.0  # sum of magnitudes seen
+        self._first = math.nan  # time of the first sample
+        self._time = self._before = -math.inf  # of the latest sample, and the one before
         self._value = math.nan  # of the watched signal
         self._since = -math.inf  # when it took that value
         self._told_constant = self._told_held = False
@@ -127,20 +141,19 @@ class Detector(ABC):
 
         Returns the events that it decides, none or one as a rule.
         """
-        gap = time - self._time
-        if not 0.0 < gap <= self._longest_gap and not self._mended(gap):
+        if not 0.0 < time - self._time <= self._longest_gap and not self._mended(time):
             return []
         total = 0.0
         for value in values:
             total += value if value >= 0.0 else -value
-        if total >= self._largest:
-            self._largest = total
         if not total < self.impossible:
-            if not total < math.inf:  # also where it is not a number
+            if not total < math.inf:  # nor is what is not a number
                 self.counts.not_finite += 1
                 return []
             self.counts.impossible += 1
-        self._time = time
+        if total > self._largest:
+            self._largest = total
+        self._before, self._time = self._time, time
         if values[self.watched] != self._value:
             self._value, self._since = values[self.watched], time
             self._told_constant = self._told_held = False
@@ -148,22 +161,34 @@ class Detector(ABC):
             self._watch(time)
         return self._take(time, values)
 
-    def _mended(self, gap: float) -> bool:
+    def _mended(self, time: float) -> bool:
         """Begin anew after a gap or a jump of the clock; False if the sample is left out."""
-        counts = self.counts
+        counts, gap = self.counts, time - self._time
+        if math.isnan(gap):
+            counts.not_finite += 1
+            return False
         if -self._longest_gap <= gap <= 0.0:
             counts.clock_back += 1
             return False
-        if gap < 0.0:
+        if gap == math.inf:
+            self._first = time
+        elif gap < 0.0:
             counts.clock_jumps += 1
-        elif gap < math.inf:
+        else:
             counts.dropouts += 1
-        elif math.isnan(gap):
-            counts.not_finite += 1
-            return False
-        self._value, self._since = math.nan, -math.inf
+        # No interval that ends here is that of the sampling.
+        self._time = time
+        self._value, self._since = math.nan, time
         self._restart()
         return True
+
+    def _found(self, kind: EventKind, event: float, now: float) -> list[Detection]:
+        """Return the event of an instant [s] that is decided now; none if it comes too late."""
+        if now - event > self.latency + (now - self._before):
+            self.counts.rejected += 1
+            return []
+        bias = self.settings.heel_strike_bias, self.settings.toe_off_bias
+        return [Detection(kind, self.side, event - bias[kind], now, self.uncertainty[kind])]
 
     def _watch(self, time: float) -> None:
         """Count a signal that does not change, once for each time."""
@@ -191,6 +216,10 @@ class Detector(ABC):
             told.append(
                 f"{where}: {self.counts.impossible} samples of up to {self._largest:.3g} cannot "
                 f"be: {self.suspicion}"
+            )
+        if self._time - self._first > _LONG_ENOUGH and self._largest < self.reached:
+            told.append(
+                f"{where}: never above {self._largest:.3g}, which a walk exceeds: {self.suspicion}"
             )
         if now is not None and not now - self._time <= self._longest_gap:
             silent = "no sample yet" if self._time == -math.inf else "no sample for "

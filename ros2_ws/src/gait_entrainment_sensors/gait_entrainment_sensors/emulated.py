@@ -12,9 +12,10 @@ What is modelled beyond the walker's own motion, because the model leaves it out
 
 - Its foot slaps down in no time, and meets the ground flat. A person's comes down on the heel with
   the toes up and turns flat within a tenth of a second. So a gyroscope on the foot also measures
-  ``slap_angle`` turned in ``slap_time`` after each strike, and as much more in the swing.
-- Its swing leg has no dynamics; the foot goes on turning down long after toe-off. A person's is
-  pulled up at once. So the rate at toe-off fades with ``release_time``.
+  ``slap_angle`` turned in ``slap_time`` after each strike; that the swing turns it up by as much
+  more is left out. A switch under the toes closes after ``slap_time``.
+- Its swing leg has no dynamics; the foot goes on turning down for a seventh of a second after
+  toe-off. A person's is pulled up at once. So that rate fades with ``release_time``.
 
 What is not modelled: the knee does not bend, so the shank turns like the whole leg, about half as
 fast in swing as a person's, without the negative peaks at strike and toe-off by which a gyroscope on
@@ -22,9 +23,10 @@ the shank tells these events; soft tissue; shocks at impact; cross-talk of axes;
 foot's belt; the centre of pressure.
 """
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
-from typing import Any
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +40,8 @@ Floats = NDArray[np.float64]
 Stamps = NDArray[np.int64]
 
 HIP, ANKLE = 0, 2  # places in an array of joints, plus the side
+_BLOCK: Final = 1024  # instants drawn at a time
+_NEVER: Final = -(10**15)  # [ns]
 
 
 @dataclass(frozen=True)
@@ -86,7 +90,7 @@ KINDS: dict[str, tuple[tuple[str, ...], EmulatedSettings]] = {
     "foot_switch": (("heel", "toe"), EmulatedSettings()),
     "foot_gyroscope": (("gyro_x", "gyro_y", "gyro_z"), _GYROSCOPE),
     "shank_gyroscope": (("gyro_x", "gyro_y", "gyro_z"), _GYROSCOPE),
-    "ankle_encoder": (("angle",), EmulatedSettings(noise=1e-3, resolution=1.5e-3, full_scale=7.0)),
+    "ankle_encoder": (("angle", "torque"), EmulatedSettings(noise=1e-3, resolution=1.5e-3, full_scale=7.0)),
 }
 
 
@@ -104,10 +108,30 @@ class EmulatedSensor:
         self.kind, self.side = kind, side
         self.signals, usual = KINDS[kind]
         self.settings = settings or usual
+        seeds = np.random.SeedSequence([seed, int(side), [*KINDS].index(kind)]).spawn(4)
+        # One generator for each purpose: what it draws does not depend on the cuts.
+        self._jitters, self._noises, self._gaps, self._bounces = map(np.random.default_rng, seeds)
+        self._bias = self.settings.bias * self._noises.standard_normal(len(self.signals))
+        self._next = 0  # number of the first sample that `due` has not returned
+        self._taken = 0  # number of the first that `measure` has not had
+        self._instants: Stamps = np.empty(0, np.int64)  # drawn, from number `_next` on
+        self._gap_from = -math.inf  # start of the latest dropout [s]
+        self._strikes: list[int] = [_NEVER]  # of this foot [ns]
+        self._toe_offs: list[int] = [_NEVER]
 
     def due(self, until: int) -> Stamps:
         """Return the instants of the samples up to and including ``until`` [ns], each once."""
-        raise NotImplementedError
+        interval = NANOSECONDS_PER_SECOND / self.settings.rate
+        while self._instants.size == 0 or self._instants[-1] <= until:
+            numbers = self._next + self._instants.size + np.arange(_BLOCK)
+            jitter = self._jitters.standard_normal(_BLOCK) * self.settings.jitter
+            jitter = np.clip(jitter * self.settings.rate, -0.45, 0.45)
+            drawn = np.maximum(np.rint((numbers + jitter) * interval), 0).astype(np.int64)
+            self._instants = np.concatenate([self._instants, drawn])
+        count = int(np.searchsorted(self._instants, until, "right"))
+        due, self._instants = np.split(self._instants, [count])
+        self._next += count
+        return due
 
     def measure(
         self, times: Stamps, samples: Samples, events: Iterable[GaitEvent]
@@ -117,4 +141,83 @@ class EmulatedSensor:
 
         ``times`` are what `due` returned; ``events`` those of the stretch, of both feet.
         """
-        raise NotImplementedError
+        for event in events:
+            if event.side is self.side:
+                struck = event.kind is EventKind.HEEL_STRIKE
+                (self._strikes if struck else self._toe_offs).append(event.stamp)
+        settings, n = self.settings, times.size
+        stamps = (self._taken + np.arange(n)) / settings.rate
+        self._taken += n
+        values = _SIGNALS[self.kind](self, times, samples)
+        noise = settings.noise * self._noises.standard_normal(values.shape)
+        if self.kind == "ankle_encoder":
+            noise[:, 1] = 0.0  # the torque is the robot's own figure
+        elif self.kind != "foot_switch":
+            noise += self._bias + settings.drift * stamps[:, np.newaxis]
+        values = values + noise
+        if settings.resolution > 0.0:
+            values = np.rint(values / settings.resolution) * settings.resolution
+        values = np.clip(values, -settings.full_scale, settings.full_scale)
+        clock = stamps * (1.0 + settings.clock_drift) + settings.clock_offset
+        kept = [self._there(stamp) for stamp in stamps.tolist()]
+        rows = zip(clock.tolist(), map(tuple, values.tolist()), kept, strict=True)
+        return [(stamp, row) for stamp, row, there in rows if there]
+
+    def _there(self, stamp: float) -> bool:
+        """Whether a sample is not lost in a dropout."""
+        settings = self.settings
+        if settings.dropouts == 0.0:
+            return True
+        if self._gap_from == -math.inf:
+            self._gap_from = self._gaps.exponential(60.0 / settings.dropouts)
+        while stamp >= self._gap_from + settings.dropout_time:
+            self._gap_from += settings.dropout_time
+            self._gap_from += self._gaps.exponential(60.0 / settings.dropouts)
+        return stamp < self._gap_from
+
+    def _since(self, stamps: list[int], times: Stamps) -> Floats:
+        """Return the time [s] since the latest of some events."""
+        latest = np.array(stamps)[np.searchsorted(stamps, times, "right") - 1]
+        return (times - latest) / NANOSECONDS_PER_SECOND
+
+    def _force(self, times: Stamps, samples: Samples) -> Floats:  # noqa: ARG002
+        return samples.ground_reaction[:, self.side, 1:]
+
+    def _switches(self, times: Stamps, samples: Samples) -> Floats:
+        leading = samples.leading == self.side
+        struck = self._since(self._strikes, times)
+        left = self._since(self._toe_offs, times)
+        toe = np.where(leading, struck >= self.settings.slap_time, samples.double_stance)
+        closed = np.stack([leading, toe], axis=1).astype(float)
+        bounces = np.stack([struck, left], axis=1) < self.settings.bounce
+        return np.where(bounces, self._bounces.random(closed.shape) < 0.5, closed)
+
+    def _rates(self, times: Stamps, samples: Samples) -> Floats:
+        """Sensor x forward, y to the left, z up: it measures toes down, leaning forward as +y."""
+        rate = -samples.velocity[:, HIP + self.side]
+        if self.kind == "foot_gyroscope":
+            rate = rate + samples.velocity[:, ANKLE + self.side]
+            settings = self.settings
+            swings = ~samples.double_stance & (samples.leading != self.side)
+            left = self._since(self._toe_offs, times)
+            fading = np.exp(-left / max(settings.release_time, 1e-9))
+            rate = np.where(swings & (rate > 0.0), rate * fading, rate)
+            phase = self._since(self._strikes, times) / settings.slap_time
+            slap = settings.slap_angle * math.pi / (2 * settings.slap_time)
+            rate = rate + np.where(phase < 1.0, slap * np.sin(math.pi * phase), 0.0)
+        none = np.zeros_like(rate)
+        return np.stack([none, rate, none], axis=1)
+
+    def _ankle(self, times: Stamps, samples: Samples) -> Floats:  # noqa: ARG002
+        angle, torque = samples.position[:, ANKLE + self.side], samples.delivered_torque
+        return np.stack([angle, torque[:, self.side]], axis=1)
+
+
+_SIGNALS: dict[str, Callable[[EmulatedSensor, Stamps, Samples], Floats]] = {
+    "treadmill_force": EmulatedSensor._force,
+    "insole_force": EmulatedSensor._force,
+    "foot_switch": EmulatedSensor._switches,
+    "foot_gyroscope": EmulatedSensor._rates,
+    "shank_gyroscope": EmulatedSensor._rates,
+    "ankle_encoder": EmulatedSensor._ankle,
+}

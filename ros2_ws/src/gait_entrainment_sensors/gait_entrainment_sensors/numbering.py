@@ -55,7 +55,6 @@ class Numbering:
     """
 
     def __init__(self, first_side: Side | None = None, limits: GaitLimits | None = None) -> None:
-        self.first_side = first_side
         self.limits = limits or GaitLimits()
         self.counts = NumberingCounts()
         self._even = first_side  # the side whose strikes have even numbers
@@ -63,7 +62,6 @@ class Numbering:
         self._strides: deque[float] = deque(maxlen=_OWN_STRIDES)
         self._latest = -1  # place
         self._refused = 0  # in a row
-        self._swapped = False
 
     @property
     def period(self) -> float:
@@ -107,11 +105,6 @@ class Numbering:
         """Return what a person should know, each in one line; empty if all is well."""
         counts = self.counts
         told = []
-        if self._swapped and self.first_side is not None:
-            told.append(
-                f"the first heel strike was of the {self.first_side.other.name.lower()} foot, not "
-                f"of the {self.first_side.name.lower()}: are the sensors on the right feet?"
-            )
         if counts.repeated or counts.implausible:
             told.append(
                 f"{counts.repeated} detections repeated an event, {counts.implausible} fitted no "
@@ -129,7 +122,6 @@ class Numbering:
     def _begin(self, detection: Detection) -> int:
         """Return the place of the first heel strike."""
         self._even = self._even if self._even is not None else detection.side
-        self._swapped = detection.side is not self._even
         return self._first_place(detection)
 
     def _first_place(self, detection: Detection) -> int:
