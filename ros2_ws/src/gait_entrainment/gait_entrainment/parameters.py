@@ -294,3 +294,28 @@ class WalkerParameters:
     def least_leading_force(self) -> float:
         """Smallest ground reaction [N] of the leading leg over the period-one gait."""
         return -self._most_while_leading(lambda hold, lift: self.ankle_stiffness * lift - hold)
+
+
+@dataclass(frozen=True)
+class Variation:
+    """
+    How the stride period of the walker varies by itself, which the paper's walker does not.
+
+    Adults: 1 to 3 %, with an exponent of about 0.75 (Hausdorff et al., J. Appl. Physiol. 78,
+    349, 1995). ``walker.variation`` says how it comes about.
+    """
+
+    coefficient: float = setting(
+        0.0, "coefficient of variation of the stride period", "1", (0.0, 0.2)
+    )
+    exponent: float = setting(
+        0.75,
+        "long-range exponent of the variation (Hurst); 0.5 is white",
+        "1",
+        (0.5, 1.0),
+        most_excluded=True,
+    )
+
+    def __post_init__(self) -> None:
+        """Check both fields."""
+        check_settings(self)

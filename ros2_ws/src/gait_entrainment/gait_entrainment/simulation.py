@@ -53,7 +53,8 @@ def simulate(
     robot.activate()
     robot.begin(0)
     conductor = Conductor(protocol)
-    walker, ended = Walker(protocol.walker, first_heel_strike=protocol.side), False
+    strides = {"variation": protocol.variation, "seed": protocol.seed}
+    walker, ended = Walker(protocol.walker, protocol.side, **strides), False
     events: list[GaitEvent] = []
     onsets: list[int] = []
     measured = MeasuredOnsets()

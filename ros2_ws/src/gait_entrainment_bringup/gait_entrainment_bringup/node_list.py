@@ -18,7 +18,7 @@ import yaml
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.gait import GaitLimits
-from gait_entrainment.protocol import Protocol, said_limits, write_protocol
+from gait_entrainment.protocol import Protocol, said_of, write_protocol
 from gait_entrainment.robot import find_driver
 from gait_entrainment_bags import BagError, BagReader
 from gait_entrainment_bags.recorded_run import protocol_and_side
@@ -118,7 +118,7 @@ def parameters(
             "planned.torque": abs(protocol.pulse_torque),
             "planned.duration": protocol.pulses.width,
             "planned.count": protocol.pulses.count,
-            **{f"limits.{name}": value for name, value in said_limits(protocol).items()},
+            **{f"limits.{name}": value for name, value in said_of(protocol, "limits").items()},
         },
         "gait_analyzer": {"side": side, "onset": onset},
         "experiment": {
@@ -157,7 +157,7 @@ def gentle_limits(protocol: Protocol) -> dict[str, float]:
     if protocol.pulse_torque:
         rate = abs(protocol.pulse_torque) / (FLANK_SHARE * protocol.pulses.width)
         gentle["rate"] = min(rate, 1e6)
-    return gentle | said_limits(protocol)
+    return gentle | said_of(protocol, "limits")
 
 
 def _drawn(protocol: Protocol) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from typing import Any
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side, nanoseconds
 from gait_entrainment.errors import UsageError
-from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment.parameters import Variation, WalkerParameters
 from gait_entrainment.robot import DeviceLimits
 from gait_entrainment.settings import Setting, check_settings, setting, settings_of
 
@@ -106,6 +106,7 @@ class Protocol:
     pulses: PulsePlan = field(default_factory=PulsePlan)
     washout: int = setting(15, "strides after the strides of the pulses", within=(0, _MOST))
     walker: WalkerParameters = field(default_factory=WalkerParameters)
+    variation: Variation = field(default_factory=Variation)  # of the simulated walker's strides
     limits: DeviceLimits = field(default_factory=DeviceLimits)  # of what the person may get
     driver: str = setting("ideal", "ankle robot driver, as entrain driver list has them")
     seed: int = setting(0, "seed of whatever is random", within=(0, 2**63 - 1))
@@ -143,6 +144,7 @@ class Protocol:
 SECTIONS: dict[str, type[Any]] = {
     "pulses": PulsePlan,
     "walker": WalkerParameters,
+    "variation": Variation,
     "limits": DeviceLimits,
 }
 # All fields of a protocol, by the names that files and messages use: "pulses.width".
