@@ -59,7 +59,7 @@ def outcome_of(run: Run) -> dict[str, Any]:
     reason = last.reason if last else Reason.FEW_PULSES
     entrained = verdict is Verdict.ENTRAINED
     placed = [p for p in analysis.pulses if p.toe_off is not None]  # the others have no lag
-    lags = [p.phase_lag for p in placed[-FINAL_PULSES:]]
+    uncertainty = max((p.phase_lag_uncertainty for p in placed[-FINAL_PULSES:]), default=0.0)
 
     def seconds(stamp: int) -> float:
         return max(stamp - start, 0) / NANOSECONDS_PER_SECOND
@@ -82,7 +82,8 @@ def outcome_of(run: Run) -> dict[str, Any]:
             "reason": reason.name.lower() if reason else None,
             "entrained": entrained,
             "entrained_since_stride": last.entrained_since_stride if last and entrained else None,
-            "final_phase_lag": statistics.median(lags) if lags else math.nan,
+            "final_phase_lag": final_phase_lag(analysis),
+            **({"final_phase_lag_uncertainty": uncertainty} if uncertainty else {}),
             "double_stance": _double_stance(run.events, placed[-1].toe_off if placed else None),
             "stretches": [
                 {"last_stride": e.stride, "verdict": e.verdict.name.lower()}
@@ -99,11 +100,19 @@ def outcome_of(run: Run) -> dict[str, Any]:
     return outcome
 
 
+def final_phase_lag(analysis: Analysis) -> float:
+    """Return the median lag of the last pulses [s]; NaN if none has one."""
+    lags = [p.phase_lag for p in analysis.pulses if p.toe_off is not None][-FINAL_PULSES:]
+    return statistics.median(lags) if lags else math.nan
+
+
 def _parameters(protocol: Protocol) -> dict[str, Any]:
     """Return a protocol with its side as a word and its torque in N m, however it was given."""
     parameters = asdict(protocol)
     parameters["side"] = protocol.side.name.lower()
     parameters["pulses"]["torque"] = protocol.pulse_torque
+    if not protocol.variation.coefficient:
+        del parameters["variation"]  # the paper's walker
     return parameters
 
 

@@ -22,6 +22,7 @@ from gait_entrainment.protocol import Protocol, said_of, write_protocol
 from gait_entrainment.robot import find_driver
 from gait_entrainment_bags import BagError, BagReader
 from gait_entrainment_bags.recorded_run import protocol_and_side
+from gait_entrainment_bags.topic_names import WALKER_PROGRESS, WALKER_PROGRESS_BEFORE
 from gait_entrainment_bringup.provenance import provenance
 from gait_entrainment_nodes.messaging.environment import shared_file
 
@@ -71,7 +72,7 @@ NOT_REPLAYED = (
     "/rosout",
     "/parameter_events",
 )
-ANALYZED = ("gait_events", "perturbation/torque_profile", "walker_sim/progress")
+ANALYZED = ("gait_events", "perturbation/torque_profile", "walker/progress")
 MEASURED = ("perturbation/pulses", "perturbator/state")  # if onsets are those measured
 
 Parameters = dict[str, dict[str, Any]]  # by node name, then by name
@@ -182,7 +183,8 @@ def replay_parameters(
     """
     with BagReader(path) as bag:
         topics = list(bag.topics)
-        recorded = next((name for name in topics if name.endswith("/gait_events")), None)
+        # The shortest: where the walker was simulated, its exact events are beside those detected.
+    recorded = min((n for n in topics if n.endswith("/gait_events")), key=len, default=None)
         if recorded is None:
             raise BagError(f"{path}: not a run of this project: no gait events")
         protocol, side = protocol_and_side(bag, protocol, side)
@@ -192,14 +194,18 @@ def replay_parameters(
     onset = custom_data.get("onset", "commanded")
     recorded = recorded.removesuffix("/gait_events")
     namespace = recorded if namespace is None else namespace.rstrip("/")
-    moved = [name for name in topics if namespace != recorded and name.startswith(f"{recorded}/")]
+    moved = {n: n for n in topics if namespace != recorded and n.startswith(f"{recorded}/")}
+    before = f"{recorded}/{WALKER_PROGRESS_BEFORE}"
+    if before in topics:
+        moved[before] = f"{recorded}/{WALKER_PROGRESS}"
     analyzed = (*ANALYZED, *MEASURED) if onset == "measured" else ANALYZED
-    expected = [f"{namespace}/{n}" for n in analyzed if f"{recorded}/{n}" in topics]
+    played = {moved.get(name, name) for name in topics}
+    expected = [f"{namespace}/{n}" for n in analyzed if f"{recorded}/{n}" in played]
     given: Parameters = {
         "bag_player": {
             "bag": str(path.absolute()),
             "exclude": list(NOT_REPLAYED),
-            "remap": [f"{name}:={namespace}{name.removeprefix(recorded)}" for name in moved]
+            "remap": [f"{n}:={namespace}{to.removeprefix(recorded)}" for n, to in moved.items()]
             or [""],
             # Once by the analyzer, and once more by the recorder.
             "expect": expected if out is None else expected * 2,

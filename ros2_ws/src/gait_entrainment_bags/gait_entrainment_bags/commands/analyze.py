@@ -13,6 +13,7 @@ from gait_entrainment.outcome import summary, timing_summary
 from gait_entrainment_bags.commands.record_options import add_record_options, told_of_record
 from gait_entrainment_bags.figures import draw_figures
 from gait_entrainment_bags.recorded_run import messages_line, read_run, recorded_outcome
+from gait_entrainment_bags.truth import detection_lines
 
 DESCRIPTION = "Analyze a bag anew, and hold the result against what was published live."
 EXAMPLES = """examples:
@@ -50,7 +51,8 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps(outcome))
         return 0
-    for line in (summary(outcome), *timing_summary(outcome["pulse_timing"])):
+    timing = timing_summary(outcome["pulse_timing"])
+    for line in (summary(outcome), *detection_lines(outcome), *timing):
         print(line)
     comparison = "none was recorded" if differences is None else "the same to the last bit"
     if differences:

@@ -16,7 +16,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock as ClockMessage
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Bool, Empty, String
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
@@ -75,6 +75,13 @@ GROUND_REACTION = tuple(Topic(name, WrenchStamped) for name in topic_names.GROUN
 WALKER_PROGRESS = Topic(topic_names.WALKER_PROGRESS, msg.Progress)
 WALKER_TIMING = Topic(topic_names.WALKER_TIMING, msg.WalkerTiming)
 CLOCK = Topic(topic_names.CLOCK, ClockMessage)
+
+FOOT_SWITCH = tuple(Topic(name, msg.FootSwitch) for name in topic_names.FOOT_SWITCH)
+FOOT_IMU = tuple(Topic(name, Imu) for name in topic_names.FOOT_IMU)
+SHANK_IMU = tuple(Topic(name, Imu) for name in topic_names.SHANK_IMU)
+ANKLE_ENCODER = tuple(Topic(name, JointState) for name in topic_names.ANKLE_ENCODER)
+TRUE_EVENTS = Topic(topic_names.TRUE_EVENTS, msg.GaitEvent)
+TRUE_PROGRESS = Topic(topic_names.TRUE_PROGRESS, msg.Progress)
 
 TORQUE_PROFILE = Topic(topic_names.TORQUE_PROFILE, msg.TorqueProfile)
 PULSES = Topic(topic_names.PULSES, msg.TorquePulse)
