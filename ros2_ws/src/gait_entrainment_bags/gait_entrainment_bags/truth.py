@@ -6,6 +6,7 @@
 import statistics
 from bisect import bisect_left
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
@@ -40,7 +41,7 @@ def _errors_of(
         )
         if len(real) < 2 or not found:
             continue
-        window = WINDOW * statistics.median(b - a for a, b in zip(real, real[1:], strict=False))
+        window = WINDOW * statistics.median(b - a for a, b in pairwise(real))
         real = [stamp for stamp in real if found[0] - window <= stamp <= found[-1] + window]
         events += len(real)
         taken: set[int] = set()

@@ -180,9 +180,7 @@ class StrideTracker:
         step_periods = first / NANOSECONDS_PER_SECOND, second / NANOSECONDS_PER_SECOND
         toe_off = self._stamps.get(event.place - 1)
         uncertainty = self._toe_off.uncertainty if self._toe_off else 0.0
-        return Stride(
-            closed, self.side, start, event.stamp, toe_off, step_periods, uncertainty
-        )
+        return Stride(closed, self.side, start, event.stamp, toe_off, step_periods, uncertainty)
 
 
 class UnperturbedPeriod:

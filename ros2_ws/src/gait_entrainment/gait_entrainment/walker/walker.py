@@ -94,7 +94,8 @@ class Walker:
     The ankle-actuated walker, driven by torque promises for both ankles.
 
     It starts at stamp 0, right after heel strike number 0 of `first_heel_strike`, in the
-    period-one gait or with the mass at `initial_speed` [m/s]. Its strides may vary: `seed` draws how.
+    period-one gait or with the mass at `initial_speed` [m/s]. Its strides may vary, as `seed` has
+    it.
 
     An event comes before a torque change of the same stamp, and a change acts only after its
     stamp: a sample shows the events of its own stamp, but the torque up to it. So everything up to

@@ -8,12 +8,9 @@ from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
-from geometry_msgs.msg import WrenchStamped
-from sensor_msgs.msg import Imu, JointState
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.errors import UsageError
-from gait_entrainment_msgs.msg import FootSwitch
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.raw_messages import MessageTemplate
 from gait_entrainment_nodes.messaging.topics import Topic
@@ -32,7 +29,9 @@ FORCE = Source(topics.GROUND_REACTION, {f"force_{axis}": f"wrench.force.{axis}" 
 SWITCH = Source(topics.FOOT_SWITCH, {"heel": "heel", "toe": "toe"})
 FOOT = Source(topics.FOOT_IMU, _RATES | _ACCELERATIONS)
 SHANK = Source(topics.SHANK_IMU, _RATES | _ACCELERATIONS)
-ENCODER = Source(topics.ANKLE_ENCODER, {"angle": "position", "velocity": "velocity"})
+ENCODER = Source(
+    topics.ANKLE_ENCODER, {"angle": "position", "velocity": "velocity", "torque": "effort"}
+)
 
 
 def source_of(name: str, signals: Sequence[str]) -> Source:

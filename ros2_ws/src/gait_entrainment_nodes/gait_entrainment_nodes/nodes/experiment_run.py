@@ -42,8 +42,8 @@ class Run:
 
     ``request`` asks the perturbator for pulses; ``take_answer`` is then told its answer. If the
     run is ``recorded``, the walker waits for the recorder. In ``real_time`` nobody waits for
-    anybody, and each owes what it does by itself. ``walker`` is the node in that role. ``held_up`` says who holds up the rest,
-    if that is known. ``clock`` is steady time [s].
+    anybody, and each owes what it does by itself. ``walker`` is the node in that role.
+    ``held_up`` says who holds up the rest, if that is known. ``clock`` is steady time [s].
     """
 
     def __init__(
