@@ -89,8 +89,8 @@ class VerticalForceDetector(Detector):
         return 0.03
 
     def _restart(self) -> None:
-        self._on: bool | None = None  # on the ground; None before the foot was seen off it
-        self._own = False  # the contact in progress is this foot's
+        self._on: bool | None = None  # on the ground; None before it is known
+        self._own = True  # the contact in progress is this foot's
         self._force = math.nan
         self._rise = math.nan  # when the force rose through the lower threshold [s]
         self._strike = self._toe_off = math.nan  # of the contact or swing in progress [s]
@@ -132,13 +132,15 @@ class VerticalForceDetector(Detector):
         seen_off = self._on is False
         self._on, self._on_since, self._lowest = True, time, math.inf
         self._strike = rise
-        self._own = seen_off and not swing < self._bound(self._swings, self.settings.least_share)
-        if swing < self.settings.refractory:
-            self._own = False
-        elif swing < self.settings.longest_stance:
+        if not seen_off:
+            self._strike = math.nan
+            return []
+        least = max(self.settings.refractory, self._bound(self._swings, self.settings.least_share))
+        self._own = not swing < least
+        if self.settings.refractory <= swing < self.settings.longest_stance:
             self._swings.append(swing)
         if not self._own:
-            self.counts.rejected += seen_off
+            self.counts.rejected += 1
             return []
         return self._found(EventKind.HEEL_STRIKE, rise, time)
 
@@ -151,7 +153,8 @@ class VerticalForceDetector(Detector):
         least = max(settings.shortest_stance, self._bound(self._stances, settings.least_share))
         most = self._bound(self._stances, settings.most_share) or math.inf
         walks = stance < settings.longest_stance  # else somebody stood
-        believed = self._own and stance >= least and (stance <= most or not walks)
+        # Of a contact that was there at the start the strike is not known.
+        believed = self._own and not stance < least and not (walks and stance > most)
         self._on, self._rise, self._toe_off = False, math.nan, toe_off
         if walks and stance >= settings.shortest_stance:
             self._stances.append(stance)
@@ -167,7 +170,7 @@ class VerticalForceDetector(Detector):
         if time - self._on_since > self.settings.longest_stance:
             if self._lowest < 150.0:
                 self._zero += self._lowest
-                self._on, self._own = None, False
+                self._on = None
             self._on_since, self._lowest = time, math.inf
         return []
 
