@@ -28,6 +28,5 @@ setup(
             f"shank_gyroscope = {NAME}.shank_gyroscope:ShankGyroscopeDetector",
             f"ankle_encoder = {NAME}.ankle_encoder:AnkleEncoderDetector",
         ],
-        "gait_entrainment.commands": [f"sensors = {NAME}.commands"],
     },
 )

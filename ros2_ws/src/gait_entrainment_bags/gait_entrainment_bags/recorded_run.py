@@ -119,7 +119,7 @@ def read_run(
             analyze(record.events, onsets[kind], leg, settings, record.unknown, bias)
             for kind, leg in ((live_onset, live_side), (onset or live_onset, side))
         )
-        measured_period, pulse_period = _periods(protocol, record.events, analysis)
+        measured_period, pulse_period = periods_of(protocol, record.events, analysis)
         run = RecordedRun(
             protocol=protocol,
             name=Path(path).stem if protocol is None else protocol.name,
@@ -186,7 +186,7 @@ def _side_in(bag: BagReader, relative: str) -> Side | None:
     return None
 
 
-def _periods(
+def periods_of(
     protocol: Protocol | None, events: Sequence[GaitEvent], analysis: Analysis
 ) -> tuple[float, float]:
     """Return unperturbed and pulse period [s]: as a protocol plans them, else as analyzed."""

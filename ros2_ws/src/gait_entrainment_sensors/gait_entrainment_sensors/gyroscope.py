@@ -12,7 +12,7 @@ import statistics
 from abc import abstractmethod
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 from gait_entrainment.conventions import Side
@@ -22,6 +22,8 @@ from gait_entrainment_sensors.mounting import Mounting, find_mounting
 
 # Steps whose median peak is the person's own.
 _OWN_STEPS = 7
+# Lean of the axis of swing from which on the toes turn in [rad]: 9 degrees.
+_TOES_IN = 0.15
 # Time constant of one of two poles with -3 dB at one hertz [s].
 _TWO_POLES = math.sqrt(math.sqrt(2) - 1) / (2 * math.pi)
 
@@ -95,6 +97,24 @@ class GyroscopeDetector(Detector):
         self._swings = Peaks(self.settings.least_peak, self.settings.peak_share)
         self._restart()
 
+    @classmethod
+    def calibrated(
+        cls, settings: Any, times: Sequence[float], samples: Sequence[Sequence[float]]
+    ) -> Any:
+        """Return settings with the axis that a recorded walk tells, unless they name one."""
+        if settings.axis is not None:
+            return settings
+        recorded = [
+            (time, values)
+            for time, values in zip(times, samples, strict=True)
+            if math.isfinite(time + sum(values))
+        ]
+        found = find_mounting(recorded, foot=cls.foot)
+        if found is None:
+            return settings
+        x, y, z = found.axis
+        return replace(settings, axis_x=x, axis_y=y, axis_z=z)
+
     @property
     def latency(self) -> float:
         """The delay of the filter, and the time to be certain."""
@@ -116,6 +136,8 @@ class GyroscopeDetector(Detector):
         found, given = self._mounting, self.settings.axis
         if found is None or given is None:
             return told
+        if self.foot and given[1] > 0.9 and found.toes_out(self.side) < -_TOES_IN:
+            told = (*told, f"{where}: the toes turn in: are the sensors on the right feet?")
         agreement = sum(a * b for a, b in zip(found.axis, given, strict=True))
         if agreement < -0.5:
             return (*told, f"{where}: put on the other way round: set {found.text}")

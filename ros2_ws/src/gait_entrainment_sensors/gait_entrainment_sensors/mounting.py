@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gait_entrainment.conventions import Side
+
 # Share of the variance about one axis from which on somebody walks: a leg swings in one plane.
 _LEAST_SHARE = 0.5
 # Root mean square [rad/s] about that axis from which on somebody walks.
@@ -26,11 +28,22 @@ class Mounting:
     axis: tuple[float, float, float]  # of unit length, in the frame of the sensor
     share: float  # of the variance that is about it
     skewness: float  # of what decides the sign; far from zero
+    swing: tuple[float, float, float]  # the axis of the swing itself, before it was put along
 
     @property
     def text(self) -> str:
         """The settings that say so."""
         return ",".join(f"axis_{n}={v:.3f}" for n, v in zip("xyz", self.axis, strict=True))
+
+
+    def toes_out(self, side: Side) -> float:
+        """
+        Return the sine of the angle by which the toes turn out, of a sensor x forward, z up.
+
+        People walk with their toes turned out by some 10 degrees, so the axis about which the leg
+        swings leans forward in the frame of the left foot, and backward in that of the right one.
+        """
+        return self.swing[0] if side is Side.LEFT else -self.swing[0]
 
 
 def find_mounting(
@@ -63,7 +76,8 @@ def find_mounting(
     skewness = float(np.mean(told**3) / np.mean(told**2) ** 1.5)
     if abs(skewness) < _LEAST_SKEWNESS:
         return None
-    axis = axes[:, -1] * np.sign(skewness)
+    axis = swing = axes[:, -1] * np.sign(skewness)
     if np.max(np.abs(axis)) > _ALONG:
         axis = np.sign(axis) * (np.abs(axis) > _ALONG)
-    return Mounting((float(axis[0]), float(axis[1]), float(axis[2])), share, abs(skewness))
+    x, y, z = axis.tolist()
+    return Mounting((x, y, z), share, abs(skewness), tuple(swing.tolist()))

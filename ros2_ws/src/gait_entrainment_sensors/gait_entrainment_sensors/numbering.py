@@ -86,7 +86,8 @@ class Numbering:
         self._refused = 0
         self._accept(detection, place)
         step = (place + 1) // 2
-        return GaitEvent(nanoseconds(detection.time), detection.kind, detection.side, step)
+        stamp, sure = nanoseconds(detection.time), detection.uncertainty
+        return GaitEvent(stamp, detection.kind, detection.side, step, sure)
 
     def stopped(self, now: float) -> str:
         """Return why nobody seems to walk at a time [s], or an empty text."""

@@ -12,7 +12,7 @@ torque that comes of it. The exact events stay beside, as the truth.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from gait_entrainment.conventions import EventKind, Side, nanoseconds
+from gait_entrainment.conventions import Side, nanoseconds
 from gait_entrainment.experiment import Conductor
 from gait_entrainment.gait import Analysis, GaitEvent, analyze
 from gait_entrainment.protocol import Protocol
@@ -21,7 +21,6 @@ from gait_entrainment.walker import Ending, Walker
 from gait_entrainment_sensors.detection import ChosenDetector, Detection
 from gait_entrainment_sensors.emulated import EmulatedSensor, EmulatedSettings
 from gait_entrainment_sensors.numbering import Numbering
-from gait_entrainment_sensors.scoring import Score, score
 
 
 @dataclass(frozen=True)
@@ -36,15 +35,6 @@ class Rehearsal:
     true_analysis: Analysis  # of the exact events, with the same pulses
     ending: Ending | None  # fall or fly-off
     troubles: tuple[str, ...]
-
-    def errors(self, kind: EventKind) -> Score:
-        """Return the errors of the detected events of a kind, of both feet."""
-
-        def times(events: Sequence[GaitEvent], side: Side) -> list[float]:
-            return [e.stamp / 1e9 for e in events if e.kind is kind and e.side is side]
-
-        sides = [(times(self.truth, side), times(self.events, side)) for side in Side]
-        return score(sides)
 
 
 class Sensors:
@@ -97,7 +87,8 @@ def rehearse(protocol: Protocol, sensors: Sensors) -> Rehearsal:
     robot.activate()
     robot.begin(0)
     conductor = Conductor(protocol)
-    walker, ended = Walker(protocol.walker, first_heel_strike=protocol.side), False
+    strides = {"variation": protocol.variation, "seed": protocol.seed}
+    walker, ended = Walker(protocol.walker, protocol.side, **strides), False
     truth: list[GaitEvent] = []
     detected: list[GaitEvent] = []
     onsets: list[int] = []
