@@ -99,8 +99,7 @@ class Detector(ABC):
     name: ClassVar[str]
     signals: ClassVar[tuple[str, ...]]  # names of the columns, SI units, in order
     Settings: ClassVar[type[DetectorSettings]] = DetectorSettings
-    # The signal that is watched for standing still, and from where on [its unit] it moves.
-    watched: ClassVar[int] = 0
+    # Magnitude of the signal that decides [its unit] from which on it cannot stand still.
     moving: ClassVar[float] = math.inf
     # Magnitude [unit of the signals] that no person reaches, and what to say of it.
     impossible: ClassVar[float] = math.inf
@@ -117,8 +116,10 @@ class Detector(ABC):
         self._largest = 0.0  # sum of magnitudes seen
         self._first = math.nan  # time of the first sample
         self._time = self._before = -math.inf  # of the latest sample, and the one before
-        self._value = math.nan  # of the watched signal
-        self._since = -math.inf  # when it took that value
+        self._total = math.nan  # the latest sum of magnitudes
+        self._constant_from = -math.inf  # since when it is so [s]
+        self._value = math.nan  # the latest of the signal that decides
+        self._held_from = -math.inf  # since when it is so [s]
         self._told_constant = self._told_held = False
         self._longest_gap = self.settings.longest_gap
 
@@ -164,11 +165,11 @@ class Detector(ABC):
         if total > self._largest:
             self._largest = total
         self._before, self._time = self._time, time
-        if values[self.watched] != self._value:
-            self._value, self._since = values[self.watched], time
-            self._told_constant = self._told_held = False
-        else:
-            self._watch(time)
+        if total != self._total:
+            self._total, self._constant_from, self._told_constant = total, time, False
+        elif time - self._constant_from > self.settings.longest_constant:
+            self.counts.constant += not self._told_constant
+            self._told_constant = True
         return self._take(time, values)
 
     def _mended(self, time: float) -> bool:
@@ -188,7 +189,7 @@ class Detector(ABC):
             counts.dropouts += 1
         # No interval that ends here is that of the sampling.
         self._time = time
-        self._value, self._since = math.nan, time
+        self._total = self._value = math.nan
         self._restart()
         return True
 
@@ -200,14 +201,12 @@ class Detector(ABC):
         bias = self.settings.heel_strike_bias, self.settings.toe_off_bias
         return [Detection(kind, self.side, event - bias[kind], now, self.uncertainty[kind])]
 
-    def _watch(self, time: float) -> None:
-        """Count a signal that does not change, once for each time."""
-        same = time - self._since
-        if same > self.settings.longest_constant and not self._told_constant:
-            self.counts.constant += 1
-            self._told_constant = True
-        if same > _HELD and abs(self._value) > self.moving and not self._told_held:
-            self.counts.held += 1
+    def _watch(self, time: float, value: float) -> None:
+        """Count that the signal that decides stays at one value although it moves."""
+        if value != self._value:
+            self._value, self._held_from, self._told_held = value, time, False
+        elif time - self._held_from > _HELD and abs(value) > self.moving:
+            self.counts.held += not self._told_held
             self._told_held = True
 
     def troubles(self, now: float | None = None) -> tuple[str, ...]:

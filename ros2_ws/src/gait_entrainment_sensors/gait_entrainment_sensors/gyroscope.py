@@ -123,7 +123,7 @@ class GyroscopeDetector(Detector):
     def _restart(self) -> None:
         self._first_pole = self._rate = math.nan
         self._swinging = False
-        self._changed = -math.inf  # when the stance or swing in progress began [s]
+        self._changed = self._time  # when the stance or swing in progress began [s]
         if self._recorded is not None:
             self._recorded = []
 
@@ -152,6 +152,7 @@ class GyroscopeDetector(Detector):
         if axis is None:
             return []
         rate = axis[0] * values[0] + axis[1] * values[1] + axis[2] * values[2]
+        self._watch(time, rate)
         interval = time - self._before
         if interval != self._interval:
             self._interval = interval

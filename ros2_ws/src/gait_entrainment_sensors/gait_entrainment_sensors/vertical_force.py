@@ -105,6 +105,7 @@ class VerticalForceDetector(Detector):
         return (*told, f"{where}: {self._downwards} samples below -100 N: {self.suspicion}")
 
     def _take(self, time: float, values: Sequence[float]) -> list[Detection]:
+        self._watch(time, values[0])
         settings, before = self.settings, self._force
         force = self._force = values[0] - self._zero
         lower = settings.toe_off_force
@@ -155,8 +156,10 @@ class VerticalForceDetector(Detector):
         walks = stance < settings.longest_stance  # else somebody stood
         # Of a contact that was there at the start the strike is not known.
         believed = self._own and not stance < least and not (walks and stance > most)
-        self._on, self._rise, self._toe_off = False, math.nan, toe_off
-        if walks and stance >= settings.shortest_stance:
+        self._on, self._rise = False, math.nan
+        if self._own:  # else the swing in progress goes on
+            self._toe_off = toe_off if believed else math.nan
+        if self._own and walks and stance >= settings.shortest_stance:
             self._stances.append(stance)
         if not believed:
             self.counts.rejected += 1
