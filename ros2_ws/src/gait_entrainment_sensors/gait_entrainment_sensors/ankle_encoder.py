@@ -26,7 +26,9 @@ class AnkleEncoderSettings(DetectorSettings):
     strike_share: float = setting(
         0.38, "strides from the plantarflexion peak to heel strike", "1", (0.0, 0.9)
     )
-    blank_torque: float = setting(1.0, "torque from which on the angle is not read", "N m", (0, 30))
+    blank_torque: float = setting(
+        1.0, "torque from which on the angle is not read", "N m", (0, 30)
+    )
 
 
 class AnkleEncoderDetector(Detector):
@@ -75,8 +77,8 @@ class AnkleEncoderDetector(Detector):
         where = f"{self.side.name.lower()} {self.name}"
         told = (
             *super().troubles(now),
-            f"{where}: a fallback: heel strikes are inferred to some 50 ms, there are no toe-offs, "
-            "so no phase lag can be told",
+            f"{where}: a fallback: heel strikes are inferred to some 50 ms, there are no "
+            "toe-offs, so no phase lag can be told",
         )
         if not self._unlikely:
             return told

@@ -111,7 +111,7 @@ class Detector(ABC):
 
     def __init__(self, side: Side, settings: Any = None) -> None:
         self.side = side
-        self.settings = settings if settings is not None else self.Settings()
+        self.settings: Any = settings if settings is not None else self.Settings()
         self.counts = SignalCounts()
         self._largest = 0.0  # sum of magnitudes seen
         self._first = math.nan  # time of the first sample

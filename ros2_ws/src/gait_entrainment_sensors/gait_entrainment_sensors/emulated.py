@@ -18,8 +18,8 @@ What is modelled beyond the walker's own motion, because the model leaves it out
   toe-off. A person's is pulled up at once. So that rate fades with ``release_time``.
 
 What is not modelled: the knee does not bend, so the shank turns like the whole leg, about half as
-fast in swing as a person's, without the negative peaks at strike and toe-off by which a gyroscope on
-the shank tells these events; soft tissue; shocks at impact; cross-talk of axes; forces on the other
+fast in swing as a person's, without the peaks at strike and toe-off by which a gyroscope on the
+shank tells these events; soft tissue; shocks at impact; cross-talk of axes; forces on the other
 foot's belt; the centre of pressure.
 """
 
@@ -90,7 +90,10 @@ KINDS: dict[str, tuple[tuple[str, ...], EmulatedSettings]] = {
     "foot_switch": (("heel", "toe"), EmulatedSettings()),
     "foot_gyroscope": (("gyro_x", "gyro_y", "gyro_z"), _GYROSCOPE),
     "shank_gyroscope": (("gyro_x", "gyro_y", "gyro_z"), _GYROSCOPE),
-    "ankle_encoder": (("angle", "torque"), EmulatedSettings(noise=1e-3, resolution=1.5e-3, full_scale=7.0)),
+    "ankle_encoder": (
+        ("angle", "torque"),
+        EmulatedSettings(noise=1e-3, resolution=1.5e-3, full_scale=7.0),
+    ),
 }
 
 
@@ -178,10 +181,11 @@ class EmulatedSensor:
     def _since(self, stamps: list[int], times: Stamps) -> Floats:
         """Return the time [s] since the latest of some events."""
         latest = np.array(stamps)[np.searchsorted(stamps, times, "right") - 1]
-        return (times - latest) / NANOSECONDS_PER_SECOND
+        return np.asarray((times - latest) / NANOSECONDS_PER_SECOND)
 
     def _force(self, times: Stamps, samples: Samples) -> Floats:  # noqa: ARG002
-        return samples.ground_reaction[:, self.side, 1:]
+        vertical: Floats = samples.ground_reaction[:, self.side, 1:]
+        return vertical
 
     def _switches(self, times: Stamps, samples: Samples) -> Floats:
         leading = samples.leading == self.side

@@ -99,7 +99,7 @@ class FootGyroscopeDetector(GyroscopeDetector):
         if before <= _LEFT_ZERO < rate:
             self._turn = self._crossing(time, before, rate, _LEFT_ZERO)
         turned = self._turn == self._turn
-        certain = turned and rate > _SLAPPING or time - self._rest >= self.settings.decision
+        certain = (turned and rate > _SLAPPING) or time - self._rest >= self.settings.decision
         if not certain or time - self._changed < self.settings.shortest_swing:
             return []
         strike, peak = self._turn if turned else self._rest, self._peak

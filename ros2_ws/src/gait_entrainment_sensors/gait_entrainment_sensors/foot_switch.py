@@ -34,7 +34,7 @@ class FootSwitchSettings(DetectorSettings):
 
 class FootSwitchDetector(Detector):
     """
-    Events from two contacts, a Schmitt trigger each; the foot is on the ground while either closes.
+    Events from two contacts, a Schmitt trigger each; a foot is on the ground while one is closed.
 
     An event is the first of the changes that lasts: half a sample before it was seen, interpolated
     where the contact is graded. Hanlon and Anderson (Gait Posture 30, 2009) found 2.4 +/- 2.1 ms
@@ -42,7 +42,7 @@ class FootSwitchDetector(Detector):
 
     Latency: ``debounce``.
     Uncertainty: 6 ms, between the two published; measure it with your own insoles.
-    Fails: worn or shifted insoles, whose toe-off comes early when only heel and toes are covered; a
+    Fails: worn or shifted insoles, whose toe-off comes early if only heel and toes are covered; a
     contact that stays closed in the shoe: neither strike nor toe-off, which is told.
     """
 

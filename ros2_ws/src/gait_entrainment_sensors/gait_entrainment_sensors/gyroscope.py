@@ -118,7 +118,7 @@ class GyroscopeDetector(Detector):
     @property
     def latency(self) -> float:
         """The delay of the filter, and the time to be certain."""
-        return 2 * self._pole + float(self.settings.decision)
+        return float(2 * self._pole + self.settings.decision)
 
     def _restart(self) -> None:
         self._first_pole = self._rate = math.nan

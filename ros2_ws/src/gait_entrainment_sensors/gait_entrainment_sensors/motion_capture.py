@@ -131,8 +131,8 @@ def events_on_plates(
     Return the events on the plates, and what was wrong.
 
     A contact is the foot's whose middle, between heel and toe, is next to the centre of pressure;
-    none's, and told, if both feet are on the plate or neither is near. ``sides`` says instead whose
-    each plate is, as of a treadmill with two belts.
+    none's, and told, if both feet are on the plate or neither is near. ``sides`` says instead
+    whose each plate is, as of a treadmill with two belts.
     Raises RecordingError if nothing tells whose the contacts are.
     """
     told: list[str] = []
@@ -166,7 +166,7 @@ def events_on_plates(
 def _of_their_feet(
     capture: MotionCapture, plate: Plate, events: Sequence[Detection]
 ) -> tuple[list[Detection], int]:
-    """Return events of one plate with the side of the foot, and how many contacts were nobody's."""
+    """Return a plate's events with the side of the foot, and how many contacts were nobody's."""
     contacts: list[list[Detection]] = []
     for event in events:
         if event.kind is EventKind.HEEL_STRIKE or not contacts:
@@ -187,7 +187,7 @@ def _of_their_feet(
 
 
 def _whose(capture: MotionCapture, plate: Plate, start: float, end: float) -> Side | None:
-    """Return the foot that presses on a plate from one instant to another [s]; None if doubtful."""
+    """Return the foot that presses on a plate between two instants [s]; None if doubtful."""
     across = [axis for axis in range(3) if axis != capture.up]
     during = (capture.times >= start) & (capture.times <= end)
     middle = np.argmin(np.abs(plate.times - 0.5 * (start + end)))
@@ -201,7 +201,7 @@ def _whose(capture: MotionCapture, plate: Plate, start: float, end: float) -> Si
         height = np.minimum(heel[:, capture.up], toe[:, capture.up])
         low = height < np.nanmin(height) + _LOW
         inside = np.all((centre > plate.low)[:, across] & (centre < plate.high)[:, across], axis=1)
-        if away <= _REACH or np.mean((low & inside)[during]) > 0.2:
+        if (low[at] and away <= _REACH) or np.mean((low & inside)[during]) > 0.2:
             near.append(side)
     return near[0] if len(near) == 1 else None
 
@@ -210,9 +210,9 @@ def events_of_markers(capture: MotionCapture) -> list[Detection]:
     """
     Return events by the position of heel and toe relative to the pelvis, for the whole recording.
 
-    Heel strike is where the heel is furthest ahead, toe-off where the toe is furthest behind (Zeni,
-    Richards and Higginson, Gait Posture 27, 710, 2008): within 16.7 ms in 94 % of strides. Not
-    causal: an event is decided by all of the recording. Hidden markers are interpolated.
+    Heel strike is where the heel is furthest ahead, toe-off where the toe is furthest behind
+    (Zeni, Richards and Higginson, Gait Posture 27, 710, 2008): within 16.7 ms in 94 % of
+    strides. Not causal: an event is decided by all of the recording. Hidden markers are interpolated.
     Raises RecordingError if a marker is missing.
     """
     from scipy.signal import find_peaks

@@ -14,8 +14,8 @@ from gait_entrainment.conventions import Side
 _LEAST_SHARE = 0.5
 # Root mean square [rad/s] about that axis from which on somebody walks.
 _LEAST_RATE = 0.5
-# Cosine of the angle within which a sensor counts as put on along the shoe or shank: a foot that is
-# turned out, and rolls, swings about an axis of its own, which is not that of its pitch.
+# Cosine of the angle within which a sensor counts as put on along the shoe or shank: a foot that
+# is turned out, and rolls, swings about an axis of its own, which is not that of its pitch.
 _ALONG = 0.8
 # Skewness that leaves no doubt about the sign.
 _LEAST_SKEWNESS = 0.3
@@ -34,7 +34,6 @@ class Mounting:
     def text(self) -> str:
         """The settings that say so."""
         return ",".join(f"axis_{n}={v:.3f}" for n, v in zip("xyz", self.axis, strict=True))
-
 
     def toes_out(self, side: Side) -> float:
         """
@@ -68,9 +67,7 @@ def find_mounting(
     about = rates @ axes[:, -1]
     told = -about
     if foot:
-        angle = np.concatenate(
-            [[0.0], np.cumsum((about[1:] + about[:-1]) / 2 * np.diff(times))]
-        )
+        angle = np.concatenate([[0.0], np.cumsum((about[1:] + about[:-1]) / 2 * np.diff(times))])
         told = angle - np.polyval(np.polyfit(times, angle, 1), times)
     told = told - told.mean()
     skewness = float(np.mean(told**3) / np.mean(told**2) ** 1.5)

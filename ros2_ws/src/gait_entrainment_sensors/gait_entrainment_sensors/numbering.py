@@ -48,7 +48,7 @@ class Numbering:
     Numbers the detections of both feet, given in the order in which they were detected.
 
     The first heel strike is step 0; with ``first_side`` it is step 0 or 1, such that strikes of
-    that side have even numbers. Strikes and toe-offs of a side return once a stride, so a detection
+    that side have even numbers. Strikes and toe-offs of a side return once a stride, so each
     belongs to the place of its kind and side that is nearest to where the period predicts it: half
     a stride either way. While the period is not known, to the next such place after the latest
     event before it. ``limits`` say which strides can be (`gait_entrainment.gait.GaitLimits`).

@@ -4,8 +4,8 @@
 """
 Gait events of a recording, and the table that keeps them.
 
-The table is an ``events.tsv`` of BIDS (1.10, "Task events"): ``onset`` and ``duration`` in seconds,
-``trial_type``, and columns of our own, which the JSON file beside it describes.
+The table is an ``events.tsv`` of BIDS (1.10, "Task events"): ``onset`` and ``duration`` in
+seconds, ``trial_type``, and columns of our own, which the JSON file beside it describes.
 """
 
 import csv
@@ -109,8 +109,8 @@ def write_events(path: Path, events: Iterable[DetectedEvent]) -> None:
         )
         for e in sorted(events, key=lambda e: e.event.stamp)
     ]
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, delimiter="\t", lineterminator="\n")
+    with path.open("w", encoding="utf-8", newline="") as table:
+        writer = csv.writer(table, delimiter="\t", lineterminator="\n")
         writer.writerow(COLUMNS)
         writer.writerows(rows)
     sidecar.write_text(json.dumps(COLUMNS, indent=2) + "\n", encoding="utf-8")
@@ -130,7 +130,9 @@ def read_events(path: Path) -> list[GaitEvent]:
         )
     times = _finite(path, "onset", table["onset"])
     sides = {side.name.lower(): side for side in Side}
-    kinds = [_one_of(path, "trial_type", row, text, KINDS) for row, text in _rows(table, "trial_type")]
+    kinds = [
+        _one_of(path, "trial_type", row, text, KINDS) for row, text in _rows(table, "trial_type")
+    ]
     feet = [_one_of(path, "side", row, text, sides) for row, text in _rows(table, "side")]
     sure = [0.0] * len(times)
     if "uncertainty" in table:

@@ -5,7 +5,7 @@
 Signals that were recorded elsewhere: a table with named columns.
 
 A column is named by side and signal, in SI units: ``left_force_z``, ``right_foot_gyro_y``. One in
-degrees, or degrees per second, says so: ``right_foot_gyro_y_deg``. The table of all is ``SIGNALS``.
+degrees, or degrees per second, says so: ``right_foot_gyro_y_deg``. ``SIGNALS`` lists all.
 """
 
 import csv
@@ -101,7 +101,8 @@ def read_streams(
     for name, column in (columns or {}).items():
         if column not in table:
             raise RecordingError(
-                f"{path}: has no column {column}, which is to be {name}; it has: {', '.join(table)}"
+                f"{path}: has no column {column}, which is to be {name}; it has: "
+                f"{', '.join(table)}"
             )
         table[name] = table[column]
     times = _times(path, table, rate)
@@ -115,7 +116,9 @@ def read_streams(
         if streams:
             return name, streams
     needed = " or ".join(" and ".join(f"SIDE_{s}" for s in names) for names in wanted.values())
-    raise RecordingError(f"{path}: lacks columns {needed}, or --column; it has: {', '.join(table)}")
+    raise RecordingError(
+        f"{path}: lacks columns {needed}, or --column; it has: {', '.join(table)}"
+    )
 
 
 def _times(path: Path, table: Mapping[str, list[str]], rate: float | None) -> list[float]:

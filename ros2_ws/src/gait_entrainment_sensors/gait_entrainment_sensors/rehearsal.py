@@ -87,8 +87,10 @@ def rehearse(protocol: Protocol, sensors: Sensors) -> Rehearsal:
     robot.activate()
     robot.begin(0)
     conductor = Conductor(protocol)
-    strides = {"variation": protocol.variation, "seed": protocol.seed}
-    walker, ended = Walker(protocol.walker, protocol.side, **strides), False
+    walker, ended = (
+        Walker(protocol.walker, protocol.side, variation=protocol.variation, seed=protocol.seed),
+        False,
+    )
     truth: list[GaitEvent] = []
     detected: list[GaitEvent] = []
     onsets: list[int] = []

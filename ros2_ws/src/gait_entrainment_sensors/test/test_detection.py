@@ -104,12 +104,13 @@ def test_a_clock_that_stands_still_or_jumps_is_told():
 
 def test_a_constant_signal_is_told_once():
     detector = FootGyroscopeDetector(Side.RIGHT, FootGyroscopeDetector.Settings(axis_y=1.0))
-    fed(detector, sampled(lambda t: (0.0, 0.1, 0.0), UNTIL))
+    fed(detector, sampled(lambda _: (0.0, 0.1, 0.0), UNTIL))
     assert detector.counts.constant == 1
 
 
 SAMPLE = st.tuples(
-    st.floats(-1.0, 1.0) | st.just(0.005) | st.floats(), st.lists(st.floats(), min_size=3, max_size=3)
+    st.floats(-1.0, 1.0) | st.just(0.005) | st.floats(),
+    st.lists(st.floats(), min_size=3, max_size=3),
 )
 
 

@@ -70,10 +70,17 @@ def test_noise_resolution_range_clock_and_dropouts_are_as_set():
     assert slope == pytest.approx(2.0, abs=0.5)
     assert abs(offset) < 12.0
     assert np.std(noisy - plain - slope * times - offset) == pytest.approx(7.0, rel=0.05)
-    clipped = [v for _, (v,) in measured("treadmill_force", settings=replace(quiet, full_scale=400, resolution=8.0))[0]]
+    clipped = [
+        v
+        for _, (v,) in measured(
+            "treadmill_force", settings=replace(quiet, full_scale=400, resolution=8.0)
+        )[0]
+    ]
     assert max(clipped) == 400.0
     assert {v % 8.0 for v in clipped} == {0.0}
-    rows, _ = measured("treadmill_force", settings=replace(quiet, clock_offset=0.5, clock_drift=1e-3))
+    rows, _ = measured(
+        "treadmill_force", settings=replace(quiet, clock_offset=0.5, clock_drift=1e-3)
+    )
     assert rows[1000][0] == pytest.approx(0.5 + 2.0 * 1.001)
     rows, _ = measured("treadmill_force", settings=replace(quiet, dropouts=30.0, dropout_time=0.2))
     gaps = np.diff([t for t, _ in rows])

@@ -46,10 +46,13 @@ def write(path, *, sign=-1.0, wrong=False, units="mm", labels=LABELS, plates=2, 
             left = [[x, 330.0 - y, z] for x, y, z in right]
         data[:3, :, frame] = np.array([*left, *right, [0.0, 0.0, 900.0]]).T
     file["data"]["points"] = data if points is None else points
+    file["data"]["analogs"] = np.zeros((1, 6 * plates, FRAMES * PER_FRAME))
+    if not plates:
+        file.write(str(path))
+        return path
     names = [f"{n}{p}" for p in range(plates) for n in ("Fx", "Fy", "Fz", "Mx", "My", "Mz")]
     analog["LABELS"]["value"] = names
     analog["UNITS"]["value"] = ["N", "N", "N", "Nmm", "Nmm", "Nmm"] * plates
-    file["data"]["analogs"] = np.zeros((1, max(len(names), 1), FRAMES * PER_FRAME))
     time = np.arange(FRAMES * PER_FRAME) / RATE / PER_FRAME
     for place, _, strike, toe_off in CONTACTS[:plates]:
         loaded = 800.0 * np.sin(np.pi * np.clip((time - strike) / (toe_off - strike), 0, 1))

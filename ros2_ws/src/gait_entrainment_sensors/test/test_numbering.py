@@ -97,7 +97,9 @@ def test_of_a_real_walk_27_right_strides_are_left_whatever_event_is_lost_or_doub
             detection.uncertainty,
         )
         rest = found[:place] + found[place + 1 :]
-        changed = rest if change == "delete" else sorted([*found, again], key=lambda d: d.detected_at)
+        changed = (
+            rest if change == "delete" else sorted([*found, again], key=lambda d: d.detected_at)
+        )
         analysis = analyze(numbered(changed)[1], (), Side.RIGHT)
         assert len(analysis.strides) >= 27
         assert analysis.event_counts.contradictory == 0
@@ -107,7 +109,9 @@ def test_a_pause_is_a_gap_and_a_stop_is_told():
     before = detections(10)
     pause = 3.5 * STRIDE
     after = [
-        Detection(d.kind, d.side, d.time + 10 * STRIDE + pause, d.detected_at + 10 * STRIDE + pause, 0.0)
+        Detection(
+            d.kind, d.side, d.time + 10 * STRIDE + pause, d.detected_at + 10 * STRIDE + pause, 0.0
+        )
         for d in detections(10)
     ]
     numbering = Numbering()
@@ -125,7 +129,7 @@ def test_a_pause_is_a_gap_and_a_stop_is_told():
 
 def test_a_wrong_first_event_does_not_silence_the_walk():
     wrong = Detection(STRIKE, Side.RIGHT, 0.0, 0.01, 0.0)
-    numbering, events = numbered([wrong, *detections(30)])
+    _, events = numbered([wrong, *detections(30)])
     analysis = analyze(events, (), Side.RIGHT)
     assert len(analysis.strides) >= 25
 

@@ -11,7 +11,13 @@ from walks import force, sampled
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.errors import EntrainmentError
 from gait_entrainment_sensors.detection import find_detector
-from gait_entrainment_sensors.offline import COLUMNS, detect, read_events, read_onsets, write_events
+from gait_entrainment_sensors.offline import (
+    COLUMNS,
+    detect,
+    read_events,
+    read_onsets,
+    write_events,
+)
 from gait_entrainment_sensors.recording import RecordingError, read_streams, read_table
 
 STRIKE, TOE_OFF = EventKind
@@ -51,7 +57,8 @@ def test_events_without_steps_are_numbered(walk, tmp_path):
     events, _ = events_of(walk)
     path = tmp_path / "theirs.csv"
     rows = [
-        f"{e.event.stamp / 1e9:.9f};{e.event.kind.name};{e.event.side.name.title()}" for e in events
+        f"{e.event.stamp / 1e9:.9f};{e.event.kind.name};{e.event.side.name.title()}"
+        for e in events
     ]
     path.write_text("\n".join(["onset;trial_type;side", *rows]))
     assert [(e.step, e.stamp) for e in read_events(path)] == [

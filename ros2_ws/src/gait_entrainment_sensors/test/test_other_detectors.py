@@ -4,6 +4,7 @@
 """Foot switch, shank gyroscope, ankle encoder: closed forms."""
 
 import math
+from itertools import pairwise
 
 import pytest
 from walks import OFFSET, STANCE, STRIDE, fed, sampled, times
@@ -69,7 +70,7 @@ def shank_rate(time):
     phase = phase_of(time)
     if time < OFFSET[Side.RIGHT]:
         return 0.0
-    strike = 2.5 * math.exp(-(min(phase, STRIDE - phase) / 0.015) ** 2)
+    strike = 2.5 * math.exp(-((min(phase, STRIDE - phase) / 0.015) ** 2))
     push = 3.0 * math.exp(-(((phase - STANCE) / 0.05) ** 2))
     stance = 1.0 if phase < STANCE else 0.0
     swing = -6.0 * math.sin(math.pi * (phase - STANCE) / (STRIDE - STANCE))
@@ -105,7 +106,7 @@ def test_the_encoder_follows_the_period_and_says_what_it_is():
     found = fed(detector, sampled(lambda t: (ankle(t), 0.0), UNTIL))
     strikes = times(found, STRIKE)
     assert len(strikes) >= 8
-    for a, b in zip(strikes, strikes[1:], strict=False):
+    for a, b in pairwise(strikes):
         assert b - a == pytest.approx(STRIDE, abs=0.011)
     assert times(found, TOE_OFF) == []
     assert any("a fallback" in line for line in detector.troubles())

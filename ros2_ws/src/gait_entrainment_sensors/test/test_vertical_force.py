@@ -3,6 +3,8 @@
 
 """Vertical force: a real belt, closed forms, steps on the wrong belt, and what cannot be."""
 
+from itertools import pairwise
+
 import pytest
 from public_data import belt
 from walks import OFFSET, STANCE, STRIDE, fed, force, sampled, times
@@ -26,7 +28,7 @@ def test_every_strike_of_a_real_belt_and_none_else():
     strikes = times(found, STRIKE)
     assert len(strikes) == 46
     # A walk without a gap: each stride is that of the others, to 10 %.
-    strides = [b - a for a, b in zip(strikes, strikes[1:], strict=False)]
+    strides = [b - a for a, b in pairwise(strikes)]
     assert max(strides) < 1.1 * min(strides)
     assert len(times(found, TOE_OFF)) == 47  # the record begins in stance
     assert all(d.detected_at - d.time <= detector.latency + 0.0101 for d in found)

@@ -36,8 +36,8 @@ def foot_rate(time, side=Side.RIGHT):
     """
     Sagittal rate of a foot, toes down positive [rad/s].
 
-    It slaps flat in 0.1 s after the strike; in the last 0.15 s of stance it turns down ever faster,
-    and from toe-off on the rate falls within 20 ms; the swing is a sine that ends at zero.
+    It slaps flat in 0.1 s after the strike; in the last 0.15 s of stance it turns down ever
+    faster, and from toe-off on the rate falls within 20 ms; the swing is a sine that ends at zero.
     """
     phase = (time - OFFSET[side]) % STRIDE
     if time < OFFSET[side] + 0.1:  # it stood before

@@ -97,7 +97,8 @@ def _of_tables(options: argparse.Namespace) -> int:
     lacking = [f"--{name}" for name in (*TABLES, "side") if getattr(options, name) is None]
     if options.bag is not None or lacking:
         raise UsageError(
-            f"give BAG, or else --events, --pulses and --side; missing: {', '.join(lacking) or '-'}"
+            "give BAG, or else --events, --pulses and --side; missing: "
+            f"{', '.join(lacking) or '-'}"
         )
     if options.figures is not None or options.onset is not None:
         raise UsageError("--figures and --onset need a BAG")

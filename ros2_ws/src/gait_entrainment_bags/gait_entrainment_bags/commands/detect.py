@@ -96,7 +96,7 @@ def _of_table(
     chosen = find_detector(options.detector) if options.detector else None
     name, streams = read_streams(
         path,
-        chosen and chosen.name,
+        chosen.name if chosen else None,
         chosen.detector.signals if chosen else (),
         _pairs("column", options.column),
         options.rate,
@@ -104,7 +104,9 @@ def _of_table(
     return detect(chosen or find_detector(name), streams)
 
 
-def _of_c3d(path: Path, options: argparse.Namespace) -> tuple[list[DetectedEvent], tuple[str, ...]]:
+def _of_c3d(
+    path: Path, options: argparse.Namespace
+) -> tuple[list[DetectedEvent], tuple[str, ...]]:
     names = _pairs("marker", options.marker)
     if unknown := [name for name in names if name not in MARKERS]:
         raise UsageError(f"--marker: {unknown[0]!r}; allowed: {', '.join(MARKERS)}")
@@ -116,7 +118,8 @@ def _of_c3d(path: Path, options: argparse.Namespace) -> tuple[list[DetectedEvent
     chosen: ChosenDetector = find_detector(options.detector or "vertical_force")
     if chosen.detector.signals != ("force_z",):
         raise UsageError(
-            f"--detector: {chosen.name} reads no force plate; allowed: vertical_force, {BY_MARKERS}"
+            f"--detector: {chosen.name} reads no force plate; allowed: vertical_force, "
+            f"{BY_MARKERS}"
         )
     sides = None if options.plates is None else _sides(options.plates)
     found, told = events_on_plates(capture, chosen, sides)

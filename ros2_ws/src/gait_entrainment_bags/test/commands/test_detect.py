@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""entrain detect, and entrain analyze of what it wrote: a run through tables, without this project."""
+"""entrain detect, and entrain analyze of tables: runs that this project did not record."""
 
 import json
 
@@ -43,9 +43,7 @@ def test_a_run_from_tables_has_the_outcome_of_the_same_run(capsys, tables, simul
     assert (told["verdict"], told["entrained_since_stride"]) == ("entrained", 29)
     lag = simulation.analysis.pulses[-1].phase_lag
     assert told["final_phase_lag"] == pytest.approx(lag, abs=1e-6)
-    late = entrain(
-        capsys, "analyze", *tables, "--side=right", "--toe-off-bias=0.01", "--json"
-    )[1]
+    late = entrain(capsys, "analyze", *tables, "--side=right", "--toe-off-bias=0.01", "--json")[1]
     assert json.loads(late)["final_phase_lag"] == pytest.approx(lag + 0.01, abs=1e-6)
 
 
@@ -64,11 +62,10 @@ def test_a_bag_or_tables_and_the_leg(capsys, words, message):
 
 
 def test_detect_writes_beside_the_file_and_prints(capsys, tmp_path):
-    rows = [
-        f"{n / 100:g},{800 if (n + shift) % 110 < 68 else 0},{800 if (n + 55 + shift) % 110 < 68 else 0}"
-        for n in range(1200)
-        for shift in (n % 2,)
-    ]
+    def load(n):
+        return 800 if n % 110 < 68 else 0
+
+    rows = [f"{n / 100:g},{load(n)},{load(n + 55)}" for n in range(1200)]
     path = tmp_path / "walk.csv"
     path.write_text("\n".join(["time,left_force_z,right_force_z", *rows]))
     code, out, err = entrain(capsys, "detect", path, "--json")
