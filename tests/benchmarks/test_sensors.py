@@ -7,6 +7,7 @@ import sys
 import time
 from collections import Counter
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -21,12 +22,12 @@ from gait_entrainment.conventions import EventKind, Side  # noqa: E402
 from gait_entrainment.gait import analyze  # noqa: E402
 from gait_entrainment.parameters import Variation  # noqa: E402
 from gait_entrainment.protocol import Protocol  # noqa: E402
+from gait_entrainment.walker import Walker  # noqa: E402
 from gait_entrainment_sensors.detection import find_detector  # noqa: E402
-from gait_entrainment_sensors.emulated import KINDS, EmulatedSensor  # noqa: E402
+from gait_entrainment_sensors.emulated import EmulatedSensor  # noqa: E402
 from gait_entrainment_sensors.offline import detect, number  # noqa: E402
 from gait_entrainment_sensors.recording import Stream  # noqa: E402
 from gait_entrainment_sensors.rehearsal import Sensors, rehearse  # noqa: E402
-from gait_entrainment.walker import Walker  # noqa: E402
 
 pytestmark = pytest.mark.benchmark
 
@@ -90,7 +91,7 @@ def test_a_real_belt():
     stream = Stream(Side.LEFT, [t for t, _ in rows], [v for _, v in rows])
     events, _ = detect(find_detector("vertical_force"), [stream])
     strikes = times(events, EventKind.HEEL_STRIKE, Side.LEFT)
-    strides = [b - a for a, b in zip(strikes, strikes[1:], strict=False)]
+    strides = [b - a for a, b in pairwise(strikes)]
     print(
         f"\nbelt: {len(strikes)} strikes of 46, strides {min(strides):.3f} to {max(strides):.3f} s"
     )

@@ -71,7 +71,8 @@ def read_c3d(path: Path, names: Mapping[str, str] | None = None) -> MotionCaptur
     except (OSError, RuntimeError, ValueError, IndexError) as error:
         reason = str(error).partition("\n")[0]
         raise RecordingError(f"{path}: cannot be read as C3D: {reason}") from None
-    labels = file["parameters"]["POINT"]["LABELS"]["value"]
+    # Some systems put the subject's name and a colon before each.
+    labels = [label.rpartition(":")[2] for label in file["parameters"]["POINT"]["LABELS"]["value"]]
     unit = _unit(path, file["parameters"]["POINT"].get("UNITS", {"value": ["mm"]})["value"])
     points = np.moveaxis(np.asarray(file["data"]["points"][:3], float), 0, -1) * unit
     rate = float(file["header"]["points"]["frame_rate"])
