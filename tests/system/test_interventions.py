@@ -3,6 +3,7 @@
 
 """Stops, cancellations and refusals in mid-run, and several runs of the same processes."""
 
+import math
 import pytest
 from harness import QUICK, session, stamp_of
 from lifecycle_msgs.msg import Transition
@@ -64,7 +65,10 @@ class Conducted:
         return answer.result
 
     def reset(self):
-        return self.probe.call(Trigger, "walker/reset")
+        client = self.probe.client
+        client.service(Trigger, "walker/reset")
+        client.wait_to_be_known("walker_sim")
+        return client.call(Trigger, "walker/reset", period=math.inf)
 
 
 @pytest.fixture(scope="module")

@@ -56,6 +56,8 @@ VIEWED = quality(100)
 SAID_ONCE = quality(1, lasting=True)
 # For who only looks on: the writer never waits for it. It holds a stretch of a lock-step run.
 LOOKING_ON = quality(1000, reliable=False)
+# What a sensor's driver sends, whatever quality it offers: 2 s of a force plate.
+FROM_A_DRIVER = quality(2048, reliable=False)
 # Only the latest sign of life counts, and nobody waits for anybody.
 HEARTBEAT = quality(1, reliable=False)
 

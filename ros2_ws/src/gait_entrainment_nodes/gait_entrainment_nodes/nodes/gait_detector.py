@@ -112,7 +112,7 @@ class GaitDetector(Participant):
         if given := getattr(self.settings, f"{side.name.lower()}_topic"):
             topic = topic._replace(name=given)
         if not self.settings.simulated:  # of a driver, whatever it offers
-            topic = topic._replace(qos=topics.quality(2048, reliable=False))
+            topic = topic._replace(qos=topics.FROM_A_DRIVER)
         read = reader_of(source, detector.signals)
         self.subscribe(topic, partial(self._on_sample, side, read))
         return topic
