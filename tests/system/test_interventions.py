@@ -4,6 +4,7 @@
 """Stops, cancellations and refusals in mid-run, and several runs of the same processes."""
 
 import math
+
 import pytest
 from harness import QUICK, session, stamp_of
 from lifecycle_msgs.msg import Transition

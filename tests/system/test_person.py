@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A person in the walker's place: rehearsed through sensors, played from outside, and gone wrong."""
+"""A person in the walker's place: rehearsed through sensors, played from outside, gone wrong."""
 
 import os
 import re
@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -176,7 +177,9 @@ def test_what_sensors_do_wrong_is_told_by_name(tmp_path):
             texts = [status.message for array in heard for status in array.status]
             return [text for text in texts if re.search(pattern, text)]
 
-        assert "ground_reaction/left [geometry_msgs/msg/WrenchStamped]: not published" in waits_for()
+        assert (
+            "ground_reaction/left [geometry_msgs/msg/WrenchStamped]: not published" in waits_for()
+        )
         with other_probe(nodes.domain) as other:  # one process has one type for a topic
             other.node.create_publisher(String, "ground_reaction/left", 10)
             probe.until(lambda: "published as std_msgs/msg/String" in waits_for(), "a wrong type")
@@ -197,8 +200,10 @@ def test_what_sensors_do_wrong_is_told_by_name(tmp_path):
         feet.until(lambda: said("samples are not numbers"), "what is told of NaN")
         feet.value = None
         feet.silent = {Side.RIGHT}
-        feet.until(lambda: said(r"right vertical_force: no sample for \d"), "what is told of silence")
+        feet.until(
+            lambda: said(r"right vertical_force: no sample for \d"), "what is told of silence"
+        )
         count = len(events)
         feet.silent = set()
         feet.until(lambda: len(events) > count + 8, "events after all that")
-        assert all(b.step >= a.step for a, b in zip(events, events[1:], strict=False))
+        assert all(b.step >= a.step for a, b in pairwise(events))

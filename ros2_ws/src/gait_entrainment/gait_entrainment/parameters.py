@@ -299,21 +299,14 @@ class WalkerParameters:
 @dataclass(frozen=True)
 class Variation:
     """
-    How the stride period of the walker varies by itself, which the paper's walker does not.
+    How the stride period varies by itself, which that of the paper's walker does not.
 
-    Adults: 1 to 3 %, with an exponent of about 0.75 (Hausdorff et al., J. Appl. Physiol. 78,
-    349, 1995). ``walker.variation`` says how it comes about.
+    Adults: 1 to 3 %, exponent about 0.75 (Hausdorff et al., J. Appl. Physiol. 78, 349, 1995).
     """
 
-    coefficient: float = setting(
-        0.0, "coefficient of variation of the stride period", "1", (0.0, 0.2)
-    )
+    coefficient: float = setting(0.0, "coefficient of variation of the period", "1", (0.0, 0.2))
     exponent: float = setting(
-        0.75,
-        "long-range exponent of the variation (Hurst); 0.5 is white",
-        "1",
-        (0.5, 1.0),
-        most_excluded=True,
+        0.75, "its long-range (Hurst) exponent; 0.5: white", "1", (0.5, 1.0), most_excluded=True
     )
 
     def __post_init__(self) -> None:

@@ -53,8 +53,8 @@ def simulate(
     robot.activate()
     robot.begin(0)
     conductor = Conductor(protocol)
-    strides = {"variation": protocol.variation, "seed": protocol.seed}
-    walker, ended = Walker(protocol.walker, protocol.side, **strides), False
+    walker = Walker(protocol.walker, protocol.side, None, protocol.variation, protocol.seed)
+    ended = False
     events: list[GaitEvent] = []
     onsets: list[int] = []
     measured = MeasuredOnsets()

@@ -67,10 +67,7 @@ class GaitAnalyzer:
     """
 
     def __init__(
-        self,
-        side: Side,
-        settings: VerdictSettings | None = None,
-        toe_off_bias: float = 0.0,
+        self, side: Side, settings: VerdictSettings | None = None, toe_off_bias: float = 0.0
     ) -> None:
         self._bias = nanoseconds(toe_off_bias)
         self._tracker = StrideTracker(side, _ANYBODY)

@@ -53,15 +53,15 @@ def _covariance(lags: int, hurst: float) -> Floats:
     return np.asarray(0.5 * ((lag + 1) ** power - 2 * lag**power + np.abs(lag - 1) ** power))
 
 
-def made_for_any_stiffness(model: Any) -> Any:
+def made_for_any_stiffness(model: Any, stiffness: float) -> Any:
     """
-    Return a copy of a walker's constants (`Model`) that holds whatever the stiffness.
+    Return a copy of a walker's constants (`Model`), with a stiffness, that holds for any other.
 
-    Those of the whole double stance do not, so it is made a quadrature of its own each time, and
-    searched for a fall or fly-off.
+    The whole double stance is made a quadrature each time, and searched for a fall or fly-off.
     """
     made = model.copy()
     made["whole_double_stance_apex"], made["least_gain"] = np.inf, -np.inf
+    made["ankle_stiffness"] = stiffness
     return made
 
 
@@ -82,7 +82,7 @@ def stride_response(model: Any, hurst: float) -> float:
     """
     turn = model["max_plantarflexion"] - model["double_stance_start"]
     stiffness, apex, kept = (model[n] for n in ("ankle_stiffness", "start_apex", "restitution"))
-    turned = np.append(0.5 * turn * (1 + model["rule"][NODES]), turn)
+    turned: Any = np.append(0.5 * turn * (1 + model["rule"][NODES]), turn)
     work = model["per_energy"] * torque_work(turned, stiffness * turn, stiffness)
     gained, energy = work[:-1], work[-1]
     (gain, weights), (later_gain, later_weights) = (

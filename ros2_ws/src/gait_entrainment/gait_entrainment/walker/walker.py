@@ -23,14 +23,7 @@ from gait_entrainment.walker.model import Floats, Stamps, make_model, start_apex
 from gait_entrainment.walker.promise import PromisedTorque
 from gait_entrainment.walker.sampling import SAMPLE, Samples, fill_samples, samples_from
 from gait_entrainment.walker.segment import SEGMENT, Log, Stance, Switch, leg_sine_at
-from gait_entrainment.walker.trajectory import (
-    ENDED,
-    SWITCHED,
-    Torques,
-    advance,
-    start_walking,
-    stiffen,
-)
+from gait_entrainment.walker.trajectory import ENDED, SWITCHED, Torques, advance, start_walking
 from gait_entrainment.walker.transitions import clock, seconds
 from gait_entrainment.walker.variation import made_for_any_stiffness, push_off_stiffness
 
@@ -94,8 +87,7 @@ class Walker:
     The ankle-actuated walker, driven by torque promises for both ankles.
 
     It starts at stamp 0, right after heel strike number 0 of `first_heel_strike`, in the
-    period-one gait or with the mass at `initial_speed` [m/s]. Its strides may vary, as `seed` has
-    it.
+    period-one gait or with the mass at `initial_speed` [m/s]. Its strides may vary.
 
     An event comes before a torque change of the same stamp, and a change acts only after its
     stamp: a sample shows the events of its own stamp, but the torque up to it. So everything up to
@@ -117,7 +109,7 @@ class Walker:
         self._stiffness = np.empty(0)  # of each push-off, by step [N m/rad]; empty: of the model
         if variation is not None and variation.coefficient:
             self._stiffness = push_off_stiffness(self._model, variation, seed)
-            self._model = made_for_any_stiffness(self._model)
+            self._model = made_for_any_stiffness(self._model, self._stiffness[1])
         self._promises = (PromisedTorque(), PromisedTorque())
         self._log: Log = np.zeros(16, SEGMENT)
         self._count = 1
@@ -125,7 +117,6 @@ class Walker:
         self._sampled_from = 0
         self.time_reached = 0
         self.ending: Ending | None = None
-        stiffen(self._model, 1, self._stiffness)
         start_walking(self._model, self._log[0], int(first_heel_strike), apex)
 
     @property

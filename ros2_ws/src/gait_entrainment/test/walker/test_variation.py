@@ -82,7 +82,9 @@ def test_each_push_off_has_its_own_stiffness():
 
 
 def test_seeds_differ_and_nothing_asked_is_the_papers_gait():
-    protocol = replace(DEFAULT_PROTOCOL, baseline=4, pulses=replace(DEFAULT_PROTOCOL.pulses, count=3))
+    protocol = replace(
+        DEFAULT_PROTOCOL, baseline=4, pulses=replace(DEFAULT_PROTOCOL.pulses, count=3)
+    )
     paper = simulate(protocol).events
     assert simulate(replace(protocol, variation=Variation(0.0, 0.9), seed=3)).events == paper
     varied = replace(protocol, variation=Variation(0.02))

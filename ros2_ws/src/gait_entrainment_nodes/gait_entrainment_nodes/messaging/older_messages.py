@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Messages of this project as earlier versions recorded them: what has been added is left empty."""
+"""Messages of this project as earlier versions recorded them: what was added is left empty."""
 
 from collections.abc import Callable
 from typing import Any

@@ -84,7 +84,7 @@ class SensorWriter:
             if source in (FOOT, SHANK):  # REP 145: not measured
                 made.orientation_covariance[0] = made.linear_acceleration_covariance[0] = -1.0
             fields = {source.fields[signal]: 1 for signal in signals}
-            self._templates = {(): MessageTemplate(made, fields)}
+            self._template = MessageTemplate(made, fields)
 
     def write(self, samples: Sequence[tuple[int, tuple[float, ...]]]) -> list[bytes]:
         """Return one serialized message for each (stamp [ns], values)."""
@@ -97,4 +97,4 @@ class SensorWriter:
             ]
         stamps = np.array([stamp for stamp, _ in samples], np.int64)
         columns = np.array([values for _, values in samples], float).T[..., None]
-        return self._templates[()].fill(stamps, *columns)
+        return self._template.fill(stamps, *columns)

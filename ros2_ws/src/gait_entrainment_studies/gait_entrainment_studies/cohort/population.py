@@ -90,7 +90,10 @@ class Population:
         if not -1 < asymmetry < 1:
             raise UsageError(f"asymmetry: {asymmetry:g}; allowed: above -1 and below 1")
         self.size = len(walkers)
-        self._models = [made_for_any_stiffness(make_model(walker, slope)) for walker in walkers]
+        self._models = [
+            made_for_any_stiffness(make_model(walker, slope), walker.ankle_stiffness)
+            for walker in walkers
+        ]
         # In even steps the leg that is not perturbed trails and pushes off.
         self._sides = 1 - asymmetry, 1 + asymmetry
 
