@@ -213,7 +213,7 @@ def events_of_markers(capture: MotionCapture) -> list[Detection]:
 
     Heel strike is where the heel is furthest ahead, toe-off where the toe is furthest behind
     (Zeni, Richards and Higginson, Gait Posture 27, 710, 2008): within 16.7 ms in 94 % of
-    strides. Not causal: an event is decided by all of the recording. Hidden markers are interpolated.
+    strides. Not causal. Hidden markers are interpolated.
     Raises RecordingError if a marker is missing.
     """
     from scipy.signal import find_peaks

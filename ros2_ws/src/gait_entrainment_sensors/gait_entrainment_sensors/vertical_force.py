@@ -50,8 +50,8 @@ class VerticalForceDetector(Detector):
     A foot is on the ground once the force exceeds ``strike_force``, and off it once it is below
     ``toe_off_force``; both events are put where the force crossed the latter, interpolated between
     samples. 20 N is the usual threshold (Tirosh and Sparrow, J. Appl. Biomech. 19, 2003), far
-    above the noise of a plate; a belt shakes more, hence the hysteresis. The zero follows the force
-    in swing, and is taken anew if a foot seems never to leave the ground.
+    above the noise of a plate; a belt shakes more, hence the hysteresis. The zero follows the
+    force in swing, and is taken anew if a foot seems never to leave the ground.
 
     Steps on the wrong belt: a strike after less than half of the own median swing, and a toe-off
     after a stance that is too short or too long, are the other foot's, and rejected.
