@@ -172,7 +172,7 @@ def _one_of(path: Path, name: str, row: int, text: str, allowed: dict[str, Any])
 def _finite(path: Path, name: str, texts: Sequence[str]) -> list[float]:
     numbers = column_numbers(path, name, texts)
     for row, value in enumerate(numbers, 2):
-        if not abs(value) < 1e9:
+        if not abs(value) < 1e10:  # it may count from 1970
             raise RecordingError(
                 f"{path}: row {row}, column {name}: {texts[row - 2]!r}; allowed: a finite number"
             )

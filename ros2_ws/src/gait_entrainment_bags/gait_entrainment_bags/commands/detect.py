@@ -11,6 +11,7 @@ from pathlib import Path
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.errors import UsageError
 from gait_entrainment.robot.drivers import split_options
+from gait_entrainment_bags.recorded_signals import read_signals
 from gait_entrainment_sensors.detection import ChosenDetector, find_detector
 from gait_entrainment_sensors.motion_capture import (
     MARKERS,
@@ -27,6 +28,7 @@ EXAMPLES = """examples:
   entrain detect walk.csv --rate 204.8 --column left_foot_gyro_y_deg=gyr_y ...
   entrain detect walk.csv --detector foot_gyroscope:axis_y=1,toe_off_bias=0.004
   entrain detect trial.c3d                      force plates, whose feet by the markers
+  entrain detect bags/mine --detector vertical_force
   entrain detect trial.c3d --detector markers --marker left_heel=L_FCC ...
 columns: docs/sensors.md
 """
@@ -36,7 +38,7 @@ BY_MARKERS = "markers"
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="table (.csv, .tsv) or C3D file")
+    parser.add_argument("file", type=Path, metavar="FILE", help="table (.csv, .tsv), C3D file or bag")
     parser.add_argument("--out", type=Path, metavar="FILE", help="default: FILE_events.tsv")
     parser.add_argument(
         "--detector",
@@ -65,7 +67,8 @@ def run(options: argparse.Namespace) -> int:
     out = options.out or path.with_name(f"{path.stem}_events.tsv")
     if not path.exists():
         raise RecordingError(f"{path}: there is no such file")
-    events, troubles = (_of_c3d if path.suffix.lower() == ".c3d" else _of_table)(path, options)
+    read = {".c3d": _of_c3d, ".mcap": _of_bag}.get(path.suffix.lower(), _of_table)
+    events, troubles = (_of_bag if path.is_dir() else read)(path, options)
     if not events:
         reason = f": {'; '.join(troubles)}" if troubles else ""
         raise RecordingError(f"{path}: holds no gait event that could be detected{reason}")
@@ -101,6 +104,14 @@ def _of_table(
         _pairs("column", options.column),
         options.rate,
     )
+    return detect(chosen or find_detector(name), streams)
+
+
+def _of_bag(
+    path: Path, options: argparse.Namespace
+) -> tuple[list[DetectedEvent], tuple[str, ...]]:
+    chosen = find_detector(options.detector) if options.detector else None
+    name, streams = read_signals(path, chosen.name if chosen else None)
     return detect(chosen or find_detector(name), streams)
 
 

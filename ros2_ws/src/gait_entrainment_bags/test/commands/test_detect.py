@@ -10,6 +10,8 @@ import pytest
 from gait_entrainment.commands import main
 from gait_entrainment.protocol import Protocol
 from gait_entrainment.simulation import simulate
+from gait_entrainment_bags import BagWriter
+from gait_entrainment_sensors.offline import read_events
 
 
 def entrain(capsys, *words):
@@ -100,3 +102,41 @@ def test_what_is_refused_is_one_line(capsys, tmp_path, words, message):
     assert (code, out) == (2, "")
     assert message in err
     assert err.count("\n") == 1
+
+
+def test_the_signals_of_a_bag_in_any_namespace(capsys, tmp_path, topic, typestore, joint_state):
+    def wrench(stamp, force):
+        types = typestore.types
+        vectors = [
+            types["geometry_msgs/msg/Vector3"](0.0, 0.0, z) for z in (float(force), 0.0)
+        ]
+        header = types["std_msgs/msg/Header"](
+            types["builtin_interfaces/msg/Time"](*divmod(stamp, 10**9)), ""
+        )
+        name = "geometry_msgs/msg/WrenchStamped"
+        message = types[name](header, types["geometry_msgs/msg/Wrench"](*vectors))
+        return bytes(typestore.serialize_cdr(message, name))
+
+    folder, start = tmp_path / "walk", 1_700_000_000
+    with BagWriter(folder, ros_distro="jazzy") as writer:
+        for leg in ("left", "right"):
+            name = f"/lab/ground_reaction/{leg}"
+            writer.add_topic(topic(name, "geometry_msgs/msg/WrenchStamped"))
+        writer.add_topic(topic("/foot_switch/left", "sensor_msgs/msg/JointState"))
+        writer.write("/foot_switch/left", joint_state(start * 10**9, [0.0]), 1, 1)
+        for n in range(600):
+            stamp = start * 10**9 + n * 10**7
+            for leg, late in (("left", 0), ("right", 55)):
+                force = 800 if (n + late) % 110 < 68 else 0
+                writer.write(f"/lab/ground_reaction/{leg}", wrench(stamp, force), stamp, stamp)
+    code, out, err = entrain(capsys, "detect", folder, "--json", "--out", tmp_path / "e.tsv")
+    assert (code, err) == (0, "")
+    assert json.loads(out)["detector"] == "vertical_force"
+    first = read_events(tmp_path / "e.tsv")[0]
+    assert first.stamp == pytest.approx((start + 0.55) * 1e9, abs=0.6e9)
+    code, _, err = entrain(capsys, "detect", folder, "--detector", "foot_switch")
+    assert code == 1
+    assert "/foot_switch/left: a sensor_msgs/msg/JointState has no such field" in err
+    code, _, err = entrain(capsys, "detect", folder, "--detector", "shank_gyroscope")
+    assert code == 1
+    assert "lacks topics of sensors: imu/left_shank, imu/right_shank" in err
