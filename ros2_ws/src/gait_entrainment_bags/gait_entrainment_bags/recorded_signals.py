@@ -62,7 +62,5 @@ def _stream(bag: BagReader, side: Side, topic: str, fields: tuple[str, ...]) -> 
             raise BagError(f"{bag.path}: {topic}: a {kind} has no such field: {error}") from None
         times.append(nanoseconds_of(stamp) / NANOSECONDS_PER_SECOND)
         # A joint state has lists; of one joint here.
-        values.append(
-            tuple(float(v[0] if isinstance(v, list | tuple) else v) for v in signals)
-        )
+        values.append(tuple(float(v[0] if isinstance(v, list | tuple) else v) for v in signals))
     return Stream(side, times, values)

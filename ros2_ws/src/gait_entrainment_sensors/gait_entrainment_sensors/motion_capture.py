@@ -57,9 +57,12 @@ class MotionCapture:
     up: int  # the vertical axis
 
 
-def read_c3d(path: Path, names: Mapping[str, str] | None = None) -> MotionCapture:
+def read_c3d(
+    path: Path, names: Mapping[str, str] | None = None, *, plates: bool = True
+) -> MotionCapture:
     """
-    Read a C3D file; ``names`` says which of its markers is left_heel, right_toe, ..., pelvis.
+    Read a C3D file; ``names`` says which of its markers is left_heel, right_toe, ..., pelvis;
+    ``plates`` whether its force plates are wanted.
 
     The sign of vertical forces is taken such that feet press the plates down.
     Raises RecordingError if it is none, or lacks a marker that is named.
@@ -67,7 +70,7 @@ def read_c3d(path: Path, names: Mapping[str, str] | None = None) -> MotionCaptur
     import ezc3d  # for this alone: it takes a quarter of a second to load
 
     try:
-        file = ezc3d.c3d(str(path), extract_forceplat_data=True)
+        file = ezc3d.c3d(str(path), extract_forceplat_data=plates)
     except (OSError, RuntimeError, ValueError, IndexError) as error:
         reason = str(error).partition("\n")[0]
         raise RecordingError(f"{path}: cannot be read as C3D: {reason}") from None
@@ -90,8 +93,8 @@ def read_c3d(path: Path, names: Mapping[str, str] | None = None) -> MotionCaptur
     platforms = file["data"].get("platform", [])
     up = _vertical(platforms)
     analog = float(file["header"]["analogs"]["frame_rate"])
-    plates = tuple(_plate(path, platform, analog, up) for platform in platforms)
-    return MotionCapture(path, plates, np.arange(points.shape[1]) / rate, markers, up)
+    found_plates = tuple(_plate(path, platform, analog, up) for platform in platforms)
+    return MotionCapture(path, found_plates, np.arange(points.shape[1]) / rate, markers, up)
 
 
 def _unit(path: Path, units: Sequence[str]) -> float:

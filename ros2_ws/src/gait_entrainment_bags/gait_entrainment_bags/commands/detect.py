@@ -38,7 +38,9 @@ BY_MARKERS = "markers"
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="table (.csv, .tsv), C3D file or bag")
+    parser.add_argument(
+        "file", type=Path, metavar="FILE", help="table (.csv, .tsv), C3D file or bag"
+    )
     parser.add_argument("--out", type=Path, metavar="FILE", help="default: FILE_events.tsv")
     parser.add_argument(
         "--detector",
@@ -121,7 +123,7 @@ def _of_c3d(
     names = _pairs("marker", options.marker)
     if unknown := [name for name in names if name not in MARKERS]:
         raise UsageError(f"--marker: {unknown[0]!r}; allowed: {', '.join(MARKERS)}")
-    capture = read_c3d(path, names)
+    capture = read_c3d(path, names, plates=options.detector != BY_MARKERS)
     if options.detector == BY_MARKERS or not (capture.plates or options.detector):
         return number(events_of_markers(capture), BY_MARKERS)
     if not capture.plates:

@@ -107,9 +107,7 @@ def test_what_is_refused_is_one_line(capsys, tmp_path, words, message):
 def test_the_signals_of_a_bag_in_any_namespace(capsys, tmp_path, topic, typestore, joint_state):
     def wrench(stamp, force):
         types = typestore.types
-        vectors = [
-            types["geometry_msgs/msg/Vector3"](0.0, 0.0, z) for z in (float(force), 0.0)
-        ]
+        vectors = [types["geometry_msgs/msg/Vector3"](0.0, 0.0, z) for z in (float(force), 0.0)]
         header = types["std_msgs/msg/Header"](
             types["builtin_interfaces/msg/Time"](*divmod(stamp, 10**9)), ""
         )
