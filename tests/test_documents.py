@@ -21,6 +21,7 @@ QUALITIES = {
     "said once": topics.SAID_ONCE,
     "looking on": topics.LOOKING_ON,
     "heartbeat": topics.HEARTBEAT,
+    "from a driver": topics.FROM_A_DRIVER,
 }
 
 

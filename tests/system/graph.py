@@ -50,6 +50,7 @@ def graph(probe: Probe) -> str:
         asked: dict[str, set[str]] = {}
         for name, _ in node.get_client_names_and_types_by_node(asker, "/"):
             server, _, service = name.strip("/").replace("/_action", "").partition("/")
+            server = {"walker": "walker_sim"}.get(server, server)  # who plays the role here
             if service != "ready":
                 asked.setdefault(server, set()).add(service.partition("/")[0])
         for server, services in sorted(asked.items()):

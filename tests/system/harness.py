@@ -173,6 +173,8 @@ def cpu_seconds(pid: int) -> float:
 class Started:
     """A command that starts nodes, as a process, with a look at the processes that it starts."""
 
+    names: Sequence[str] = NODES  # that it starts
+
     def __init__(self, command: Sequence[str], out: Path, **environment: str) -> None:
         self.out = out
         with self.out.open("wb") as out_file:
@@ -206,8 +208,9 @@ class Started:
         """What it has printed so far."""
         return self.out.read_text(errors="replace")
 
-    def find_nodes(self, names: Sequence[str] = NODES) -> dict[str, int]:
+    def find_nodes(self, names: Sequence[str] = ()) -> dict[str, int]:
         """Return the process ids of all its nodes, once they are there."""
+        names = names or self.names
         deadline = time.monotonic() + PATIENCE
         while self.nodes.keys() != set(names):
             assert self.process.poll() is None, self.text
@@ -295,10 +298,12 @@ class Session:
         participants: Sequence[str] = (),
         strangers: bool = False,
         recorded: bool = True,
+        walker: str = "simulated",
     ) -> None:
-        self.bag = folder / "bag"
+        self.bag, self.domain = folder / "bag", domain
         self.protocol = protocol_of(*options)
-        given = parameters(self.protocol, self.bag if recorded else None, real_time=real_time)
+        bag = self.bag if recorded else None
+        given = parameters(self.protocol, bag, real_time=real_time, walker=walker)
         del given["bag_recorder"]["publishers"]  # it records until it is stopped
         if participants:
             given["experiment"]["participants"] = list(participants)
@@ -340,6 +345,7 @@ def session(
     real_time: bool = True,
     participants: Sequence[str] = (),
     strangers: bool = False,
+    walker: str = "simulated",
 ) -> Iterator[Session]:
     """
     Start nodes in a domain of their own; stop them in the end.
@@ -347,8 +353,8 @@ def session(
     If ``strangers`` may ask for pulses, the perturbator knows no protocol that these must be of.
     """
     with claimed_domain() as domain:
-        recorded = RECORDER in nodes
-        running = Session(folder, domain, options, real_time, participants, strangers, recorded)
+        told = (options, real_time, participants, strangers, RECORDER in nodes, walker)
+        running = Session(folder, domain, *told)
         try:
             running.start(*nodes)
             yield running

@@ -13,7 +13,7 @@ import yaml
 from harness import PATIENCE
 
 from gait_entrainment_bags import BagReader
-from gait_entrainment_bringup.node_list import NODES, PUBLISHERS
+from gait_entrainment_bringup.node_list import NODES
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -82,7 +82,7 @@ def test_services_conduct_and_record_one_experiment(tmp_path):
         text, _ = start("outcome").communicate(timeout=PATIENCE)
         assert "strides          9, pulses placed in them: 5" in text
         assert_no_state_is_counted(tmp_path / "bags/from_compose")
-        for name in set(PUBLISHERS) - {"experiment"}:
+        for name in set(NODES) - {"bag_recorder", "experiment"}:
             running[name].terminate()
             assert running[name].wait(PATIENCE) == 0, name
 

@@ -3,6 +3,8 @@
 
 """Stops, cancellations and refusals in mid-run, and several runs of the same processes."""
 
+import math
+
 import pytest
 from harness import QUICK, session, stamp_of
 from lifecycle_msgs.msg import Transition
@@ -67,7 +69,10 @@ class Conducted:
         return answer.result
 
     def reset(self):
-        return self.probe.call(Trigger, "walker_sim/reset")
+        client = self.probe.client
+        client.service(Trigger, "walker/reset")
+        client.wait_to_be_known("walker_sim")
+        return client.call(Trigger, "walker/reset", period=math.inf)
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +81,7 @@ def conducted(tmp_path_factory):
         yield Conducted(nodes)
     # Runs 2, 4 and 5 were refused. All are in one bag; torque was on only before its run's stop.
     with BagReader(nodes.bag) as reader:
-        recorded = list(reader.decoded(["/walker_sim/progress", "/ankle_torque"]))
+        recorded = list(reader.decoded(["/walker/progress", "/ankle_torque"]))
         profiles = list(reader.decoded(["/perturbation/torque_profile"]))
     finals = {m.run: raw for raw, m in recorded if raw.topic.endswith("progress") and m.state}
     assert set(finals) == {1, 3, 6}
@@ -172,7 +177,7 @@ def test_walker_that_counts_events_which_nobody_receives_ends_the_run(tmp_path):
             response.ready = True
             return response
 
-        probe.node.create_service(StartRun, "walker_sim/start", start)
+        probe.node.create_service(StartRun, "walker/start", start)
         probe.node.create_service(Ready, "walker_sim/ready", ready)
         profiles = probe.listen(TORQUE_PROFILE)
         handle = nodes.conduct()

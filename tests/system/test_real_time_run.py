@@ -77,7 +77,7 @@ def test_every_sample_is_there_with_its_exact_stamp(real_time_run):
     assert outcome["lost"] == 0
     with BagReader(bag) as reader:
         start = min(m.log_time for m in reader.messages(["/gait_events"]))
-        end = max(m.log_time for m in reader.messages(["/walker_sim/progress"]))
+        end = max(m.log_time for m in reader.messages(["/walker/progress"]))
         samples = (end - start) * RATE // 10**9
         assert samples > 15 * RATE
         due = [start + k * 10**9 // RATE for k in range(samples)]

@@ -120,7 +120,7 @@ def without(bag: Path, out: Path, drop: Callable[[int, str, Any], bool]) -> Path
         pytest.param(
             lambda n, topic, _: topic == "/gait_events" and n in (30, 47, 48, 61), id="gaps"
         ),
-        pytest.param(lambda _, topic, c: topic == "/walker_sim/progress" and c.state, id="no end"),
+        pytest.param(lambda _, topic, c: topic == "/walker/progress" and c.state, id="no end"),
     ],
 )
 def test_a_bag_that_lacks_messages_gives_the_same_replayed_and_offline(

@@ -8,6 +8,8 @@ from setuptools import find_packages, setup
 NAME = "gait_entrainment_nodes"
 NODES = [
     "walker_sim",
+    "sensor_sim",
+    "gait_detector",
     "perturbator",
     "gait_analyzer",
     "experiment",

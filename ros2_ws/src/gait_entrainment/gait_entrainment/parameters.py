@@ -294,3 +294,21 @@ class WalkerParameters:
     def least_leading_force(self) -> float:
         """Smallest ground reaction [N] of the leading leg over the period-one gait."""
         return -self._most_while_leading(lambda hold, lift: self.ankle_stiffness * lift - hold)
+
+
+@dataclass(frozen=True)
+class Variation:
+    """
+    How the stride period varies by itself, which that of the paper's walker does not.
+
+    Adults: 1 to 3 %, exponent about 0.75 (Hausdorff et al., J. Appl. Physiol. 78, 349, 1995).
+    """
+
+    coefficient: float = setting(0.0, "coefficient of variation of the period", "1", (0.0, 0.2))
+    exponent: float = setting(
+        0.75, "its long-range (Hurst) exponent; 0.5: white", "1", (0.5, 1.0), most_excluded=True
+    )
+
+    def __post_init__(self) -> None:
+        """Check both fields."""
+        check_settings(self)

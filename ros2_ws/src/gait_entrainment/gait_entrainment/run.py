@@ -6,6 +6,7 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import chain
 
 from gait_entrainment.conventions import Side
@@ -47,6 +48,7 @@ def analyze_blocks(
     side: Side,
     settings: VerdictSettings | None = None,
     unknown: Sequence[tuple[int, int]] = (),
+    toe_off_bias: float = 0.0,
 ) -> tuple[Analysis, tuple[JudgedBlock, ...]]:
     """
     Analyze a run, and each of its blocks, unless its protocol is one of fixed length.
@@ -55,20 +57,20 @@ def analyze_blocks(
     blocks, pulses, verdicts and holes of the run are those of its blocks.
     """
     plans = [block.plan for block in blocks]
-    whole = analyze(events, onsets, side, settings_for(plans, settings), unknown)
+    judge = partial(analyze, side=side, toe_off_bias=toe_off_bias)
+    whole = judge(events, onsets, settings=settings_for(plans, settings), unknown=unknown)
     if len(blocks) <= 1 and not any(block.plan.open_ended for block in blocks):
         return whole, ()
     judged = []
     for block in blocks:
         start = block.start or 0
         end = math.inf if block.end is None else block.end
-        analysis = analyze(
+        analysis = judge(
             [event for event in events if start <= event.stamp <= end],
             [onset for onset in onsets if start <= onset < end],
-            side,
-            settings_for([block.plan], settings),
-            [hole for hole in unknown if start < hole[1] and hole[0] < end],
-            block.strides_before,
+            settings=settings_for([block.plan], settings),
+            unknown=[hole for hole in unknown if start < hole[1] and hole[0] < end],
+            strides_before=block.strides_before,
         )
         strides = [stride.number for stride in analysis.strides if stride.end == end]
         judged.append(

@@ -53,7 +53,8 @@ def simulate(
     robot.activate()
     robot.begin(0)
     conductor = Conductor(protocol)
-    walker, ended = Walker(protocol.walker, first_heel_strike=protocol.side), False
+    walker = Walker(protocol.walker, protocol.side, None, protocol.variation, protocol.seed)
+    ended = False
     events: list[GaitEvent] = []
     onsets: list[int] = []
     measured = MeasuredOnsets()

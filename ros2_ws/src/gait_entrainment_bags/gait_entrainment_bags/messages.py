@@ -36,7 +36,8 @@ def event_of(message: Any, start: int = 0) -> GaitEvent:
     """Return the event of a GaitEvent message; raises MessageError for an unknown kind or side."""
     stamp = nanoseconds_of(message.header.stamp) - start
     kind = _member(EventKind, "kind", message.kind)
-    return GaitEvent(stamp, kind, side_of(message), int(message.step))
+    uncertainty = getattr(message, "uncertainty", 0.0)  # bags of earlier versions have none
+    return GaitEvent(stamp, kind, side_of(message), int(message.step), uncertainty)
 
 
 def stop_of(message: Any, start: int = 0) -> int | None:

@@ -24,10 +24,11 @@ from numpy.typing import NDArray
 from gait_entrainment.conventions import Side
 from gait_entrainment.experiment import BlockRun, Conductor, GaitError
 from gait_entrainment.gait import Analysis, GaitEvent, Stride, VerdictSettings, analyze
-from gait_entrainment.gait.analyzer import Result
+from gait_entrainment.gait.analyzer import TOE_OFF_BIAS, Result
 from gait_entrainment.protocol import Protocol, ProtocolError, read_protocol
 from gait_entrainment.robot import MeasuredOnsets, TorqueProfile
 from gait_entrainment.run import Run, analyze_blocks, settings_for
+from gait_entrainment.settings import SettingError
 from gait_entrainment_bags import messages, topic_names
 from gait_entrainment_bags.decoding import decoder_for
 from gait_entrainment_bags.errors import BagError
@@ -35,6 +36,7 @@ from gait_entrainment_bags.holes import hole_before
 from gait_entrainment_bags.mcap_records import BagMessage
 from gait_entrainment_bags.reader import BagReader
 from gait_entrainment_bags.recovery import RECOVERY_KEY
+from gait_entrainment_bags.truth import detector_errors, lag_shift
 from gait_entrainment_bags.writer import ENDED_EARLY
 from gait_entrainment_commands.outcome import outcome_of, timing_outcome
 
@@ -44,6 +46,7 @@ STRIDES_DRAWN = 24
 _FORMING_DRAWN = 30
 _TYPES = {
     topic_names.GAIT_EVENTS: "GaitEvent",
+    topic_names.TRUE_EVENTS: "GaitEvent",
     topic_names.TORQUE_PROFILE: "TorqueProfile",
     topic_names.PULSES: "TorquePulse",
     topic_names.ROBOT_STATE: "AnkleRobotState",
@@ -53,7 +56,7 @@ _TYPES = {
     topic_names.ENTRAINMENT: "Entrainment",
 }
 # Fields that bags of earlier versions lack.
-_ADDED = {"reason", "stretch", "window", "spread", "scatter"}
+_ADDED = {"reason", "stretch", "window", "spread", "scatter", "phase_lag_uncertainty"}
 _Value = TypeVar("_Value")
 
 
@@ -78,6 +81,8 @@ class RecordedRun(Run):
     lost: int | None  # published but not recorded; None if no publisher gave a count
     real_time_factor: float  # walked time over wall time, first to last /clock; NaN without
     onset: str = "commanded"  # what the live analysis took pulses to begin with, or "measured"
+    toe_off_bias: float = 0.0  # [s] by which the toe-offs of the events are late
+    detector_errors: dict[str, Any] | None = None  # None if nobody knows the exact events
     ended_early: str = ""  # why the recording ended before the run did
     differences: tuple[str, ...] | None = None
     """How what the analyzer published live differs from an analysis anew of the same onsets, a
@@ -110,12 +115,15 @@ def read_run(
             raise BagError(f"{path}: its onset is {live_onset!r}; allowed: {', '.join(onsets)}")
         live_side = _side_in(bag, topic_names.STRIDES)
         live_side = side if live_side is None else live_side
+        bias = _toe_off_bias(bag)
         told = settings_for(protocol.sequence if protocol else (), settings)
-        live = analyze(record.events, onsets[live_onset], live_side, told, record.unknown)
+        live = analyze(
+            record.events, onsets[live_onset], live_side, told, record.unknown, toe_off_bias=bias
+        )
         blocks = _conducted(protocol, record.events) if protocol else ()
         begun = onsets[onset or live_onset]
         analysis, judged = analyze_blocks(
-            blocks, record.events, begun, side, settings, record.unknown
+            blocks, record.events, begun, side, settings, record.unknown, bias
         )
         measured_period, pulse_period = _periods(blocks, analysis)
         run = RecordedRun(
@@ -132,11 +140,16 @@ def read_run(
             onset=live_onset,
             differences=record.differences_from(live, live_side),
             torques=record.read_torques(side, []),
+            toe_off_bias=bias,
             messages=bag.message_count,
             lost=_lost(bag),
             real_time_factor=record.real_time_factor,
             ended_early=bag.custom_data.get(ENDED_EARLY, ""),
         )
+        if record.true_events:
+            exact = analyze(record.true_events, begun, side, settings)
+            errors = detector_errors(record.events, record.true_events)
+            run = replace(run, detector_errors=errors | lag_shift(analysis, exact))
         if torques:
             run = replace(run, torques=record.read_torques(side, drawn_strides(run)))
         return run
@@ -178,6 +191,13 @@ def _side_in(bag: BagReader, relative: str) -> Side | None:
     return None
 
 
+def periods_of(
+    protocol: Protocol | None, events: Sequence[GaitEvent], analysis: Analysis
+) -> tuple[float, float]:
+    """Return unperturbed and pulse period [s]: as a protocol plans them, else as analyzed."""
+    return _periods(_conducted(protocol, events) if protocol else (), analysis)
+
+
 def _conducted(protocol: Protocol, events: Sequence[GaitEvent]) -> Sequence[BlockRun]:
     """Return the blocks of a protocol, as they were planned on a walk."""
     conductor = Conductor(protocol)
@@ -195,6 +215,15 @@ def _periods(blocks: Sequence[BlockRun], analysis: Analysis) -> tuple[float, flo
         return blocks[-1].measured_period, blocks[-1].pulse_period
     last = analysis.entrainments[-1] if analysis.entrainments else None
     return (last.unperturbed_period, last.pulse_period) if last else (math.nan, math.nan)
+
+
+def _toe_off_bias(bag: BagReader) -> float:
+    """Return by how much toe-offs are late [s], as it was known when the run was recorded."""
+    told = bag.custom_data.get("toe_off_bias", "0")
+    try:
+        return float(TOE_OFF_BIAS.parse("toe_off_bias", told))
+    except SettingError as error:
+        raise BagError(f"{bag.path}: {error}") from None
 
 
 def _lost(bag: BagReader) -> int | None:
@@ -249,7 +278,10 @@ class _Record:
         self._messages: dict[str, list[BagMessage]] = {name: [] for name in self._names.values()}
         self.real_time_factor = self._read()
         events = self._messages[self._names[topic_names.GAIT_EVENTS]]
-        self.events = [e for e in self._values(topic_names.GAIT_EVENTS, _event_of) if e]
+        self.events, self.true_events = (
+            [event for event in self._values(name, _event_of) if event]
+            for name in (topic_names.GAIT_EVENTS, topic_names.TRUE_EVENTS)
+        )
         # Whether the log times are the stamps, so that instants can be looked up.
         self._stamped = [m.log_time for m in events] == [event.stamp for event in self.events]
         self.onsets: list[int] = []
@@ -339,7 +371,8 @@ def _find(bag: BagReader, relative: str) -> str | None:
     """Return the topic of a bag with this relative name and its type, in whatever namespace."""
     type_name = f"gait_entrainment_msgs/msg/{_TYPES[relative]}"
     names = (name for name, topic in bag.topics.items() if topic.type == type_name)
-    return next((name for name in names if name.endswith(f"/{relative}")), None)
+    # The shortest: /truth/gait_events holds what is to be compared with /gait_events.
+    return min((n for n in names if n.endswith(f"/{relative}")), key=len, default=None)
 
 
 def _event_of(message: Any) -> GaitEvent | None:
@@ -406,6 +439,8 @@ def recorded_outcome(run: RecordedRun, bag: Path) -> dict[str, Any]:
         "lost": run.lost,
         "real_time_factor": None if math.isnan(factor) else factor,
         "pulse_timing": timing_outcome(run.timings, run.measured_period),
+        **({"toe_off_bias": run.toe_off_bias} if run.toe_off_bias else {}),
+        **({"detector_errors": run.detector_errors} if run.detector_errors else {}),
     }
 
 

@@ -14,9 +14,18 @@ JOINT_STATES = "joint_states"
 GAIT_EVENTS = "gait_events"
 ANKLE_TORQUE = "ankle_torque"
 GROUND_REACTION = ("ground_reaction/left", "ground_reaction/right")
-WALKER_PROGRESS = "walker_sim/progress"
+WALKER_PROGRESS = "walker/progress"
+WALKER_PROGRESS_BEFORE = "walker_sim/progress"  # its name in bags of earlier versions
 WALKER_TIMING = "walker_sim/timing"
 CLOCK = "/clock"
+
+# Of sensors on a person, or on the simulated walker: then its exact events are beside them.
+FOOT_SWITCH = ("foot_switch/left", "foot_switch/right")
+FOOT_IMU = ("imu/left_foot", "imu/right_foot")
+SHANK_IMU = ("imu/left_shank", "imu/right_shank")
+ANKLE_ENCODER = ("ankle_encoder/left", "ankle_encoder/right")
+TRUE_EVENTS = "truth/gait_events"
+TRUE_PROGRESS = "truth/progress"
 
 # Of the robot.
 TORQUE_PROFILE = "perturbation/torque_profile"

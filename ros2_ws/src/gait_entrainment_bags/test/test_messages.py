@@ -97,5 +97,6 @@ def test_results_have_the_fields_of_their_messages():
     values = result_values(pulse, Side.LEFT)
     assert (values["header"], values["side"], values["toe_off"]) == (12, Side.LEFT, 0)
     assert set(values) == {
-        *("header", "side", "number", "stride", "phase", "phase_lag", "unwrapped_lag", "toe_off")
+        *("header", "side", "number", "stride", "phase", "phase_lag", "unwrapped_lag", "toe_off"),
+        "phase_lag_uncertainty",
     }

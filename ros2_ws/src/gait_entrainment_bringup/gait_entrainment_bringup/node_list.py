@@ -18,28 +18,41 @@ import yaml
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.gait import GaitLimits
-from gait_entrainment.protocol import Protocol, said_limits, write_protocol
+from gait_entrainment.protocol import Protocol, said_of, write_protocol
 from gait_entrainment.robot import find_driver
 from gait_entrainment.run import settings_for
 from gait_entrainment_bags import BagError, BagReader
 from gait_entrainment_bags.recorded_run import protocol_and_side
+from gait_entrainment_bags.topic_names import WALKER_PROGRESS, WALKER_PROGRESS_BEFORE
 from gait_entrainment_bringup.provenance import provenance
 from gait_entrainment_nodes.messaging.environment import shared_file
 
-# In the order in which they are started. Executable and node have the same name.
 RECORDER = "bag_recorder"
-NODES = (RECORDER, "walker_sim", "perturbator", "gait_analyzer", "experiment")
+# Who walks: the model with its exact events; the model as sensors see it; a person with sensors.
+# The last node plays the walker's role to the others.
+WALKERS = {
+    "simulated": ("walker_sim",),
+    "sensed": ("sensor_sim", "gait_detector"),
+    "person": ("gait_detector",),
+}
+
+
+def nodes_for(walker: str) -> tuple[str, ...]:
+    """Return the nodes in the order in which they are started, each named as its executable."""
+    return (RECORDER, *WALKERS[walker], "perturbator", "gait_analyzer", "experiment")
+
+
+NODES = nodes_for("simulated")
 # Only looks on: started if somebody wants to see the walk, waited for by nobody.
 DISPLAY = "walker_display"
 # The operator's page: looks on as well, and is what one looks at, so it outlives the torque.
 PAGE = "operator_page"
 # In the order in which they are stopped: torque first, the record last.
 STOP_ORDER = (
-    *("perturbator", "experiment", "walker_sim", "gait_analyzer", DISPLAY, PAGE),
-    "bag_recorder",
+    *("perturbator", "experiment", "walker_sim", "gait_detector", "sensor_sim"),
+    *("gait_analyzer", DISPLAY, PAGE, "bag_recorder"),
 )
-# Nodes that publish what is counted at the end of a run.
-PUBLISHERS = ("walker_sim", "perturbator", "gait_analyzer", "experiment")
+DETECTOR = "vertical_force"
 # In real time promises are short, so that more can be decided late, but longer than a hiccup [s].
 LEAD_TIME = 0.3
 # A real robot's torque is known only once it has been measured and promised: by so much the walker
@@ -51,6 +64,8 @@ FLANK_SHARE = 0.1
 RISING = 5
 # By how much the clocks of the hosts of a real robot may differ [s]: what a phase lag is worth.
 CLOCK_OFFSET = 0.005
+# From the sample of a sensor to its arrival [s], with the time from one sample to the next.
+DELIVERY = 0.03
 # How long any node, or the operator, may be silent while a real robot is worn [s].
 PERSON_SILENCE = 0.3
 
@@ -77,7 +92,7 @@ NOT_REPLAYED = (
     "/rosout",
     "/parameter_events",
 )
-ANALYZED = ("gait_events", "perturbation/torque_profile", "walker_sim/progress")
+ANALYZED = ("gait_events", "perturbation/torque_profile", "walker/progress")
 MEASURED = ("perturbation/pulses", "perturbator/state")  # if onsets are those measured
 
 Parameters = dict[str, dict[str, Any]]  # by node name, then by name
@@ -97,6 +112,10 @@ def parameters(
     unproved: bool = False,
     onset: str = "commanded",
     lead_time: float = LEAD_TIME,
+    walker: str = "simulated",
+    detector: str = DETECTOR,
+    sensor: str = "",
+    toe_off_bias: float = 0.0,
 ) -> Parameters:
     """
     Return the parameters of every node for a run that is recorded into the folder ``bag``, if any.
@@ -104,12 +123,18 @@ def parameters(
     If ``armed``, a real robot may deliver torque without another word, even one whose watchdog is
     ``unproved`` (`gait_entrainment_drivers.proof`); ``onset`` is when the analyzer takes a pulse
     to begin, "commanded" or "measured"; promised torque leads by ``lead_time`` [s] in real time.
+    ``walker`` is one of WALKERS, ``detector`` what finds its events in sensors' signals,
+    ``sensor`` what is emulated, by default the detector's; toe-offs are detected late by
+    ``toe_off_bias`` [s].
     """
+    nodes = nodes_for(walker)
     side = protocol.side.name.lower()
     measured = real_time and not find_driver(protocol.driver).simulated
     given: Parameters = {
         "walker_sim": {
             **asdict(protocol.walker),
+            **{f"variation.{name}": value for name, value in asdict(protocol.variation).items()},
+            "seed": protocol.seed,
             "first_heel_strike": side,
             "real_time": real_time,
             "acknowledged": bag is not None and not real_time,
@@ -122,22 +147,35 @@ def parameters(
             "armed": armed,
             "unproved": unproved,
             **{f"planned.{name}": value for name, value in asdict(protocol.planned).items()},
-            **{f"limits.{name}": value for name, value in said_limits(protocol).items()},
+            **{f"limits.{name}": value for name, value in said_of(protocol, "limits").items()},
         },
-        "gait_analyzer": {"side": side, "onset": onset, **_verdict(protocol)},
+        "gait_analyzer": {
+            "side": side,
+            "onset": onset,
+            "toe_off_bias": toe_off_bias,
+            **_verdict(protocol),
+        },
         "experiment": {
-            "participants": [n for n in NODES if n != "experiment" and (bag or n != RECORDER)]
+            "participants": [n for n in nodes if n != "experiment" and (bag or n != RECORDER)],
+            "walker": WALKERS[walker][-1],
         },
         "bag_recorder": {
             "output": str(bag.absolute()) if bag else "",
-            "publishers": list(PUBLISHERS),
-            "custom_data": json.dumps(provenance(protocol, real_time=real_time, onset=onset)),
+            "publishers": [node for node in nodes if node != RECORDER],
+            "custom_data": json.dumps(
+                provenance(protocol, real_time=real_time, onset=onset)
+                | ({"toe_off_bias": repr(toe_off_bias)} if toe_off_bias else {})
+            ),
         },
         DISPLAY: _drawn(protocol),
         PAGE: {"record": str(bag.absolute())},
     }
+    latency = 0.0
+    if walker != "simulated":
+        latency = _add_detection(given, walker, detector, sensor, real_time=real_time)
     if real_time:
-        given["experiment"]["longest_lookahead"] = lead_time
+        # What is known is by so much older.
+        given["experiment"]["longest_lookahead"] = lead_time + latency
     if measured:
         # A person wears it: who falls silent ends the torque, and so does a record that cannot
         # be written. Whoever is silent is to be named before the robot misses the experiment.
@@ -154,6 +192,31 @@ def parameters(
     return {name: given[name] | {"use_sim_time": not real_time} for name in given}
 
 
+def _add_detection(
+    given: Parameters, walker: str, detector: str, sensor: str, *, real_time: bool
+) -> float:
+    """Add the nodes by which a sensed walker takes part; return the latency of its events [s]."""
+    # Here, since few runs need it.
+    from gait_entrainment_sensors import find_detector
+
+    chosen = find_detector(detector)
+    simulated = given.pop("walker_sim")
+    detecting = given["gait_detector"] = {
+        "detector": detector,
+        "simulated": walker == "sensed",
+        "delivery": DELIVERY,
+    }
+    if walker == "sensed":
+        from gait_entrainment_sensors.kinds import USUAL, find_sensor
+
+        sensor = sensor or USUAL.get(chosen.name, chosen.name)
+        _, quality = find_sensor(sensor)
+        given["sensor_sim"] = simulated | {"sensor": sensor, "ground_reaction": False}
+        if not real_time:  # nothing is on its way but the sample that decides
+            detecting["delivery"] = 2 / quality.rate
+    return float(max(chosen.make(side).latency for side in Side) + detecting["delivery"])
+
+
 def gentle_limits(protocol: Protocol) -> dict[str, float]:
     """Return what limits the pulses of a real robot, unless the protocol says otherwise."""
     # No two pulses closer than the shortest stride that is believed.
@@ -165,7 +228,7 @@ def gentle_limits(protocol: Protocol) -> dict[str, float]:
     ]
     if any(rates):
         gentle["rate"] = min(max(rates), 1e6)
-    return gentle | said_limits(protocol)
+    return gentle | said_of(protocol, "limits")
 
 
 def _verdict(protocol: Protocol | None) -> dict[str, Any]:
@@ -196,7 +259,9 @@ def replay_parameters(
     """
     with BagReader(path) as bag:
         topics = list(bag.topics)
-        recorded = next((name for name in topics if name.endswith("/gait_events")), None)
+        # The shortest: /truth/gait_events lies beside the detected ones.
+        named = (name for name in topics if name.endswith("/gait_events"))
+        recorded = min(named, key=len, default=None)
         if recorded is None:
             raise BagError(f"{path}: not a run of this project: no gait events")
         protocol, side = protocol_and_side(bag, protocol, side)
@@ -206,14 +271,18 @@ def replay_parameters(
     onset = custom_data.get("onset", "commanded")
     recorded = recorded.removesuffix("/gait_events")
     namespace = recorded if namespace is None else namespace.rstrip("/")
-    moved = [name for name in topics if namespace != recorded and name.startswith(f"{recorded}/")]
+    moved = {n: n for n in topics if namespace != recorded and n.startswith(f"{recorded}/")}
+    before = f"{recorded}/{WALKER_PROGRESS_BEFORE}"
+    if before in topics:
+        moved[before] = f"{recorded}/{WALKER_PROGRESS}"
     analyzed = (*ANALYZED, *MEASURED) if onset == "measured" else ANALYZED
-    expected = [f"{namespace}/{n}" for n in analyzed if f"{recorded}/{n}" in topics]
+    played = {moved.get(name, name) for name in topics}
+    expected = [f"{namespace}/{n}" for n in analyzed if f"{recorded}/{n}" in played]
     given: Parameters = {
         "bag_player": {
             "bag": str(path.absolute()),
             "exclude": list(NOT_REPLAYED),
-            "remap": [f"{name}:={namespace}{name.removeprefix(recorded)}" for name in moved]
+            "remap": [f"{n}:={namespace}{to.removeprefix(recorded)}" for n, to in moved.items()]
             or [""],
             # Once by the analyzer, and once more by the recorder.
             "expect": expected if out is None else expected * 2,
@@ -222,6 +291,7 @@ def replay_parameters(
         "gait_analyzer": {
             "side": side.name.lower(),
             "onset": onset,
+            "toe_off_bias": float(custom_data.get("toe_off_bias", "0")),
             "use_sim_time": True,
             **_verdict(protocol),
         },

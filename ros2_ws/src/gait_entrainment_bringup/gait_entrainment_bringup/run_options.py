@@ -12,10 +12,18 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from gait_entrainment.errors import UsageError
+from gait_entrainment.gait.analyzer import TOE_OFF_BIAS
 from gait_entrainment.protocol import Protocol
 from gait_entrainment.robot import LimitError, find_driver
 from gait_entrainment.settings import Setting
-from gait_entrainment_bringup.node_list import LEAD_TIME, Parameters, bag_folder, parameters
+from gait_entrainment_bringup.node_list import (
+    DETECTOR,
+    LEAD_TIME,
+    WALKERS,
+    Parameters,
+    bag_folder,
+    parameters,
+)
 from gait_entrainment_commands.outcome_options import add_onset_option
 from gait_entrainment_commands.protocol_options import add_protocol_options, chosen_protocol
 from gait_entrainment_drivers.proof import require_proof
@@ -40,6 +48,7 @@ _NUMBERS = {
         least=0,
         most=1000,
     ),
+    "toe_off_bias": TOE_OFF_BIAS,
 }
 
 
@@ -51,6 +60,16 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
     for name, told in _NUMBERS.items():
         text = f"{told.meaning}; {told.allowed}"
         parser.add_argument(_option(name), metavar="FLOAT", help=text)
+    parser.add_argument(
+        "--walker",
+        choices=WALKERS,
+        default="simulated",
+        help="the model with exact events; the model through sensors and detectors; a person",
+    )
+    parser.add_argument(
+        "--detector", default=DETECTOR, help=f"of a person's gait events; default {DETECTOR}"
+    )
+    parser.add_argument("--sensor", default="", help="to emulate; default: the detector's")
     parser.add_argument("--out", type=Path, help="folder of the bag; default bags/<time>_<name>")
     add_onset_option(parser)
 
@@ -73,6 +92,7 @@ def checked_run(
         if (text := getattr(options, name)) is not None:
             setattr(options, name, told.parse(_option(name), text))
     protocol.check_limits()
+    check_walker(options.walker, options.detector, real_time=options.real_time)
     if drives:
         switches = {"armed": options.arm, "unproved": options.unproved}
         check_robot(protocol, real_time=options.real_time, **switches)
@@ -80,6 +100,16 @@ def checked_run(
     if records:
         check_output(bag, exactly=options.out is not None)
     return protocol, bag
+
+
+def check_walker(walker: str, detector: str, *, real_time: bool) -> None:
+    """Raise UsageError if nobody could walk so, or nobody finds the events."""
+    if walker == "person" and not real_time:
+        raise UsageError("--walker: a person walks in real time only; add --real-time")
+    if walker != "simulated":
+        from gait_entrainment_sensors import find_detector
+
+        find_detector(detector)
 
 
 def check_robot(protocol: Protocol, *, real_time: bool, armed: bool, unproved: bool) -> None:
@@ -159,12 +189,17 @@ def chosen_parameters(protocol: Protocol, bag: Path, options: argparse.Namespace
         unproved=options.unproved,
         onset=options.onset,
         lead_time=LEAD_TIME if options.lead_time is None else options.lead_time,
+        walker=options.walker,
+        detector=options.detector,
+        sensor=options.sensor,
+        toe_off_bias=options.toe_off_bias or 0.0,
     )
     # What is not said stays as config/nodes.yaml has it.
+    walker = chosen.get(WALKERS[options.walker][0], {})
     if options.sample_rate is not None:
-        chosen["walker_sim"]["sample_rate"] = options.sample_rate
+        walker["sample_rate"] = options.sample_rate
     if options.no_ground_reaction:
-        chosen["walker_sim"]["ground_reaction"] = False
+        walker["ground_reaction"] = False
     if options.require_record:
         chosen["bag_recorder"]["required"] = True
     return chosen

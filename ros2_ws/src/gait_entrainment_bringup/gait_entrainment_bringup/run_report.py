@@ -10,6 +10,7 @@ from gait_entrainment_bags import BagReader
 from gait_entrainment_bags.figures import draw_figures
 from gait_entrainment_bags.recorded_run import messages_line, read_run, recorded_outcome
 from gait_entrainment_bags.topic_names import WALKER_TIMING
+from gait_entrainment_bags.truth import detection_lines
 from gait_entrainment_commands.outcome import summary, timing_summary
 
 
@@ -21,7 +22,8 @@ def report(bag: Path, *, figures: bool, as_json: bool) -> None:
     if as_json:
         print(json.dumps(outcome))
         return
-    for line in (summary(outcome), *timing_summary(outcome["pulse_timing"])):
+    timing = timing_summary(outcome["pulse_timing"])
+    for line in (summary(outcome), *detection_lines(outcome), *timing):
         print(line)
     if (factor := outcome["real_time_factor"]) is not None:
         print(f"speed            {factor:.0f} times real time")

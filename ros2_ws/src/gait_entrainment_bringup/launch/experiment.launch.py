@@ -19,8 +19,15 @@ from launch.events import Shutdown
 from gait_entrainment.protocol import read_protocol, write_protocol
 from gait_entrainment.settings import Setting
 from gait_entrainment_bringup import launch_nodes as shared
-from gait_entrainment_bringup.node_list import NODES, RECORDER, bag_folder, parameters
-from gait_entrainment_bringup.run_options import check_output, check_robot
+from gait_entrainment_bringup.node_list import (
+    DETECTOR,
+    RECORDER,
+    WALKERS,
+    bag_folder,
+    nodes_for,
+    parameters,
+)
+from gait_entrainment_bringup.run_options import check_output, check_robot, check_walker
 
 DELAY = Setting("from the start of the other nodes to that of the experiment", float, "s", 0, 600)
 
@@ -42,10 +49,15 @@ def nodes(context: LaunchContext) -> list[Action]:
         raise shared.LaunchError("bag: there is none with recorder:=none; leave one of them out")
     protocol.check_limits()
     check_robot(protocol, real_time=real_time, **switches)
-    given = parameters(protocol, bag, real_time=real_time, onset=onset, **switches)
+    walking = {
+        "walker": shared.choice(context, "walker", *WALKERS),
+        "detector": shared.value(context, "detector"),
+    }
+    check_walker(**walking, real_time=real_time)
+    given = parameters(protocol, bag, real_time=real_time, onset=onset, **switches, **walking)
     given["experiment"]["protocol"] = write_protocol(protocol)
     namespace = shared.value(context, "namespace")
-    names = [name for name in NODES if recorded or name != RECORDER]
+    names = [name for name in nodes_for(walking["walker"]) if recorded or name != RECORDER]
     made = [shared.make_node(context, name, namespace, given[name]) for name in names]
     over: list[Action] = [EmitEvent(event=Shutdown(reason="the experiment is over"))]
     if recorded:
@@ -73,6 +85,8 @@ def generate_launch_description() -> LaunchDescription:
         ("real_time", "false", "at the pace of the wall clock, not in lock-step"),
         ("arm", "false", "let a real ankle robot deliver torque at once: see safety.md"),
         ("unproved", "false", "even one whose own watchdog was not proved on this computer"),
+        ("walker", "simulated", "who walks: simulated, sensed (through sensors) or person"),
+        ("detector", DETECTOR, "what finds the events of a walker who is not simulated"),
         ("onset", "commanded", "when the analyzer takes a pulse to begin: or measured"),
         ("recorder", RECORDER, "or none: somebody else records, such as ros2 bag record"),
         ("start_delay", "0", "seconds in which another recorder finds topics, before the run"),

@@ -15,8 +15,9 @@ from gait_entrainment_bringup.node_list import (
     DISPLAY,
     NODES,
     PAGE,
-    PUBLISHERS,
     STOP_ORDER,
+    WALKERS,
+    nodes_for,
     parameter_arguments,
     parameters,
     replay_parameters,
@@ -26,7 +27,9 @@ from gait_entrainment_nodes.nodes.bag_player import BagPlayer
 from gait_entrainment_nodes.nodes.bag_recorder import BagRecorder
 from gait_entrainment_nodes.nodes.experiment import Experiment
 from gait_entrainment_nodes.nodes.gait_analyzer import GaitAnalyzerNode
+from gait_entrainment_nodes.nodes.gait_detector import GaitDetector
 from gait_entrainment_nodes.nodes.perturbator import Perturbator
+from gait_entrainment_nodes.nodes.sensor_sim import SensorSim
 from gait_entrainment_nodes.nodes.walker_display import WalkerDisplay
 from gait_entrainment_nodes.nodes.walker_sim import WalkerSim
 from gait_entrainment_page import operator_page
@@ -34,6 +37,8 @@ from gait_entrainment_page import operator_page
 BAG = Path(__file__).parents[4] / "bags" / "paper_example"
 CLASSES = (
     WalkerSim,
+    SensorSim,
+    GaitDetector,
     Perturbator,
     GaitAnalyzerNode,
     Experiment,
@@ -41,10 +46,11 @@ CLASSES = (
     BagPlayer,
     WalkerDisplay,
 )
+ALL = {*NODES, *nodes_for("sensed"), "bag_player"}
 # Not for the file: of ROS itself, of the mode or the launch file, of a node started by hand.
 ELSEWHERE = {
-    *(f"{name}.use_sim_time" for name in (*NODES, "bag_player")),
-    *(f"{name}.start_type_description_service" for name in (*NODES, "bag_player", DISPLAY)),
+    *(f"{name}.use_sim_time" for name in ALL),
+    *(f"{name}.start_type_description_service" for name in (*ALL, DISPLAY)),
     "experiment.longest_lookahead",
     "experiment.longest_clock_offset",
     "perturbator.operator_timeout",
@@ -89,6 +95,7 @@ def test_file_lists_what_a_user_may_set_at_its_default(tmp_path):
     for folder in (tmp_path / "with", tmp_path / "without"):
         folder.mkdir()
         given = parameters(DEFAULT_PROTOCOL, folder / "bag")
+        given |= parameters(DEFAULT_PROTOCOL, folder / "bag", walker="sensed")
         given["bag_player"] = replay_parameters(BAG)[1]["bag_player"]
         arguments = parameter_arguments(given, folder)
         if folder.name == "without":
@@ -122,12 +129,22 @@ def test_parameters_are_given_to_every_node(real_time):
     assert ("longest_lookahead" in given["experiment"]) is real_time
     sides = {given["perturbator"]["side"], given["gait_analyzer"]["side"]}
     assert sides == {"right"} == {walker["first_heel_strike"]}
-    assert given["bag_recorder"]["publishers"] == list(PUBLISHERS)
+    assert set(given["bag_recorder"]["publishers"]) == set(NODES) - {"bag_recorder"}
     assert "experiment" not in given["experiment"]["participants"]
 
 
+@pytest.mark.parametrize("walker", WALKERS)
+def test_whoever_walks_plays_the_role_to_the_experiment(walker):
+    given = parameters(DEFAULT_PROTOCOL, Path("/bag"), real_time=True, walker=walker)
+    role, lead = given["experiment"]["walker"], given["experiment"]["longest_lookahead"]
+    assert set(given) == {*nodes_for(walker), DISPLAY}
+    assert role in given["experiment"]["participants"]
+    # What is known of a sensed walker is older by the detector's latency.
+    assert (lead == 0.3) is (walker == "simulated")
+    assert 0.3 <= lead < 0.5
+
+
 def test_torque_is_stopped_first_and_the_record_last():
-    assert sorted(STOP_ORDER) == sorted([*NODES, DISPLAY, PAGE])
+    assert set(STOP_ORDER) == {*NODES, *nodes_for("sensed"), DISPLAY, PAGE}
     assert STOP_ORDER[0] == "perturbator"
     assert STOP_ORDER[-1] == "bag_recorder"
-    assert set(PUBLISHERS) == set(NODES) - {"bag_recorder"}

@@ -89,15 +89,22 @@ def _judgement(analysis: Analysis, events: Sequence[GaitEvent]) -> dict[str, Any
     reason = last.reason if last else Reason.FEW_PULSES
     entrained = verdict is Verdict.ENTRAINED
     placed = [p for p in analysis.pulses if p.toe_off is not None]  # the others have no lag
-    lags = [p.phase_lag for p in placed[-FINAL_PULSES:]]
+    uncertainty = max((p.phase_lag_uncertainty for p in placed[-FINAL_PULSES:]), default=0.0)
     return {
         "verdict": verdict.name.lower(),
         "reason": reason.name.lower() if reason else None,
         "entrained": entrained,
         "entrained_since_stride": last.entrained_since_stride if last and entrained else None,
-        "final_phase_lag": statistics.median(lags) if lags else math.nan,
+        "final_phase_lag": final_phase_lag(analysis),
+        **({"final_phase_lag_uncertainty": uncertainty} if uncertainty else {}),
         "double_stance": _double_stance(events, placed[-1].toe_off if placed else None),
     }
+
+
+def final_phase_lag(analysis: Analysis) -> float:
+    """Return the median lag of the last pulses [s]; NaN if none has one."""
+    lags = [p.phase_lag for p in analysis.pulses if p.toe_off is not None][-FINAL_PULSES:]
+    return statistics.median(lags) if lags else math.nan
 
 
 def _parameters(protocol: Protocol) -> dict[str, Any]:
@@ -105,6 +112,8 @@ def _parameters(protocol: Protocol) -> dict[str, Any]:
     parameters = content_of(protocol)
     for said, block in zip(parameters.get("blocks", [parameters]), protocol.sequence, strict=True):
         said["pulses"]["torque"] = block.torque(protocol.walker)
+    if not protocol.variation.coefficient:
+        parameters.pop("variation", None)  # the paper's walker
     return parameters
 
 

@@ -15,7 +15,8 @@ def _option(field: str) -> str:
     if field == "pulses.count":
         return "--pulses"
     section, _, name = field.rpartition(".")
-    return ("--limit-" if section == "limits" else "--") + name.replace("_", "-")
+    prefix = {"limits": "limit-", "variation": "variation-"}.get(section, "")
+    return f"--{prefix}{name.replace('_', '-')}"
 
 
 def add_protocol_options(parser: argparse.ArgumentParser) -> None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from gait_entrainment.errors import EntrainmentError
-from gait_entrainment.stop_channel import stop_all
+from gait_entrainment_drivers.stop_channel import stop_all
 
 _TOLD = 12  # last lines of a command
 

@@ -24,10 +24,10 @@ from gait_entrainment.conventions import (
     nanoseconds_of,
 )
 from gait_entrainment.gait.verdict import Reason, Verdict
-from gait_entrainment.outcome import MEANINGS
 from gait_entrainment.robot import DeviceError, find_driver
 from gait_entrainment_bags import topic_names as names
 from gait_entrainment_bags.messages import MessageError, event_of, state_of
+from gait_entrainment_commands.outcome import MEANINGS
 
 # Strides and pulses in the charts: more would not be told apart on a screen.
 STRIDES_SHOWN = 200

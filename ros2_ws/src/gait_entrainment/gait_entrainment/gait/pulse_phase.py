@@ -23,6 +23,7 @@ class PulsePhase:
     phase_lag: float  # onset minus the nearest toe-off [s]; NaN if that toe-off is missing
     unwrapped_lag: float  # the same, followed across wraps from the first lag on [s]
     toe_off: int | None  # the toe-off that the lag refers to [ns]
+    phase_lag_uncertainty: float = 0.0  # standard deviation, that of the toe-off [s]; 0: exact
 
 
 def depends_on_next_toe_off(onset: int, stride: Stride) -> bool:
@@ -118,4 +119,9 @@ class LagFollower:
         ahead = (toe_off_stride - self._first[0]) - (number - self._first[1])
         # Without a wrap the lag stands as it is, even if T is unknown (NaN).
         unwrapped = lag + ahead * period if ahead else lag
-        return PulsePhase(number, onset, stride.number, phase, lag, unwrapped, toe_off)
+        uncertainty = next(
+            s.toe_off_uncertainty for s in (stride, before, after) if s and s.toe_off == toe_off
+        )
+        return PulsePhase(
+            number, onset, stride.number, phase, lag, unwrapped, toe_off, uncertainty
+        )

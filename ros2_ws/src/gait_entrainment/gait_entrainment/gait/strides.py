@@ -34,6 +34,7 @@ class GaitEvent:
     kind: EventKind
     side: Side  # the leg that strikes or leaves the ground
     step: int
+    uncertainty: float = 0.0  # standard deviation of the stamp [s]; 0 where it is exact
 
     @property
     def place(self) -> int:
@@ -51,6 +52,7 @@ class Stride:
     end: int  # heel strike that closes it [ns]
     toe_off: int | None  # toe-off of the leg within it [ns]; None if it is missing
     step_periods: tuple[float, float]  # [s], in order; NaN if the strike between is missing
+    toe_off_uncertainty: float = 0.0  # standard deviation of its stamp [s]
 
     @property
     def period(self) -> float:
@@ -92,6 +94,7 @@ class StrideTracker:
         self.latest_strike: int | None = None  # its stamp [ns]
         self._first_step: int | None = None  # step that the leg's first heel strike closes
         self._stamps: dict[int, int] = {}  # remembered events: place -> stamp
+        self._toe_off: GaitEvent | None = None  # of the leg, the latest
         self._latest_place = -1
         self._strike_place = -1
         self._rival: StrideTracker | None = None  # of dropped events that fit together
@@ -115,7 +118,10 @@ class StrideTracker:
         if len(self._stamps) > 2 * REMEMBERED_PLACES:
             oldest = self._latest_place - REMEMBERED_PLACES
             self._stamps = {p: stamp for p, stamp in self._stamps.items() if p >= oldest}
-        if event.kind != EventKind.HEEL_STRIKE or event.side != self.side:
+        if event.side != self.side:
+            return None
+        if event.kind == EventKind.TOE_OFF:
+            self._toe_off = event
             return None
         return self._strike(event, self._first_step)
 
@@ -173,7 +179,8 @@ class StrideTracker:
         first, second = middle - start, event.stamp - middle
         step_periods = first / NANOSECONDS_PER_SECOND, second / NANOSECONDS_PER_SECOND
         toe_off = self._stamps.get(event.place - 1)
-        return Stride(closed, self.side, start, event.stamp, toe_off, step_periods)
+        uncertainty = self._toe_off.uncertainty if self._toe_off else 0.0
+        return Stride(closed, self.side, start, event.stamp, toe_off, step_periods, uncertainty)
 
 
 class UnperturbedPeriod:

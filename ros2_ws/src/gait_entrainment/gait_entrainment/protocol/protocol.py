@@ -8,7 +8,7 @@ from enum import Enum
 from typing import Any
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment.parameters import Variation, WalkerParameters
 from gait_entrainment.protocol.block import Block, PulsePlan
 from gait_entrainment.robot import DeviceLimits, PlannedPulses
 from gait_entrainment.settings import Setting, setting, settings_of
@@ -25,6 +25,7 @@ class Protocol(Block):
     name: str = setting("paper_example", "name of the experiment, and of its bag", plain=True)
     side: Side = setting(Side.RIGHT, "the perturbed leg: left or right")
     walker: WalkerParameters = field(default_factory=WalkerParameters)
+    variation: Variation = field(default_factory=Variation)  # of the simulated walker's strides
     limits: DeviceLimits = field(default_factory=DeviceLimits)  # of what the person may get
     driver: str = setting("ideal", "ankle robot driver, as entrain driver list has them")
     seed: int = setting(0, "seed of whatever is random", within=(0, 2**63 - 1))
@@ -64,6 +65,7 @@ class Protocol(Block):
 SECTIONS: dict[str, type[Any]] = {
     "pulses": PulsePlan,
     "walker": WalkerParameters,
+    "variation": Variation,
     "limits": DeviceLimits,
 }
 

@@ -81,7 +81,7 @@ def find_driver(text: str) -> Driver:
         ) from None
     if not (isinstance(robot, type) and issubclass(robot, AnkleRobot)):
         raise LimitError(f"driver: {name} ({target}) is no AnkleRobot: derive it from that class")
-    return Driver(name, robot, _options(name, robot.Options, options))
+    return Driver(name, robot, read_options(f"driver: {name}", robot.Options, options))
 
 
 def split_options(text: str) -> list[str]:
@@ -95,19 +95,19 @@ def join_options(parts: Iterable[str]) -> str:
     return ",".join(re.sub(r"([\\,])", r"\\\1", part) for part in parts)
 
 
-def _options(name: str, options_type: type[Any], text: str) -> Any:
-    """Return a driver's options from OPTION=VALUE,OPTION=VALUE."""
+def read_options(whose: str, options_type: type[Any], text: str) -> Any:
+    """Return options from OPTION=VALUE,OPTION=VALUE; LimitError says whose are wrong."""
     known = settings_of(options_type)
     values = {}
     for part in split_options(text):
         key, equals, value = part.partition("=")
         if not equals or key not in known:
             allowed = ", ".join(known) or "none"
-            raise LimitError(f"driver: {name}: option {part!r}; allowed: {allowed}, as NAME=VALUE")
+            raise LimitError(f"{whose}: option {part!r}; allowed: {allowed}, as NAME=VALUE")
         if key in values:
-            raise LimitError(f"driver: {name}: {key}: appears twice; keep one")
+            raise LimitError(f"{whose}: {key}: appears twice; keep one")
         try:
-            values[key] = known[key].parse(f"driver: {name}: {key}", value)
+            values[key] = known[key].parse(f"{whose}: {key}", value)
         except SettingError as error:
             raise LimitError(str(error)) from None
     return options_type(**values)

@@ -34,7 +34,7 @@ from gait_entrainment.walker.segment import (
     leg_sine_at,
     squared_rate,
 )
-from gait_entrainment.walker.trajectory import Torques
+from gait_entrainment.walker.trajectory import Torques, stiffen
 from gait_entrainment.walker.transitions import NANO
 
 # Places in an array of joints: hip or ankle, plus the side.
@@ -90,7 +90,9 @@ def samples_from(table: Any) -> Samples:
 
 
 @compiled
-def fill_samples(model: Model, log: Log, times: Stamps, robot: Torques, table: Any) -> None:
+def fill_samples(
+    model: Model, log: Log, times: Stamps, robot: Torques, stiffness: Floats, table: Any
+) -> None:
     """Fill in `table` (n,) of SAMPLE, zero before, with the walker at `times` [ns]."""
     work = np.empty(WORK_SIZE)
     rows = np.searchsorted(log["after"], times)
@@ -107,6 +109,7 @@ def fill_samples(model: Model, log: Log, times: Stamps, robot: Torques, table: A
         row.double_stance = segment.stance == Stance.DOUBLE
         row.leading = segment.leading
         if segment.stance == Stance.DOUBLE:
+            stiffen(model, segment.step, stiffness)
             fill_double_stance(model, segment, position, row)
         else:
             fill_single_stance(model, segment, position, row)

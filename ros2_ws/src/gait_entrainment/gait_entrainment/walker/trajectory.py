@@ -101,15 +101,28 @@ def proceed(
 
 
 @compiled
-def advance(model: Model, log: Log, count: int, robot: Torques, until: int) -> tuple[int, int]:
+def stiffen(model: Model, step: int, stiffness: Floats) -> None:
+    """Write the stiffness of a step's push-off into the model, if it has one of its own."""
+    if stiffness.size > 0:
+        model.ankle_stiffness = stiffness[step % stiffness.size]
+
+
+@compiled
+def advance(
+    model: Model, log: Log, count: int, robot: Torques, until: int, stiffness: Floats
+) -> tuple[int, int]:
     """
     Append to the `count` segments of `log` all that begin by `until`.
+
+    Push-offs have the `stiffness` (n,) of their step, if n > 0.
 
     Returns the new count and HELD, ENDED, or SWITCHED if the log is full.
     """
     work, cursors = np.empty(WORK_SIZE), np.array([0, robot.right])
     while count < log.size:
         log[count] = log[count - 1]
+        # From single stance it goes on to the push-off of the next step.
+        stiffen(model, log[count].step + (log[count].stance == Stance.SINGLE), stiffness)
         outcome = proceed(model, work, log[count], robot, cursors, until)
         if outcome != SWITCHED:
             return count, outcome

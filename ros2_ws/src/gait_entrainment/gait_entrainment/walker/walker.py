@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from gait_entrainment.conventions import EventKind, Side
-from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment.parameters import Variation, WalkerParameters
 from gait_entrainment.robot import TorqueProfile
 from gait_entrainment.walker.model import Floats, Stamps, make_model, start_apex
 from gait_entrainment.walker.promise import PromisedTorque
@@ -25,6 +25,7 @@ from gait_entrainment.walker.sampling import SAMPLE, Samples, fill_samples, samp
 from gait_entrainment.walker.segment import SEGMENT, Log, Stance, Switch, leg_sine_at
 from gait_entrainment.walker.trajectory import ENDED, SWITCHED, Torques, advance, start_walking
 from gait_entrainment.walker.transitions import clock, seconds
+from gait_entrainment.walker.variation import made_for_any_stiffness, push_off_stiffness
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ class Walker:
     The ankle-actuated walker, driven by torque promises for both ankles.
 
     It starts at stamp 0, right after heel strike number 0 of `first_heel_strike`, in the
-    period-one gait or with the mass at `initial_speed` [m/s].
+    period-one gait or with the mass at `initial_speed` [m/s]. Its strides may vary.
 
     An event comes before a torque change of the same stamp, and a change acts only after its
     stamp: a sample shows the events of its own stamp, but the torque up to it. So everything up to
@@ -98,11 +99,17 @@ class Walker:
         parameters: WalkerParameters,
         first_heel_strike: Side = Side.RIGHT,
         initial_speed: float | None = None,
+        variation: Variation | None = None,
+        seed: int = 0,
     ) -> None:
         """Raise ValueError if `initial_speed` is not a positive, finite number."""
         self.parameters = parameters
         self._model = make_model(parameters)
         apex = start_apex(self._model, initial_speed)
+        self._stiffness = np.empty(0)  # of each push-off, by step [N m/rad]; empty: of the model
+        if variation is not None and variation.coefficient:
+            self._stiffness = push_off_stiffness(self._model, variation, seed)
+            self._model = made_for_any_stiffness(self._model, self._stiffness[1])
         self._promises = (PromisedTorque(), PromisedTorque())
         self._log: Log = np.zeros(16, SEGMENT)
         self._count = 1
@@ -165,7 +172,9 @@ class Walker:
         while outcome == SWITCHED:
             if self._count == self._log.size:
                 self._log = np.concatenate([self._log, np.zeros_like(self._log)])
-            self._count, outcome = advance(self._model, self._log, self._count, robot, until)
+            self._count, outcome = advance(
+                self._model, self._log, self._count, robot, until, self._stiffness
+            )
         self.time_reached = until
         if outcome == ENDED:
             self.ending = self._describe_ending(self._log[self._count - 1])
@@ -189,7 +198,8 @@ class Walker:
                 f" stretch, {first} to {last} ns"
             )
         table = np.zeros(times.size, SAMPLE)
-        fill_samples(self._model, self._log[: self._count], times, self._torques(), table)
+        log, robot = self._log[: self._count], self._torques()
+        fill_samples(self._model, log, times, robot, self._stiffness, table)
         return samples_from(table)
 
     def _torques(self) -> Torques:

@@ -1,18 +1,29 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""entrain analyze: the outcome of a recorded run, from its bag alone."""
+"""entrain analyze: the outcome of a recorded run, from its bag alone, or from tables."""
 
 import argparse
 import json
 from pathlib import Path
 
+from gait_entrainment.errors import UsageError
+from gait_entrainment.gait import analyze
+from gait_entrainment.gait.analyzer import TOE_OFF_BIAS
+from gait_entrainment.run import Run
 from gait_entrainment_bags.commands.record_options import add_record_options, told_of_record
 from gait_entrainment_bags.figures import draw_figures
-from gait_entrainment_bags.recorded_run import messages_line, read_run, recorded_outcome
+from gait_entrainment_bags.recorded_run import (
+    messages_line,
+    periods_of,
+    read_run,
+    recorded_outcome,
+)
+from gait_entrainment_bags.truth import detection_lines
 from gait_entrainment_commands.drawing import add_dpi_option, chosen_dpi
-from gait_entrainment_commands.outcome import summary, timing_summary
+from gait_entrainment_commands.outcome import outcome_of, summary, timing_summary
 from gait_entrainment_commands.outcome_options import add_outcome_options
+from gait_entrainment_sensors.offline import read_events, read_onsets
 
 DESCRIPTION = "Analyze a bag anew, and hold the result against what was published live."
 EXAMPLES = """examples:
@@ -21,12 +32,29 @@ EXAMPLES = """examples:
   entrain analyze bags/mine --onset measured    pulses begin where the measured torque rises
   entrain analyze bags/mine --figures out --dpi 300    draws the figures into the folder out
   entrain analyze theirs --protocol mine.yaml   recorded by ros2 bag record
+  entrain analyze --events walk_events.tsv --pulses pulses.tsv --side right
+                                                recorded without this project
 """
+TABLES = ("events", "pulses")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    add_record_options(parser)
+    add_record_options(parser, needed=False)
+    parser.add_argument(
+        "--events",
+        type=Path,
+        metavar="FILE",
+        help="instead of a bag: gait events, as entrain detect writes them",
+    )
+    parser.add_argument(
+        "--pulses", type=Path, metavar="FILE", help="with --events: a column onset [s], same clock"
+    )
+    parser.add_argument(
+        "--toe-off-bias",
+        metavar="SECONDS",
+        help=f"with --events: {TOE_OFF_BIAS.meaning} (default 0)",
+    )
     parser.add_argument("--figures", type=Path, metavar="FOLDER", help="draw figures into it")
     add_dpi_option(parser)
     add_outcome_options(parser, onset=None)
@@ -34,6 +62,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Analyze and print."""
+    if options.bag is None or any(getattr(options, name) is not None for name in TABLES):
+        return _of_tables(options)
     drawn = options.figures is not None
     told = told_of_record(options)
     recorded = read_run(options.bag, torques=drawn, onset=options.onset, **told)
@@ -50,7 +80,8 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps(outcome))
         return 0
-    for line in (summary(outcome), *timing_summary(outcome["pulse_timing"])):
+    timing = timing_summary(outcome["pulse_timing"])
+    for line in (summary(outcome), *detection_lines(outcome), *timing):
         print(line)
     comparison = "none was recorded" if differences is None else "the same to the last bit"
     if differences:
@@ -59,4 +90,26 @@ def run(options: argparse.Namespace) -> int:
     print(messages_line(recorded))
     for figure in figures:
         print(f"figure           {figure}")
+    return 0
+
+
+def _of_tables(options: argparse.Namespace) -> int:
+    """Analyze a table of events and one of pulses, and print."""
+    lacking = [f"--{name}" for name in (*TABLES, "side") if getattr(options, name) is None]
+    if options.bag is not None or lacking:
+        raise UsageError(
+            "give BAG, or else --events, --pulses and --side; missing: "
+            f"{', '.join(lacking) or '-'}"
+        )
+    if options.figures is not None or options.onset is not None:
+        raise UsageError("--figures and --onset need a BAG")
+    told = told_of_record(options)
+    bias = float(TOE_OFF_BIAS.parse("--toe-off-bias", options.toe_off_bias or "0"))
+    events, onsets = read_events(options.events), read_onsets(options.pulses)
+    analysis = analyze(events, onsets, told["side"], toe_off_bias=bias)
+    periods = periods_of(told["protocol"], events, analysis)
+    run = Run(told["protocol"], tuple(events), tuple(onsets), (), *periods, analysis, ())
+    outcome = outcome_of(run) | ({"toe_off_bias": bias} if bias else {})
+    lines = [summary(outcome), *detection_lines(outcome)]
+    print(json.dumps(outcome) if options.json else "\n".join(lines))
     return 0

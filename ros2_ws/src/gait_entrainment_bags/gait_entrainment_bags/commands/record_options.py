@@ -11,9 +11,10 @@ from gait_entrainment.conventions import Side
 from gait_entrainment.protocol import read_protocol
 
 
-def add_record_options(parser: argparse.ArgumentParser) -> None:
+def add_record_options(parser: argparse.ArgumentParser, *, needed: bool = True) -> None:
     """Add the bag, and the protocol and the perturbed leg that stand for those in it."""
-    parser.add_argument("bag", type=Path, metavar="BAG", help="folder or .mcap file")
+    nargs = None if needed else "?"
+    parser.add_argument("bag", nargs=nargs, type=Path, metavar="BAG", help="folder or .mcap file")
     parser.add_argument(
         "--protocol",
         type=Path,

@@ -9,8 +9,9 @@ import sys
 import tempfile
 from pathlib import Path
 
+from gait_entrainment.errors import UsageError
 from gait_entrainment.protocol import write_protocol
-from gait_entrainment_bringup.node_list import NODES, parameter_arguments
+from gait_entrainment_bringup.node_list import WALKERS, nodes_for, parameter_arguments
 from gait_entrainment_bringup.run_options import add_run_options, checked_run, chosen_parameters
 from gait_entrainment_nodes.messaging.domain import wanted_domain
 from gait_entrainment_nodes.messaging.environment import PACKAGE, set_environment
@@ -31,7 +32,8 @@ Each node is given what entrain run would give it: give every one the same proto
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    parser.add_argument("node", choices=NODES, metavar="NODE", help=", ".join(NODES))
+    nodes = list(dict.fromkeys(node for walker in WALKERS for node in nodes_for(walker)))
+    parser.add_argument("node", choices=nodes, metavar="NODE", help=", ".join(nodes))
     add_run_options(parser)
 
 
@@ -43,6 +45,8 @@ def run(options: argparse.Namespace) -> int:
     set_environment(domain, real_time=options.real_time)
     given = chosen_parameters(protocol, bag, options)
     given["experiment"]["protocol"] = write_protocol(protocol)
+    if options.node not in given:
+        raise UsageError(f"NODE: {options.node} takes no part with --walker {options.walker}")
     with tempfile.TemporaryDirectory(prefix="entrain_") as folder:
         arguments = parameter_arguments({options.node: given[options.node]}, Path(folder))
         sys.argv = [options.node, *arguments]

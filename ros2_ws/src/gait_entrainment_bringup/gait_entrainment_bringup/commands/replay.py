@@ -9,7 +9,7 @@ from pathlib import Path
 
 from gait_entrainment.errors import UsageError
 from gait_entrainment.settings import Setting
-from gait_entrainment_bags import BagReader
+from gait_entrainment_bags import BagReader, find_definition
 from gait_entrainment_bags.commands.record_options import add_record_options, told_of_record
 from gait_entrainment_bags.recorded_run import RecordedRun, read_run
 from gait_entrainment_bringup.node_list import MOVED, parameter_arguments, replay_parameters
@@ -110,6 +110,9 @@ def report(
 
 def differences(path: Path, results: dict[str, list[bytes]]) -> dict[str, str]:
     """Return how results differ from those in a bag, "" for not at all, by recorded topic."""
+    # Here, since it loads ROS.
+    from gait_entrainment_nodes.messaging.older_messages import converter_of
+
     differing = {}
     with BagReader(path) as bag:
         for topic, again in results.items():
@@ -117,7 +120,11 @@ def differences(path: Path, results: dict[str, list[bytes]]) -> dict[str, str]:
             if not names:
                 continue
             found = sorted(bag.messages(names[:1]), key=lambda message: message.place)
-            live = [message.data for message in found]
+            recorded = bag.topics[names[0]]
+            convert = None
+            if recorded.type_hash != find_definition(recorded.type).type_hash:
+                convert = converter_of(recorded)  # by an earlier version
+            live = [convert(message.data) if convert else message.data for message in found]
             differing[topic] = ""
             for number, (one, other) in enumerate(zip(live, again, strict=False), start=1):
                 if one != other:

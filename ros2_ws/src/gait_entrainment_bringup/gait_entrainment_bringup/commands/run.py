@@ -16,10 +16,10 @@ from gait_entrainment.protocol import Protocol, write_protocol
 from gait_entrainment.robot import find_driver
 from gait_entrainment_bags import BagError, BagReader, UnreadableBagError, recover
 from gait_entrainment_bringup.node_list import (
-    NODES,
     PAGE,
     PERSON_SILENCE,
     STOP_ORDER,
+    nodes_for,
     parameter_arguments,
 )
 from gait_entrainment_bringup.page_options import add_page_options, check_heartbeat, checked_page
@@ -39,13 +39,14 @@ EXAMPLES = """examples:
   entrain run                          the paper's example, as fast as it goes
   entrain run --real-time              the same at the pace of the wall clock
   entrain run my_protocol.yaml --out bags/mine
+  entrain run --walker sensed --detector foot_switch      rehearse an experiment on a person
   ROS_DOMAIN_ID=42 entrain run         in a domain of your choice, to listen with other tools
   entrain run --real-time --page       with the operator's page (docs/page.md)
   ROS_DOMAIN_ID=42 entrain run --elsewhere walker_sim     it runs on another host: docs/hosts.md
 """
 # Nodes that may run on another host. Not those that hold the torque and the record: Ctrl-C must
 # reach them without a network.
-DETACHABLE = ("walker_sim", "gait_analyzer")
+DETACHABLE = ("walker_sim", "sensor_sim", "gait_detector", "gait_analyzer")
 # What the end of a run needs, loaded while the walker walks.
 REPORT = "gait_entrainment_bringup.run_report"
 DRAWING = ("matplotlib.figure", "matplotlib.backends.backend_agg")
@@ -93,7 +94,8 @@ def run_experiment(
         given = chosen_parameters(protocol, bag, options)
         given[PAGE] |= options.page_parameters
         arguments = parameter_arguments(given, supervisor.folder)
-        for node in NODES:
+        nodes = nodes_for(options.walker)
+        for node in nodes:
             if node not in options.elsewhere:
                 supervisor.start(node, arguments)
         if options.page:
@@ -117,7 +119,7 @@ def run_experiment(
         )
         supervisor.wait_for_record()
         # No torque is left and the record is closed: in which order the rest ends does not matter.
-        supervisor.request_stop(NODES)
+        supervisor.request_stop(nodes)
         (bag / "protocol.yaml").write_text(write_protocol(protocol))
         importlib.import_module(REPORT).report(bag, figures=figures, as_json=options.json)
 

@@ -8,6 +8,13 @@ from std_msgs.msg import Header
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 
+# Heel strike 0 of a lock-step run [ns since 1970]: 2000-01-01, plainly not a recording time.
+LOCK_STEP_START = 946_684_800 * NANOSECONDS_PER_SECOND
+# Real time: from the start request to the start of the run [ns]: the first promise is there then.
+START_DELAY = 200_000_000
+# Real time: how often the walker reports progress, and promises are asked for [ns].
+PROGRESS_PERIOD = 20_000_000
+
 
 def to_time(nanoseconds: int) -> Time:
     """Return integer nanoseconds since 1970 as a ROS stamp."""

@@ -16,7 +16,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock as ClockMessage
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Bool, Empty, String
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
@@ -56,6 +56,8 @@ VIEWED = quality(100)
 SAID_ONCE = quality(1, lasting=True)
 # For who only looks on: the writer never waits for it. It holds a stretch of a lock-step run.
 LOOKING_ON = quality(1000, reliable=False)
+# What a sensor's driver sends, whatever quality it offers: 2 s of a force plate.
+FROM_A_DRIVER = quality(2048, reliable=False)
 # Only the latest sign of life counts, and nobody waits for anybody.
 HEARTBEAT = quality(1, reliable=False)
 
@@ -75,6 +77,13 @@ GROUND_REACTION = tuple(Topic(name, WrenchStamped) for name in topic_names.GROUN
 WALKER_PROGRESS = Topic(topic_names.WALKER_PROGRESS, msg.Progress)
 WALKER_TIMING = Topic(topic_names.WALKER_TIMING, msg.WalkerTiming)
 CLOCK = Topic(topic_names.CLOCK, ClockMessage)
+
+FOOT_SWITCH = tuple(Topic(name, msg.FootSwitch) for name in topic_names.FOOT_SWITCH)
+FOOT_IMU = tuple(Topic(name, Imu) for name in topic_names.FOOT_IMU)
+SHANK_IMU = tuple(Topic(name, Imu) for name in topic_names.SHANK_IMU)
+ANKLE_ENCODER = tuple(Topic(name, JointState) for name in topic_names.ANKLE_ENCODER)
+TRUE_EVENTS = Topic(topic_names.TRUE_EVENTS, msg.GaitEvent)
+TRUE_PROGRESS = Topic(topic_names.TRUE_PROGRESS, msg.Progress)
 
 TORQUE_PROFILE = Topic(topic_names.TORQUE_PROFILE, msg.TorqueProfile)
 PULSES = Topic(topic_names.PULSES, msg.TorquePulse)

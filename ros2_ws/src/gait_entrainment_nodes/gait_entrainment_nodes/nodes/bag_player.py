@@ -37,6 +37,7 @@ from gait_entrainment_bags import (
 )
 from gait_entrainment_bags.messages import nanoseconds_of
 from gait_entrainment_nodes.messaging import topics
+from gait_entrainment_nodes.messaging.older_messages import converter_of
 from gait_entrainment_nodes.messaging.player_services import srv
 from gait_entrainment_nodes.messaging.raw_messages import message_class
 from gait_entrainment_nodes.nodes.lateness import Lateness
@@ -105,6 +106,7 @@ class BagPlayer(Participant):
         settings = self.settings
         if not settings.bag:
             raise ValueError("bag: is empty; give the folder of the bag to play")
+        self._converters: dict[str, Callable[[bytes], bytes]] = {}  # of older messages, by topic
         try:
             self._bag = BagReader(settings.bag)
             self._types = self._playable(
@@ -157,7 +159,7 @@ class BagPlayer(Participant):
     # The start
 
     def _playable(self, names: list[str]) -> dict[str, Any]:
-        """Return the types of those topics whose type is installed as it was recorded."""
+        """Return the types of those topics whose messages the installed types can carry."""
         types = {}
         for name in names:
             topic = self._bag.topics[name]
@@ -170,6 +172,9 @@ class BagPlayer(Participant):
                 self.get_logger().error(f"{name} is not played: {error}")
                 continue
             if topic.type_hash and topic.type_hash != installed.type_hash:
+                if converter := converter_of(topic):
+                    self._converters[name] = converter
+                    continue
                 self.get_logger().error(
                     f"{name} is not played: the installed {topic.type} is not the recorded one"
                 )
@@ -252,7 +257,9 @@ class BagPlayer(Participant):
                 self.publish(topics.CLOCK, clock_message(moment.instant))
             return
         player = self._players[moment.message.topic]
-        player.publish(moment.message.data)
+        convert = self._converters.get(moment.message.topic)
+        data = moment.message.data
+        player.publish(data if convert is None else convert(data))
         if moment.message.topic in self._forgetful and player.count % (KEPT // 2) == 0:
             player.wait_for_readers()
 

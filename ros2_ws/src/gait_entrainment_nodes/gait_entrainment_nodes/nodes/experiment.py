@@ -69,6 +69,7 @@ class Settings:
         PERTURBATOR,
         "gait_analyzer",
     )
+    walker: str = setting(WALKER, "name of the node in the walker's role, for messages to people")
     longest_lookahead: float = setting(
         10.0,
         "upper bound of the horizon's lead, which never exceeds a stride; short in real time, so "
@@ -115,7 +116,7 @@ class Experiment(Participant):
         self.subscribe_to_run(topics.TORQUE_PROFILE, Run.take_profile)
         self.subscribe_to_run(topics.RECORDER_PROGRESS, Run.take_recorder_progress)
         self.subscribe(topics.TROUBLE, self._on_trouble)
-        self._start = self.client(StartRun, f"{WALKER}/start")
+        self._start = self.client(StartRun, "walker/start")
         self._change_state = self.client(ChangeState, f"{PERTURBATOR}/change_state")
         self._get_state = self.client(GetState, f"{PERTURBATOR}/get_state")
         self._deliver = ActionClient(self, DeliverPulseTrain, f"{PERTURBATOR}/deliver_pulse_train")
@@ -156,6 +157,7 @@ class Experiment(Participant):
             self._runs,
             self.publish,
             self._request,
+            walker=self.settings.walker,
             recorded=recorded,
             real_time=self.real_time,
             held_up=lambda: who_hangs(self),
@@ -197,7 +199,7 @@ class Experiment(Participant):
         final = run.final
         assert final is not None
         if final.state != msg.Progress.FINISHED:
-            blamed = WALKER if final.state == msg.Progress.ABORTED else ""
+            blamed = run.walker if final.state == msg.Progress.ABORTED else ""
             raise ExperimentError(final.message or "the walker ended the run", blamed)
         await self._transition(run, Transition.TRANSITION_DEACTIVATE)
         run.fail_if_troubled()
@@ -232,7 +234,8 @@ class Experiment(Participant):
             try:
                 await self._participants.check(self.settings.longest_clock_offset)
                 if not (self._start.service_is_ready() and self._deliver.server_is_ready()):
-                    raise ExperimentError(f"{WALKER} or {PERTURBATOR} is not there", WALKER)
+                    walker = self.settings.walker
+                    raise ExperimentError(f"{walker} or {PERTURBATOR} is not there", walker)
                 if waiting := self.not_ready():
                     raise ExperimentError(f"experiment waits for {waiting}", self.get_name())
                 return
@@ -263,9 +266,10 @@ class Experiment(Participant):
 
     async def _start_walker(self, run: Run) -> int:
         """Start the walker; return the instant of heel strike 0 [ns since 1970]."""
-        response = await self._answer(self._start, StartRun.Request(run=run.number), WALKER)
+        walker = run.walker
+        response = await self._answer(self._start, StartRun.Request(run=run.number), walker)
         if not response.success:
-            raise ExperimentError(f"{WALKER} did not start: {response.message}", WALKER)
+            raise ExperimentError(f"{walker} did not start: {response.message}", walker)
         return nanoseconds_of(response.start)
 
     async def _answer(

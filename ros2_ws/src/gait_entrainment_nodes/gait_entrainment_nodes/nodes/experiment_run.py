@@ -42,8 +42,8 @@ class Run:
 
     ``request`` asks the perturbator for pulses; ``take_answer`` is then told its answer. If the
     run is ``recorded``, the walker waits for the recorder. In ``real_time`` nobody waits for
-    anybody, and each owes what it does by itself. ``held_up`` says who holds up the rest,
-    if that is known. ``clock`` is steady time [s].
+    anybody, and each owes what it does by itself. ``walker`` is the node in that role.
+    ``held_up`` says who holds up the rest, if that is known. ``clock`` is steady time [s].
     """
 
     def __init__(
@@ -53,11 +53,12 @@ class Run:
         request: Callable[[PulseTrain], None],
         *,
         recorded: bool,
+        walker: str = WALKER,
         real_time: bool = False,
         held_up: Callable[[], str] = lambda: "",
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.number = number
+        self.number, self.walker = number, walker
         self.conductor: Conductor | None = None  # once the walker has started
         self.known_until = 0  # all events up to this instant have been seen [ns since 1970]
         self.promised_until = 0  # by the latest horizon [ns since 1970]; 0 before the first
@@ -259,9 +260,9 @@ class Run:
         asked_at, silent = min(self._debts()) if self._real_time else next(self._debts())
         if asked_at < now - silence_timeout:
             what = f"{silent} has been silent"
-            if silent == WALKER and self._progress is not None:
+            if silent == self.walker and self._progress is not None:
                 total = self._progress.events
-                what = f"{WALKER}: {total - self._events} of {total} gait events missing"
+                what = f"{silent}: {total - self._events} of {total} gait events missing"
             why = self._held_up()
             self.fail(ExperimentError(f"{what} for {silence_timeout:g} s{why}", silent))
 
@@ -278,7 +279,7 @@ class Run:
         if self._recorded and self._recorded_grant < self._grant:
             yield self._recorded_at, RECORDER
         since = self._progress_at
-        yield since if self._real_time else max(since, self._profile_at), WALKER
+        yield since if self._real_time else max(since, self._profile_at), self.walker
 
     # What the perturbator has to say
 

@@ -18,7 +18,7 @@ from std_srvs.srv import Trigger
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.gait import VerdictSettings
-from gait_entrainment.gait.analyzer import Result
+from gait_entrainment.gait.analyzer import TOE_OFF_BIAS, Result
 from gait_entrainment.settings import setting
 from gait_entrainment_bags.messages import MessageError, nanoseconds_of
 from gait_entrainment_msgs import msg
@@ -37,6 +37,9 @@ class Settings:
         "commanded",
         "where a pulse begins: commanded, or measured where the robot's torque rises",
         choices=("commanded", "measured"),
+    )
+    toe_off_bias: float = setting(
+        0.0, TOE_OFF_BIAS.meaning, "s", (TOE_OFF_BIAS.least, TOE_OFF_BIAS.most)
     )
 
 
@@ -79,7 +82,8 @@ class GaitAnalyzerNode(Participant):
         ):
             self._latest_run = message.run
             side, measured = self.settings.side, self.settings.onset == "measured"
-            self.run = Run(message.run, side, self.verdict, measured=measured)
+            bias = self.settings.toe_off_bias
+            self.run = Run(message.run, side, self.verdict, bias, measured=measured)
             self.note_state(DiagnosticStatus.OK, f"run {message.run} goes on")
             first, self._first_event = self._first_event, None
             if first is not None and first.run == message.run:

@@ -38,16 +38,23 @@ class Run:
     One run; all instants are [ns since 1970].
 
     What is added may complete results, which are returned in the order of publishing. Onsets are
-    those that were promised, or ``measured`` where the robot's torque rises.
+    those that were promised, or ``measured`` where the robot's torque rises. Toe-offs are known to
+    be detected late by ``toe_off_bias`` [s].
     """
 
     def __init__(
-        self, number: int, side: Side, settings: VerdictSettings, *, measured: bool
+        self,
+        number: int,
+        side: Side,
+        settings: VerdictSettings,
+        toe_off_bias: float = 0.0,
+        *,
+        measured: bool,
     ) -> None:
         self.number, self.side = number, side
         self.promised_until = 0  # all pulses up to this instant are known
         self.end: int | None = None  # of the walk, once it is known
-        self._analyzer = GaitAnalyzer(side, settings)
+        self._analyzer = GaitAnalyzer(side, settings, toe_off_bias)
         self._measured = MeasuredOnsets() if measured else None
         self._events = 0
         self._closed = False  # nothing will be promised any more

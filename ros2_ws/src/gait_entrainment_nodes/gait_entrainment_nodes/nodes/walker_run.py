@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side, nanoseconds
-from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment.parameters import Variation, WalkerParameters
 from gait_entrainment.robot import TorqueProfile
 from gait_entrainment.walker import Ending, Samples, Transition, Walker
 
@@ -27,16 +27,22 @@ class WalkerRun:
     Walks one run and keeps the account that a node must report.
 
     Heel strike 0, at time 0, is that of ``first_heel_strike``. There are ``sample_rate`` samples
-    per second; 0 samples at the gait events, None not at all.
+    per second; 0 samples at the gait events, None not at all. ``variation`` and ``seed`` say how
+    its strides vary.
 
     How a run is cut into stretches changes neither events nor samples: the grid of samples is
     fixed, and the walker's state is only ever computed from the last switching instant.
     """
 
     def __init__(
-        self, parameters: WalkerParameters, first_heel_strike: Side, sample_rate: float | None
+        self,
+        parameters: WalkerParameters,
+        first_heel_strike: Side,
+        sample_rate: float | None,
+        variation: Variation | None = None,
+        seed: int = 0,
     ) -> None:
-        self._walker = Walker(parameters, first_heel_strike)
+        self._walker = Walker(parameters, first_heel_strike, variation=variation, seed=seed)
         self._sampled = sample_rate is not None
         self._period = NANOSECONDS_PER_SECOND / sample_rate if sample_rate else None
         self.promised = 0  # torque is promised up to this instant [ns]

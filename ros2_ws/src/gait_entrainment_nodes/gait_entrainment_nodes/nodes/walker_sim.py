@@ -22,30 +22,32 @@ from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
-from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment.parameters import Variation, WalkerParameters
 from gait_entrainment.settings import setting
 from gait_entrainment_bags.messages import nanoseconds_of, profile_of, stop_of
 from gait_entrainment_msgs import msg
 from gait_entrainment_msgs.srv import StartRun
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.raw_messages import MessageTemplate
-from gait_entrainment_nodes.messaging.stamps import header, to_time
+from gait_entrainment_nodes.messaging.stamps import (
+    LOCK_STEP_START,
+    START_DELAY,
+    header,
+    to_time,
+)
 from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.participant import Participant
 from gait_entrainment_nodes.nodes.walker_run import Stretch, WalkerRun
 from gait_entrainment_nodes.nodes.walker_sim_run import LockStepRun, RealTimeRun, Run, Starved
 
 JOINTS = ["l_hip", "r_hip", "l_ankle", "r_ankle"]
-# Heel strike 0 of a lock-step run [ns since 1970]: 2000-01-01, plainly not a recording time.
-LOCK_STEP_START = 946_684_800 * NANOSECONDS_PER_SECOND
-# Real time: from the start request to heel strike 0 [ns], so that the first promise is there.
-START_DELAY = 200_000_000
 
 
 @dataclass(frozen=True)
 class Settings:
     """Parameters of the node, beside those of the walker."""
 
+    seed: int = setting(0, "seed of the variation", within=(0, 2**63 - 1))
     first_heel_strike: Side = setting(Side.RIGHT, "leg of heel strike 0: left or right")
     sample_rate: float = setting(
         200.0, "rate of the sampled topics; 0 samples at gait events only", "Hz", (0.0, 1000.0)
@@ -63,19 +65,27 @@ class WalkerSim(Participant):
 
     settings: Settings
     walker: WalkerParameters  # the next run begins with it
+    variation: Variation
     run: Run | None
+    # What it says of its gait, and in which role.
+    events_topic, progress_topic = topics.GAIT_EVENTS, topics.WALKER_PROGRESS
 
-    def __init__(self) -> None:
-        super().__init__("walker_sim")
-        fixed = ("real_time", "acknowledged", "ground_reaction")
-        self.begin_participation(settings=Settings, walker=WalkerParameters, fixed=fixed)
+    def __init__(self, name: str = "walker_sim", **more_settings: type) -> None:
+        super().__init__(name)
+        self.begin_participation(
+            settings=Settings,
+            walker=WalkerParameters,
+            variation=(Variation, "variation."),
+            fixed=("real_time", "acknowledged", "ground_reaction", "sensor"),
+            **more_settings,
+        )
         self._walked: int | None = None  # number of the run to be reset before the next one
-        self._events = self.offer(topics.GAIT_EVENTS)
+        self._events = self.offer(self.events_topic)
         sampled = [topics.JOINT_STATES, topics.ANKLE_TORQUE]
         if self.settings.ground_reaction:
             sampled += topics.GROUND_REACTION
         self._sampled = [self.offer(topic) for topic in sampled]
-        self.offer(topics.WALKER_PROGRESS)
+        self.offer(self.progress_topic)
         self.offer(topics.WALKER_TIMING)
         if not self.settings.real_time:
             self.offer(topics.CLOCK)
@@ -90,8 +100,12 @@ class WalkerSim(Participant):
         self.subscribe_to_run(topics.TORQUE_PROFILE, self._on_profile)
         if self.settings.acknowledged and not self.settings.real_time:
             self.subscribe_to_run(topics.RECORDER_PROGRESS, LockStepRun.acknowledge)
-        self.create_service(StartRun, "~/start", self._on_start)
-        self.create_service(Trigger, "~/reset", self._on_reset)
+        self.offer_start()
+
+    def offer_start(self) -> None:
+        """Offer what the role of the walker owes."""
+        self.create_service(StartRun, "walker/start", self._on_start)
+        self.create_service(Trigger, "walker/reset", self._on_reset)
 
     def _on_start(self, request: StartRun.Request, response: StartRun.Response) -> Any:
         used = self._walked if self.run is None else self.run.number
@@ -101,21 +115,27 @@ class WalkerSim(Participant):
         elif waiting:
             response.message = f"walker_sim waits for {waiting}"
         else:
-            self.run = self._new_run(request.run)
+            start = time.time_ns() + START_DELAY if self.settings.real_time else LOCK_STEP_START
+            self.run = self.new_run(request.run, start)
             self.note_state(DiagnosticStatus.OK, f"run {request.run} goes on")
             response.success, response.start = True, to_time(self.run.start)
         return response
 
-    def _new_run(self, number: int) -> Run:
-        settings = self.settings
-        walker = WalkerRun(self.walker, self.settings.first_heel_strike, settings.sample_rate)
-        if not settings.real_time:
-            kept_to = settings.acknowledged
-            return LockStepRun(number, walker, LOCK_STEP_START, acknowledged=kept_to)
+    def new_run(self, number: int, start: int) -> Run:
+        """Return a run with heel strike 0 at an instant [ns since 1970]."""
+        walker = self.new_walk()
+        if not self.settings.real_time:
+            return LockStepRun(number, walker, start, acknowledged=self.settings.acknowledged)
         # Deadlines are met on steady time; its offset to the stamps is fixed here, once.
-        start = time.time_ns() + START_DELAY
-        delay = START_DELAY + round(settings.presentation_delay * NANOSECONDS_PER_SECOND)
-        return RealTimeRun(number, walker, start, due_at=time.monotonic_ns() + delay)
+        delay = round(self.settings.presentation_delay * NANOSECONDS_PER_SECOND)
+        due_at = time.monotonic_ns() + start - time.time_ns() + delay
+        return RealTimeRun(number, walker, start, due_at=due_at)
+
+    def new_walk(self) -> WalkerRun:
+        """Return the walk of a run."""
+        settings = self.settings
+        rate, first = settings.sample_rate, settings.first_heel_strike
+        return WalkerRun(self.walker, first, rate, self.variation, settings.seed)
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Any:
         if self.run is not None:
@@ -152,7 +172,7 @@ class WalkerSim(Participant):
         assert run is not None
         for walked in run.walk():
             if isinstance(walked, Stretch):
-                samples = self._serialized(run, walked)
+                samples = self.serialized(run, walked)
                 run.wait()
                 self._send_events(run, walked)
                 for publisher, messages in zip(self._sampled, samples, strict=False):
@@ -165,12 +185,12 @@ class WalkerSim(Participant):
                 starved = walked.length / 1e6
                 self.diagnose(run.stamp, DiagnosticStatus.WARN, what, starved_ms=starved)
             else:
-                self._send_progress(run, walked)
+                self.send_progress(run, walked)
 
     def on_stop(self) -> None:
         """End of the process: say so if a run goes on."""
         if self.run is not None:
-            self._send_progress(self.run, self.run.progress(aborted=True))
+            self.send_progress(self.run, self.run.progress(aborted=True))
 
     def _send_events(self, run: Run, stretch: Stretch) -> None:
         for event in stretch.transitions:
@@ -181,11 +201,12 @@ class WalkerSim(Participant):
                     kind=event.kind,
                     side=event.side,
                     step=event.step,
-                    source="walker_sim",
+                    source=self.get_name(),
+                    detected_at=to_time(run.start + event.stamp),
                 )
             )
 
-    def _serialized(self, run: Run, stretch: Stretch) -> list[list[bytes]]:
+    def serialized(self, run: Run, stretch: Stretch) -> list[list[bytes]]:
         """Return the messages of the samples of a stretch, by topic; empty if it has none."""
         samples = stretch.samples
         if samples is None:
@@ -200,9 +221,9 @@ class WalkerSim(Participant):
             messages += [self._force.fill(stamps, of_foot) for of_foot in forces]
         return messages
 
-    def _send_progress(self, run: Run, progress: msg.Progress) -> None:
+    def send_progress(self, run: Run, progress: msg.Progress) -> None:
         """Publish progress, and at the end of a run how it went."""
-        self.publish(topics.WALKER_PROGRESS, progress)
+        self.publish(self.progress_topic, progress)
         if not self.settings.real_time:
             self.publish(topics.CLOCK, ClockMessage(clock=progress.header.stamp))
         if progress.state == msg.Progress.WALKING:

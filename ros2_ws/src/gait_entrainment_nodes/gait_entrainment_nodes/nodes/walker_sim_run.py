@@ -18,15 +18,13 @@ from typing import Any
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment.robot import TorqueProfile
 from gait_entrainment_msgs.msg import Progress, WalkerTiming
-from gait_entrainment_nodes.messaging.stamps import header
+from gait_entrainment_nodes.messaging.stamps import PROGRESS_PERIOD, header
 from gait_entrainment_nodes.nodes.lateness import Lateness
 from gait_entrainment_nodes.nodes.walker_run import Stretch, WalkerRun
 
 # Grants that may be sent before the recorder has acknowledged the first of them: two let it
 # write one while the next is computed.
 UNACKNOWLEDGED_GRANTS = 2
-# Real time: how often progress is reported and promises are asked for [ns].
-PROGRESS_PERIOD = 20_000_000
 # Real time: so long before it is due what is promised is walked and made ready to be sent [ns]. A
 # stop that comes meanwhile ends the torque at the end of what has been walked.
 HEAD_START = 1_000_000

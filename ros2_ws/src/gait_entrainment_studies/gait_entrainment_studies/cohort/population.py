@@ -27,19 +27,13 @@ from gait_entrainment.geometry import torque_work
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.walker import EndingKind
 from gait_entrainment.walker.model import Floats, make_model
+from gait_entrainment.walker.variation import LEAST, Seed, made_for_any_stiffness, step_noise
 from gait_entrainment_studies.walks import NO_PULSES, Pulses, walk
-
-Seed = int | tuple[int, ...]
 
 # Strides of the pilot walk that finds the noise for a coefficient of variation, and its rounds.
 _PILOT_STRIDES = 400
 _PILOT_ROUNDS = 2
 _PILOT_NOISE = 0.02
-
-# Noise is cut off at this many standard deviations: no step has an absurd push-off.
-_TRUNCATION = 3.0
-# What noise leaves at least of a push-off's stiffness.
-_LEAST = 0.01
 
 
 @dataclass(frozen=True)
@@ -96,7 +90,10 @@ class Population:
         if not -1 < asymmetry < 1:
             raise UsageError(f"asymmetry: {asymmetry:g}; allowed: above -1 and below 1")
         self.size = len(walkers)
-        self._models = [_made_for_noise(walker, slope) for walker in walkers]
+        self._models = [
+            made_for_any_stiffness(make_model(walker, slope), walker.ankle_stiffness)
+            for walker in walkers
+        ]
         # In even steps the leg that is not perturbed trails and pushes off.
         self._sides = 1 - asymmetry, 1 + asymmetry
 
@@ -126,7 +123,7 @@ class Population:
         steps = len(noise)
         strikes = np.full((steps + 1, self.size), np.nan)
         offs = np.full((steps, self.size), np.nan)
-        factors = np.resize(self._sides, steps)[:, None] * np.clip(1 + noise, _LEAST, None)
+        factors = np.resize(self._sides, steps)[:, None] * np.clip(1 + noise, LEAST, None)
         apex = self.periodic_apex() if apex is None else apex
         endings: list[EndingKind | None] = []
         for index, model in enumerate(self._models):
@@ -141,43 +138,6 @@ class Population:
         fell = np.array([ending is EndingKind.FALL for ending in endings])
         flew_off = np.array([ending is EndingKind.FLY_OFF for ending in endings])
         return PopulationWalk(strikes, offs, fell, flew_off)
-
-
-def _made_for_noise(walker: WalkerParameters, slope: float) -> Any:
-    """
-    Return constants (`Model`) that hold for any stiffness.
-
-    Those of the whole double stance do not, so it is made a quadrature of its own each time, and
-    searched for a fall or fly-off.
-    """
-    model: Any = make_model(walker, slope)
-    model["whole_double_stance_apex"] = np.inf
-    model["least_gain"] = -np.inf
-    return model
-
-
-def step_noise(seed: Seed, steps: int, size: int, hurst: float = 0.5) -> Floats:
-    """
-    Return fractional Gaussian noise (steps, size) of unit variance, truncated.
-
-    With `hurst` 0.5 it is white; above, up to 1, neighbours resemble each other over long
-    stretches (strides of adults: about 0.75). By circulant embedding (Davies and Harte 1987),
-    which is exact.
-
-    Raises UsageError for a Hurst exponent out of range.
-    """
-    if not 0.5 <= hurst < 1:
-        raise UsageError(f"hurst: {hurst:g}; allowed: at least 0.5, which is white, and below 1")
-    generator, lags = np.random.default_rng(seed), np.arange(steps + 1.0)
-    power = 2 * hurst
-    covariance = 0.5 * (np.abs(lags + 1) ** power - 2 * lags**power + np.abs(lags - 1) ** power)
-    circulant = np.concatenate([covariance, covariance[-2:0:-1]])
-    spectrum = np.clip(np.fft.fft(circulant).real, 0.0, None)
-    shape = size, circulant.size
-    white = generator.standard_normal(shape) + 1j * generator.standard_normal(shape)
-    noise = np.fft.fft(white * np.sqrt(spectrum / circulant.size)).real[:, :steps]
-    truncated: Floats = np.clip(noise.T, -_TRUNCATION, _TRUNCATION)
-    return truncated
 
 
 def noise_for(

@@ -19,13 +19,13 @@ from gait_entrainment.conventions import EventKind, Side, nanoseconds
 from gait_entrainment.errors import UsageError
 from gait_entrainment.gait import GaitEvent, Verdict, analyze
 from gait_entrainment.settings import check_settings, setting
+from gait_entrainment.walker.variation import step_noise
 from gait_entrainment_studies.cohort.population import (
     Population,
     PopulationWalk,
     PulseTrains,
     locked_runs,
     noise_for,
-    step_noise,
 )
 from gait_entrainment_studies.cohort.subjects import Subjects
 from gait_entrainment_studies.locking.branches import basin_of, locked_gaits, pieces_of

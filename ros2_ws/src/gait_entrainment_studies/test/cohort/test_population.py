@@ -10,12 +10,12 @@ from scipy.integrate import solve_ivp
 from step_to_step import step_to_step
 
 from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment.walker.variation import step_noise
 from gait_entrainment_studies.cohort.population import (
     Population,
     PulseTrains,
     locked_runs,
     noise_for,
-    step_noise,
 )
 from gait_entrainment_studies.locking.walked import walk_under_pulses
 

@@ -1,0 +1,160 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""entrain detect: gait events from the signals of a recording."""
+
+import argparse
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from gait_entrainment.conventions import EventKind, Side
+from gait_entrainment.errors import UsageError
+from gait_entrainment.robot.drivers import split_options
+from gait_entrainment_bags.recorded_signals import read_signals
+from gait_entrainment_sensors.detection import ChosenDetector, find_detector
+from gait_entrainment_sensors.motion_capture import (
+    MARKERS,
+    events_of_markers,
+    events_on_plates,
+    read_c3d,
+)
+from gait_entrainment_sensors.offline import DetectedEvent, detect, number, write_events
+from gait_entrainment_sensors.recording import RecordingError, read_streams
+
+DESCRIPTION = "Find heel strikes and toe-offs in recorded signals; write an events.tsv (BIDS)."
+EXAMPLES = """examples:
+  entrain detect walk.csv                       columns time, left_force_z, right_force_z
+  entrain detect walk.csv --rate 204.8 --column left_foot_gyro_y_deg=gyr_y ...
+  entrain detect walk.csv --detector foot_gyroscope:axis_y=1,toe_off_bias=0.004
+  entrain detect trial.c3d                      force plates, whose feet by the markers
+  entrain detect bags/mine --detector vertical_force
+  entrain detect trial.c3d --detector markers --marker left_heel=L_FCC ...
+columns: docs/sensors.md
+"""
+# What is no detector: it needs the whole recording.
+BY_MARKERS = "markers"
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    parser.add_argument(
+        "file", type=Path, metavar="FILE", help="table (.csv, .tsv), C3D file or bag"
+    )
+    parser.add_argument("--out", type=Path, metavar="FILE", help="default: FILE_events.tsv")
+    parser.add_argument(
+        "--detector",
+        metavar="NAME[:OPTION=VALUE,...]",
+        help="default: the first whose columns are there; markers: by position, of C3D",
+    )
+    parser.add_argument("--rate", type=float, metavar="HZ", help="instead of a column time [s]")
+    for word, meaning in (
+        ("column", "column of the file that is meant by a name"),
+        ("marker", f"marker that is one of {', '.join(MARKERS)}"),
+    ):
+        parser.add_argument(
+            f"--{word}", action="append", default=[], metavar="NAME=NAME_IN_FILE", help=meaning
+        )
+    parser.add_argument(
+        "--plates", metavar="SIDE,SIDE", help="whose foot each plate carries (two belts)"
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Detect, write and print."""
+    path: Path = options.file
+    if options.rate is not None and not 0.0 < options.rate < 1e6:
+        raise UsageError(f"--rate: {options.rate:g} Hz; allowed: above 0 and below 1e6")
+    out = options.out or path.with_name(f"{path.stem}_events.tsv")
+    if not path.exists():
+        raise RecordingError(f"{path}: there is no such file")
+    read = {".c3d": _of_c3d, ".mcap": _of_bag}.get(path.suffix.lower(), _of_table)
+    events, troubles = (_of_bag if path.is_dir() else read)(path, options)
+    if not events:
+        reason = f": {'; '.join(troubles)}" if troubles else ""
+        raise RecordingError(f"{path}: holds no gait event that could be detected{reason}")
+    write_events(out, events)
+    counts = {
+        f"{side.name.lower()}_{kind.name.lower()}": sum(
+            (e.event.side, e.event.kind) == (side, kind) for e in events
+        )
+        for side in Side
+        for kind in EventKind
+    }
+    detector = events[0].detector
+    if options.json:
+        result = {"events": str(out), "detector": detector, "counts": counts, "troubles": troubles}
+        print(json.dumps(result))
+        return 0
+    print(f"detector  {detector}")
+    print(f"events    {', '.join(f'{n} {what}' for what, n in counts.items())}".replace("_", " "))
+    for trouble in troubles:
+        print(f"trouble   {trouble}")
+    print(f"written   {out}")
+    return 0
+
+
+def _of_table(
+    path: Path, options: argparse.Namespace
+) -> tuple[list[DetectedEvent], tuple[str, ...]]:
+    chosen = find_detector(options.detector) if options.detector else None
+    name, streams = read_streams(
+        path,
+        chosen.name if chosen else None,
+        chosen.detector.signals if chosen else (),
+        _pairs("column", options.column),
+        options.rate,
+    )
+    return detect(chosen or find_detector(name), streams)
+
+
+def _of_bag(
+    path: Path, options: argparse.Namespace
+) -> tuple[list[DetectedEvent], tuple[str, ...]]:
+    chosen = find_detector(options.detector) if options.detector else None
+    name, streams = read_signals(path, chosen.name if chosen else None)
+    return detect(chosen or find_detector(name), streams)
+
+
+def _of_c3d(
+    path: Path, options: argparse.Namespace
+) -> tuple[list[DetectedEvent], tuple[str, ...]]:
+    names = _pairs("marker", options.marker)
+    if unknown := [name for name in names if name not in MARKERS]:
+        raise UsageError(f"--marker: {unknown[0]!r}; allowed: {', '.join(MARKERS)}")
+    capture = read_c3d(path, names, plates=options.detector != BY_MARKERS)
+    if options.detector == BY_MARKERS or not (capture.plates or options.detector):
+        return number(events_of_markers(capture), BY_MARKERS)
+    if not capture.plates:
+        raise RecordingError(f"{path}: holds no force plate; allowed: --detector {BY_MARKERS}")
+    chosen: ChosenDetector = find_detector(options.detector or "vertical_force")
+    if chosen.detector.signals != ("force_z",):
+        raise UsageError(
+            f"--detector: {chosen.name} reads no force plate; allowed: vertical_force, "
+            f"{BY_MARKERS}"
+        )
+    sides = None if options.plates is None else _sides(options.plates)
+    found, told = events_on_plates(capture, chosen, sides)
+    events, troubles = number(found, chosen.name)
+    return events, (*told, *troubles)
+
+
+def _sides(text: str) -> list[Side]:
+    known = {side.name.lower(): side for side in Side}
+    words = text.split(",")
+    if unknown := [word for word in words if word not in known]:
+        raise UsageError(f"--plates: {unknown[0]!r}; allowed: left, right, with commas between")
+    return [known[word] for word in words]
+
+
+def _pairs(option: str, given: Sequence[str]) -> dict[str, str]:
+    """Return NAME=NAME_IN_FILE of an option as a mapping."""
+    pairs = {}
+    for text in given:
+        for part in split_options(text):
+            name, equals, there = part.partition("=")
+            if not (name and equals and there):
+                raise UsageError(f"--{option}: {part!r}; allowed: NAME=NAME_IN_FILE")
+            pairs[name] = there
+    return pairs

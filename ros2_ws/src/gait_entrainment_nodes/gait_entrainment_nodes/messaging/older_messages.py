@@ -1,0 +1,49 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Messages of this project as earlier versions recorded them: what was added is left empty."""
+
+from collections.abc import Callable
+from typing import Any
+
+from rosidl_parser.definition import AbstractNestedType, NamespacedType
+
+from gait_entrainment_bags.decoding import decoder_for
+from gait_entrainment_bags.metadata import TopicInfo
+from gait_entrainment_nodes.messaging.raw_messages import message_class, serialize
+
+_OWN = "gait_entrainment_msgs/"
+
+
+def converter_of(topic: TopicInfo) -> Callable[[bytes], bytes] | None:
+    """
+    Return what turns a recorded message into one of the installed type, which differs.
+
+    None unless it is one of this project that has every field that was recorded.
+    """
+    if not topic.type.startswith(_OWN):
+        return None
+    installed = message_class(topic.type)
+    recorded = topic.schema_text.partition("=" * 80)[0].splitlines()
+    declared = [line.partition("#")[0].split() for line in recorded]
+    names = {words[1] for words in declared if len(words) == 2 and "=" not in words[1]}
+    if not names <= installed.get_fields_and_field_types().keys():
+        return None
+    decode = decoder_for(topic)
+    return lambda data: serialize(_filled(installed(), decode(data)))
+
+
+def _filled(message: Any, recorded: Any) -> Any:
+    fields = message.get_fields_and_field_types()
+    for name, kind in zip(fields, message.SLOT_TYPES, strict=True):
+        if hasattr(recorded, name):
+            setattr(message, name, _converted(kind, getattr(recorded, name)))
+    return message
+
+
+def _converted(kind: Any, value: Any) -> Any:
+    if isinstance(kind, NamespacedType):
+        return _filled(message_class("/".join(kind.namespaced_name()))(), value)
+    if isinstance(kind, AbstractNestedType):
+        return [_converted(kind.value_type, item) for item in value]
+    return value

@@ -1,0 +1,290 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+gait_detector: plays the walker for a person, from the signals of sensors on both feet.
+
+What an event is, and when it is known, is decided by the detectors of gait_entrainment_sensors,
+which number it, too. In real time the node promises that events are known once their latency is
+over, by the wall clock. In lock-step simulated sensors tell how far they are, and nothing depends
+on when a message arrives.
+"""
+
+import time
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from std_srvs.srv import Trigger
+
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
+from gait_entrainment.settings import setting
+from gait_entrainment_bags.messages import nanoseconds_of
+from gait_entrainment_msgs import msg
+from gait_entrainment_msgs.srv import StartRun
+from gait_entrainment_nodes.messaging import topics
+from gait_entrainment_nodes.messaging.sensors import reader_of, source_of
+from gait_entrainment_nodes.messaging.stamps import (
+    LOCK_STEP_START,
+    PROGRESS_PERIOD,
+    START_DELAY,
+    to_time,
+)
+from gait_entrainment_nodes.nodes.gait_detector_run import Run
+from gait_entrainment_nodes.nodes.loop import run_node
+from gait_entrainment_nodes.nodes.participant import STATE_PERIOD, Participant
+from gait_entrainment_sensors import Detection, find_detector
+
+# A sensor that was not heard for so long is not there [s].
+_ABSENT = 1.0
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Parameters of the node; what it listens to is decided when it starts."""
+
+    detector: str = setting(
+        "vertical_force", "detector of both feet, NAME or NAME:OPTION=VALUE,OPTION=VALUE"
+    )
+    left: str = setting("", "detector of the left foot, if it is another")
+    right: str = setting("", "detector of the right foot, if it is another")
+    left_topic: str = setting("", "topic of the left sensor; empty: as docs/person.md has it")
+    right_topic: str = setting("", "topic of the right sensor; empty: as docs/person.md has it")
+    first_heel_strike: str = setting(
+        "", "foot whose heel strikes have even numbers; empty: the first to strike",
+        choices=("", "left", "right"),
+    )  # fmt: skip
+    delivery: float = setting(
+        0.03, "longest time from a sample to its arrival, with one sample's", "s", (0.0, 1.0)
+    )
+    longest_age: float = setting(
+        0.5, "older samples, or ones ahead by a tenth of it, are left out", "s", (0.01, 10.0)
+    )
+    simulated: bool = setting(False, "sensor_sim stands for the person")
+
+
+class GaitDetector(Participant):
+    """ROS side of the detectors: converts samples, publishes events and progress."""
+
+    settings: Settings
+    run: Run | None
+
+    def __init__(self) -> None:
+        super().__init__("gait_detector")
+        fixed = ("detector", "left", "right", "left_topic", "right_topic", "simulated")
+        self.begin_participation(settings=Settings, fixed=fixed)
+        self._events = self.offer(topics.GAIT_EVENTS)
+        self.offer(topics.WALKER_PROGRESS)
+        self._epoch = time.time_ns() if self.real_time else LOCK_STEP_START
+        self._detectors = [find_detector(self._text_of(side)).make(side) for side in Side]
+        self._topics = [self._listen(side) for side in Side]
+        self._heard = [0, 0]  # samples of each foot
+        self._left_out = [0, 0]  # of them, those whose stamps cannot be
+        self._age = [0.0, 0.0]  # of the latest such sample [s]
+        self._heard_at = [-1e9, -1e9]  # on steady time [s]
+        self._found: list[Detection] = []  # lock-step: not numbered yet
+        self._truth: msg.Progress | None = None  # lock-step: not answered yet
+        self._readings = 0  # lock-step: samples of this run
+        self._walked = False
+        self._latest = ""  # event, for the diagnostics
+        self._progress_at = self._state_at = 0.0
+        self._counted = (0, 0)  # samples at the latest state
+        self.subscribe_to_run(topics.HORIZON, self._on_horizon)
+        if not self.real_time:
+            self.subscribe_to_run(topics.TRUE_PROGRESS, self._on_truth)
+        self.create_service(StartRun, "walker/start", self._on_start)
+        self.create_service(Trigger, "walker/reset", self._on_reset)
+
+    @property
+    def latency(self) -> float:
+        """Longest time from an event to its message [s]."""
+        return max(d.latency for d in self._detectors) + self.settings.delivery
+
+    def _text_of(self, side: Side) -> str:
+        return getattr(self.settings, side.name.lower()) or self.settings.detector
+
+    def _listen(self, side: Side) -> topics.Topic:
+        """Subscribe to the sensor of one foot; return its topic."""
+        detector = self._detectors[side]
+        source = source_of(detector.name, detector.signals)
+        topic = source.topics[side]
+        if given := getattr(self.settings, f"{side.name.lower()}_topic"):
+            topic = topic._replace(name=given)
+        if not self.settings.simulated:  # of a driver, whatever it offers
+            topic = topic._replace(qos=topics.FROM_A_DRIVER)
+        read = reader_of(source, detector.signals)
+        self.subscribe(topic, partial(self._on_sample, side, read))
+        return topic
+
+    # Samples
+
+    def _on_sample(self, side: Side, read: Any, message: Any) -> None:
+        stamp = nanoseconds_of(message.header.stamp)
+        self._heard[side] += 1
+        self._heard_at[side] = time.monotonic()
+        if not self.real_time:
+            self._readings += 1
+        elif not self._timely(side, stamp):
+            return
+        try:
+            values = read(message)
+        except IndexError:  # a joint state without positions
+            self._left_out[side] += 1
+            return
+        seconds = (stamp - self._epoch) / NANOSECONDS_PER_SECOND
+        self._found += self._detectors[side].add(seconds, values)
+        if self.real_time and self._found:
+            self._publish_found()
+        elif self._truth is not None:
+            self._answer_truth()
+
+    def _timely(self, side: Side, stamp: int) -> bool:
+        """Whether a sample's stamp can be: neither old nor ahead of this host's clock."""
+        age = (time.time_ns() - stamp) / NANOSECONDS_PER_SECOND
+        longest = self.settings.longest_age
+        if -0.1 * longest <= age <= longest:
+            return True
+        self._left_out[side] += 1
+        self._age[side] = age
+        return False
+
+    def _publish_found(self) -> None:
+        """Number what was found and publish it; between runs it only shows that sensors work."""
+        found, self._found = self._found, []
+        if found:
+            latest = max(found, key=lambda detection: detection.detected_at)
+            kind, side = latest.kind.name.lower(), latest.side.name.lower()
+            self._latest = f"{kind} {side}".replace("_", " ")
+        if self.run is None:
+            return
+        for event in self.run.events_of(found, [detector.name for detector in self._detectors]):
+            self._events.publish(event)
+
+    # The role of the walker
+
+    def _on_start(self, request: StartRun.Request, response: StartRun.Response) -> Any:
+        if self.run is not None or (self._walked and not self.real_time):
+            response.message = "a run is in progress, or a lock-step run is over: start anew"
+        elif waiting := self.not_ready():
+            response.message = f"gait_detector waits for {waiting}"
+        else:
+            start = time.time_ns() + START_DELAY if self.real_time else LOCK_STEP_START
+            first = self.settings.first_heel_strike
+            side = Side[first.upper()] if first else None
+            self.run = Run(request.run, start, self.latency, self._epoch, side)
+            self._readings, self._walked = 0, True
+            self._progress_at = time.monotonic() + START_DELAY / NANOSECONDS_PER_SECOND
+            self.note_state(DiagnosticStatus.OK, f"run {request.run} goes on")
+            response.success, response.start = True, to_time(start)
+        return response
+
+    def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Any:
+        response.success = self.run is None
+        response.message = "" if response.success else "a run is in progress"
+        return response
+
+    def _on_horizon(self, run: Run, horizon: msg.Horizon) -> None:
+        if horizon.last and run.end is None:
+            run.end = nanoseconds_of(horizon.until)
+
+    def _on_truth(self, _: Run, truth: msg.Progress) -> None:
+        self._truth = truth
+        self._answer_truth()
+
+    def _answer_truth(self) -> None:
+        """Go on once all samples that a simulated walk has sent are here."""
+        truth, run = self._truth, self.run
+        if truth is None or run is None or self._readings < truth.samples:
+            return
+        self._truth = None
+        self._publish_found()
+        self._send_progress(run.progress_behind(truth, nanoseconds_of(truth.header.stamp)))
+
+    def _send_progress(self, progress: msg.Progress) -> None:
+        self.publish(topics.WALKER_PROGRESS, progress)
+        if progress.state == msg.Progress.WALKING:
+            return
+        run, self.run = self.run, None
+        assert run is not None
+        stamp = nanoseconds_of(progress.header.stamp)
+        level, told = self._condition(run)
+        what = progress.message or told or "finished"
+        self.diagnose(stamp, level, what, events=run.events, late_events=run.late)
+        self.publish_counts(progress.run, stamp)
+
+    # What people are told
+
+    def not_ready(self) -> str:
+        """Return what is waited for: a sensor that is not there, or not what it should be."""
+        for side, topic in zip(Side, self._topics, strict=True):
+            wanted = f"{topic.type.__module__.split('.')[0]}/msg/{topic.type.__name__}"
+            found = {i.topic_type for i in self.get_publishers_info_by_topic(topic.name)}
+            if wanted not in found:
+                what = f"published as {', '.join(sorted(found))}" if found else "not published"
+                return f"{topic.name} [{wanted}]: {what}"
+            if self.settings.simulated:
+                continue
+            if time.monotonic() - self._heard_at[side] > _ABSENT:
+                return f"the sensor of the {side.name.lower()} foot: silent on {topic.name}"
+            if self._left_out[side] == self._heard[side]:
+                return f"the clock of the {side.name.lower()} sensor: {self._clock_of(side)}"
+        return super().not_ready()
+
+    def _clock_of(self, side: Side) -> str:
+        age = self._age[side]
+        way = "behind" if age > 0 else "ahead of"
+        return (
+            f"its stamps are {abs(age):.3g} s {way} this one's; allowed: "
+            f"{self.settings.longest_age:g} s: synchronize them (docs/hosts.md)"
+        )
+
+    def _condition(self, run: Run | None) -> tuple[bytes, str]:
+        """Return level and text of this node's state."""
+        now = None
+        if self.real_time:
+            now = (time.time_ns() - self._epoch) / NANOSECONDS_PER_SECOND
+        told = [line for detector in self._detectors for line in detector.troubles(now)]
+        told += [
+            f"{side.name.lower()}: {self._left_out[side]} samples left out: {self._clock_of(side)}"
+            for side in Side
+            if self._left_out[side]
+        ]
+        if run is not None:
+            told += run.numbering.troubles()
+            if run.late:
+                told.append(f"{run.late} events came later than promised: raise delivery")
+        return (DiagnosticStatus.WARN if told else DiagnosticStatus.OK), "; ".join(told)
+
+    def next_deadline(self) -> float:
+        """Return when to report progress, or how the sensors are."""
+        due = [self._state_at]
+        if self.run is not None and self.real_time:
+            due.append(self._progress_at)
+        return min(due)
+
+    def on_deadline(self) -> None:
+        """Report what is due."""
+        now = time.monotonic()
+        if self.run is not None and self.real_time and now >= self._progress_at:
+            self._progress_at = max(self._progress_at + PROGRESS_PERIOD / 1e9, now)
+            self._send_progress(self.run.progress_at(time.time_ns()))
+        if now >= self._state_at:
+            self._state_at = now + STATE_PERIOD
+            level, told = self._condition(self.run)
+            rates = {
+                f"{side.name.lower()}_samples_per_second": self._heard[side] - self._counted[side]
+                for side in Side
+            }
+            self._counted = (self._heard[0], self._heard[1])
+            self.note_state(level, told or "hears both feet", latest=self._latest, **rates)
+
+    def on_stop(self) -> None:
+        """End of the process: say so if a run goes on."""
+        if self.run is not None:
+            self._send_progress(self.run.aborted())
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node(GaitDetector)

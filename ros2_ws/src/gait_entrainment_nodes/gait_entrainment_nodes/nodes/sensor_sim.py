@@ -1,0 +1,118 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+sensor_sim: the simulated walker as sensors see it, for the rehearsal of an experiment on a person.
+
+The walker of walker_sim, its steps unnumbered: what emulated sensors on both feet would measure is
+published as a person's sensors would publish it, a device's buffer at a time, which is as long as
+the time between two samples of the walker. The exact events go to `truth/gait_events`. It begins
+to walk when the first torque profile of a run comes, as a person does when told to.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from gait_entrainment.conventions import Side, nanoseconds
+from gait_entrainment.gait import GaitEvent
+from gait_entrainment.settings import setting
+from gait_entrainment_bags.messages import nanoseconds_of
+from gait_entrainment_msgs import msg
+from gait_entrainment_nodes.messaging import topics
+from gait_entrainment_nodes.messaging.sensors import SensorWriter, source_of
+from gait_entrainment_nodes.nodes.loop import run_node
+from gait_entrainment_nodes.nodes.walker_run import Stretch, WalkerRun
+from gait_entrainment_nodes.nodes.walker_sim import WalkerSim
+from gait_entrainment_nodes.nodes.walker_sim_run import Run
+from gait_entrainment_sensors.emulated import KINDS, EmulatedSensor
+from gait_entrainment_sensors.kinds import find_sensor
+
+
+@dataclass(frozen=True)
+class SensorSettings:
+    """Which sensors the walker wears."""
+
+    sensor: str = setting(
+        "treadmill_force",
+        "emulated sensor on both feet, KIND or KIND:OPTION=VALUE,... of " + ", ".join(KINDS),
+    )
+
+
+@dataclass(frozen=True)
+class Measured(Stretch):
+    """A stretch, and what the sensors measured in it: (stamp [ns], values), by sensor."""
+
+    measured: list[list[tuple[int, tuple[float, ...]]]]
+
+
+class SensedWalk(WalkerRun):
+    """A walk with sensors on both feet."""
+
+    def __init__(self, *of_walk: Any, sensors: list[EmulatedSensor]) -> None:
+        super().__init__(*of_walk)
+        self._sensors = sensors
+        self.readings = 0  # of all sensors together, so far
+
+    def advance(self, until: int, last: bool = False) -> Measured:
+        """See `WalkerRun`; the stretch holds what the sensors measured, too."""
+        stretch = super().advance(until, last)
+        events = [GaitEvent(t.stamp, t.kind, t.side, t.step) for t in stretch.transitions]
+        measured = []
+        for sensor in self._sensors:
+            times = sensor.due(self.reached)
+            found = sensor.measure(times, self._walker.sample(times), events)
+            measured.append([(nanoseconds(stamp), values) for stamp, values in found])
+        self.readings += sum(map(len, measured))
+        return Measured(stretch.transitions, stretch.sample_times, stretch.samples, measured)
+
+
+class SensorSim(WalkerSim):
+    """ROS side of the sensed walker."""
+
+    sensors: SensorSettings
+    events_topic, progress_topic = topics.TRUE_EVENTS, topics.TRUE_PROGRESS
+
+    def __init__(self) -> None:
+        super().__init__("sensor_sim", sensors=SensorSettings)
+        self._kind, self._quality = find_sensor(self.sensors.sensor)
+        signals = KINDS[self._kind][0]
+        source = source_of(self._kind, signals)
+        self._writers = [SensorWriter(source, side, signals) for side in Side]
+        self._sampled += [self.offer(topic) for topic in source.topics]
+
+    def offer_start(self) -> None:
+        """Offer nothing: who is sensed is not asked to start, gait_detector is."""
+
+    def new_walk(self) -> WalkerRun:
+        """Return a walk with sensors."""
+        settings = self.settings
+        sensors = [EmulatedSensor(self._kind, side, self._quality, settings.seed) for side in Side]
+        rate, first = settings.sample_rate, settings.first_heel_strike
+        return SensedWalk(self.walker, first, rate, self.variation, settings.seed, sensors=sensors)
+
+    def run_of(self, message: Any) -> Run | None:
+        """Return the run of a message; the first torque profile of a run begins it."""
+        begins = isinstance(message, msg.TorqueProfile) and not (message.revision or message.stop)
+        if begins and self.run is None and (self._walked is None or self.settings.real_time):
+            self.run = self.new_run(message.run, nanoseconds_of(message.header.stamp))
+        return super().run_of(message)  # type: ignore[no-any-return]
+
+    def serialized(self, run: Run, stretch: Stretch) -> list[list[bytes]]:
+        """Return the messages of the walker, and behind them those of the sensors."""
+        assert isinstance(stretch, Measured)
+        walkers = len(self._sampled) - len(self._writers)
+        messages = super().serialized(run, stretch) or [[] for _ in range(walkers)]
+        for writer, measured in zip(self._writers, stretch.measured, strict=True):
+            messages.append(writer.write([(run.start + t, values) for t, values in measured]))
+        return messages
+
+    def send_progress(self, run: Run, progress: msg.Progress) -> None:
+        """Publish progress: of the sensors' messages it says how many there were on all topics."""
+        assert isinstance(run.walker, SensedWalk)
+        progress.samples = run.walker.readings
+        super().send_progress(run, progress)
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node(SensorSim)

@@ -1,0 +1,54 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What an emulated sensor measures arrives as its message says; a signal without one is told."""
+
+import pytest
+from rclpy.serialization import deserialize_message
+
+from gait_entrainment.conventions import Side
+from gait_entrainment.errors import UsageError
+from gait_entrainment_bags.messages import nanoseconds_of
+from gait_entrainment_nodes.messaging.sensors import (
+    ENCODER,
+    FOOT,
+    SHANK,
+    SensorWriter,
+    reader_of,
+    source_of,
+)
+from gait_entrainment_sensors.detection import detector_names, find_detector
+from gait_entrainment_sensors.emulated import KINDS
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("side", Side)
+def test_a_detector_reads_what_the_sensor_wrote(kind, side):
+    signals, _ = KINDS[kind]
+    source = source_of(kind, signals)
+    values = [tuple(float((k + n) % 2) for k, _ in enumerate(signals)) for n in range(3)]
+    stamps = [10**18 + n for n in range(3)]
+    written = SensorWriter(source, side, signals).write(list(zip(stamps, values, strict=True)))
+    read = reader_of(source, signals)
+    for data, stamp, expected in zip(written, stamps, values, strict=True):
+        message = deserialize_message(data, source.topics[side].type)
+        assert nanoseconds_of(message.header.stamp) == stamp
+        assert read(message) == expected
+    assert not SensorWriter(source, side, signals).write([])
+
+
+@pytest.mark.parametrize("name", detector_names())
+def test_each_detector_has_a_topic_for_each_foot(name):
+    detector = find_detector(name).make(Side.LEFT)
+    source = source_of(detector.name, detector.signals)
+    assert ["left" in topic.name for topic in source.topics] == [True, False]
+
+
+def test_inertial_sensors_are_told_apart_by_name_and_strange_signals_are_refused():
+    gyroscope = ("gyro_y",)
+    assert source_of("my_gyroscope", gyroscope) is FOOT
+    assert source_of("shank_gyroscope", gyroscope) is SHANK
+    with pytest.raises(UsageError, match="mine: no sensor's message carries gyro_y, heel"):
+        source_of("mine", ("gyro_y", "heel"))
+    with pytest.raises(IndexError):  # a joint state of no joint
+        reader_of(ENCODER, ("angle",))(ENCODER.topics[0].type())

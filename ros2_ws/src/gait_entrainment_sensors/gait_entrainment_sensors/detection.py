@@ -1,0 +1,279 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+What a detector owes: samples of one sensor on one foot in, heel strikes and toe-offs out.
+
+A text names a detector as one names a driver: NAME, or NAME:OPTION=VALUE,OPTION=VALUE. Detectors
+of other packages are found under the entry point ``gait_entrainment.detectors``.
+"""
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from importlib.metadata import entry_points
+from typing import Any, ClassVar
+
+from gait_entrainment.conventions import EventKind, Side
+from gait_entrainment.errors import UsageError
+from gait_entrainment.robot.drivers import read_options
+from gait_entrainment.settings import check_settings, setting
+
+ENTRY_POINTS = "gait_entrainment.detectors"
+# A walk of this length has shown what the signal reaches [s].
+_LONG_ENOUGH = 10.0
+# A signal that moves and reads the same for so long has met the end of its range [s].
+_HELD = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """A heel strike or a toe-off that a detector found; seconds since the start of the run."""
+
+    kind: EventKind
+    side: Side
+    time: float  # estimated instant of the event
+    detected_at: float  # time of the sample that decided it
+    uncertainty: float  # standard deviation of ``time`` [s]
+
+
+@dataclass(frozen=True)
+class DetectorSettings:
+    """What every detector can be told."""
+
+    longest_gap: float = setting(0.1, "longest time between two samples", "s", (1e-3, 1.0))
+    longest_constant: float = setting(3.0, "longest time without change", "s", (0.1, 60.0))
+    heel_strike_bias: float = setting(
+        0.0, "measured against a reference, taken off each strike", "s", (-0.2, 0.2)
+    )
+    toe_off_bias: float = setting(
+        0.0, "measured against a reference, taken off each toe-off", "s", (-0.2, 0.2)
+    )
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        check_settings(self)
+
+
+@dataclass(slots=True)
+class SignalCounts:
+    """What was wrong with the samples, and with what was found in them."""
+
+    not_finite: int = 0  # samples left out: not a number, or infinite
+    clock_back: int = 0  # samples left out: not later than the one before
+    clock_jumps: int = 0  # the clock went back by more than the longest gap: begun anew
+    dropouts: int = 0  # gaps longer than the longest gap: begun anew
+    constant: int = 0  # times that the signal did not change for too long
+    held: int = 0  # times that a moving signal stayed at one value: the end of its range
+    impossible: int = 0  # samples beyond what a person can do: units, or the wrong sensor
+    rejected: int = 0  # events that were found and not believed
+
+
+# What a person is told of each count.
+_MEANINGS = {
+    "not_finite": "samples are not numbers, left out",
+    "clock_back": "samples are not later than the one before, left out",
+    "clock_jumps": "times the clock jumped back: synchronize the clocks",
+    "dropouts": "dropouts: see the cable or the radio link",
+    "constant": "times the signal did not change: sensor dead, not worn, or nobody walks",
+    "held": "times the signal stuck while it moved: raise the range of the sensor",
+    "rejected": "events were found and not believed",
+}
+
+
+class Detector(ABC):
+    """
+    Finds the events of one foot in the samples of one sensor: causal, its state its own.
+
+    Its docstring gives the reference, the latency, the uncertainty, and when it fails. A detector
+    of your own derives from this class: it names itself and its signals, says how long
+    it may take, and does its work in `_take`. Samples come in order, at any spacing up to
+    ``longest_gap``; what is not a number, or not later than the sample before, never reaches
+    `_take`. `_restart` forgets what must not reach across a gap.
+
+    `latency` [s] bounds ``detected_at - time`` of every detection, beyond one sample interval:
+    what cannot be decided in that time is counted as rejected, and never published late.
+    """
+
+    name: ClassVar[str]
+    signals: ClassVar[tuple[str, ...]]  # names of the columns, SI units, in order
+    Settings: ClassVar[type[DetectorSettings]] = DetectorSettings
+    # Magnitude of the signal that decides [its unit] from which on it cannot stand still.
+    moving: ClassVar[float] = math.inf
+    # Magnitude [unit of the signals] that no person reaches, and what to say of it.
+    impossible: ClassVar[float] = math.inf
+    # Magnitude that every walk reaches.
+    reached: ClassVar[float] = 0.0
+    suspicion: ClassVar[str] = "check the units"
+    # Standard deviation of heel strikes and toe-offs [s].
+    uncertainty: ClassVar[tuple[float, float]]
+
+    def __init__(self, side: Side, settings: Any = None) -> None:
+        self.side = side
+        self.settings: Any = settings if settings is not None else self.Settings()
+        self.counts = SignalCounts()
+        self._largest = 0.0  # sum of magnitudes seen
+        self._first = math.nan  # time of the first sample
+        self._time = self._before = -math.inf  # of the latest sample, and the one before
+        self._total = math.nan  # the latest sum of magnitudes
+        self._constant_from = -math.inf  # since when it is so [s]
+        self._value = math.nan  # the latest of the signal that decides
+        self._held_from = -math.inf  # since when it is so [s]
+        self._told_constant = self._told_held = False
+        self._longest_gap = self.settings.longest_gap
+
+    @classmethod
+    def calibrated(
+        cls,
+        settings: Any,
+        times: Sequence[float],  # noqa: ARG003
+        samples: Sequence[Sequence[float]],  # noqa: ARG003
+    ) -> Any:
+        """Return settings completed by what a whole recorded walk tells; here as they are."""
+        return settings
+
+    @property
+    @abstractmethod
+    def latency(self) -> float:
+        """Longest time from an event to its detection, beyond one sample interval [s]."""
+
+    @abstractmethod
+    def _take(self, time: float, values: Sequence[float]) -> list[Detection]:
+        """Take one good sample; return what it decides."""
+
+    @abstractmethod
+    def _restart(self) -> None:
+        """Forget what must not reach across a gap in the samples."""
+
+    def add(self, time: float, values: Sequence[float]) -> list[Detection]:
+        """
+        Take one sample: its time [s since the start of the run] and the values of `signals`.
+
+        Returns the events that it decides, none or one as a rule.
+        """
+        if not 0.0 < time - self._time <= self._longest_gap and not self._mended(time):
+            return []
+        total = 0.0
+        for value in values:
+            total += value if value >= 0.0 else -value
+        if not total < self.impossible:
+            if not total < math.inf:  # nor is what is not a number
+                self.counts.not_finite += 1
+                return []
+            self.counts.impossible += 1
+        if total > self._largest:
+            self._largest = total
+        self._before, self._time = self._time, time
+        if total != self._total:
+            self._total, self._constant_from, self._told_constant = total, time, False
+        elif time - self._constant_from > self.settings.longest_constant:
+            self.counts.constant += not self._told_constant
+            self._told_constant = True
+        return self._take(time, values)
+
+    def _mended(self, time: float) -> bool:
+        """Begin anew after a gap or a jump of the clock; False if the sample is left out."""
+        counts, gap = self.counts, time - self._time
+        if math.isnan(gap):
+            counts.not_finite += 1
+            return False
+        if -self._longest_gap <= gap <= 0.0:
+            counts.clock_back += 1
+            return False
+        if gap == math.inf:
+            self._first = time
+        elif gap < 0.0:
+            counts.clock_jumps += 1
+        else:
+            counts.dropouts += 1
+        # No interval that ends here is that of the sampling.
+        self._time = time
+        self._total = self._value = math.nan
+        self._restart()
+        return True
+
+    def _found(self, kind: EventKind, event: float, now: float) -> list[Detection]:
+        """Return the event of an instant [s] that is decided now; none if it comes too late."""
+        if now - event > self.latency + (now - self._before):
+            self.counts.rejected += 1
+            return []
+        bias = self.settings.heel_strike_bias, self.settings.toe_off_bias
+        return [Detection(kind, self.side, event - bias[kind], now, self.uncertainty[kind])]
+
+    def _watch(self, time: float, value: float) -> None:
+        """Count that the signal that decides stays at one value although it moves."""
+        if value != self._value:
+            self._value, self._held_from, self._told_held = value, time, False
+        elif time - self._held_from > _HELD and abs(value) > self.moving:
+            self.counts.held += not self._told_held
+            self._told_held = True
+
+    def troubles(self, now: float | None = None) -> tuple[str, ...]:
+        """
+        Return what a person should know of this sensor, each in one line; empty if all is well.
+
+        With ``now`` [s] it tells a sensor that has fallen silent, too.
+        """
+        where = f"{self.side.name.lower()} {self.name}"
+        told = [
+            f"{where}: {n} {_MEANINGS[kind]}"
+            for kind, n in asdict(self.counts).items()
+            if n and kind in _MEANINGS
+        ]
+        if self.counts.impossible:
+            told.append(
+                f"{where}: {self.counts.impossible} samples of up to {self._largest:.3g} cannot "
+                f"be: {self.suspicion}"
+            )
+        if self._time - self._first > _LONG_ENOUGH and self._largest < self.reached:
+            told.append(
+                f"{where}: never above {self._largest:.3g}, which a walk exceeds: {self.suspicion}"
+            )
+        if now is not None and not now - self._time <= self._longest_gap:
+            silent = "no sample yet" if self._time == -math.inf else "no sample for "
+            seconds = "" if self._time == -math.inf else f"{now - self._time:.2f} s"
+            told.append(f"{where}: {silent}{seconds}")
+        return tuple(told)
+
+
+@dataclass(frozen=True)
+class ChosenDetector:
+    """A detector that has been chosen and loaded, with its settings."""
+
+    name: str
+    detector: type[Detector]
+    settings: Any
+
+    def make(self, side: Side) -> Detector:
+        """Return a detector for one foot."""
+        return self.detector(side, self.settings)
+
+
+def detector_names() -> dict[str, str]:
+    """Return where each detector is found, by name; nothing is loaded."""
+    return dict(sorted((p.name, p.value) for p in entry_points(group=ENTRY_POINTS)))
+
+
+def find_detector(text: str) -> ChosenDetector:
+    """
+    Load the detector that a text names, and check its settings.
+
+    Raises UsageError if there is none of that name or it cannot be loaded; LimitError if an
+    option is unknown or out of range.
+    """
+    name, _, options = text.partition(":")
+    found = {point.name: point for point in entry_points(group=ENTRY_POINTS)}
+    if name not in found:
+        raise UsageError(f"detector: {name!r} is unknown; allowed: {', '.join(sorted(found))}")
+    try:
+        detector = found[name].load()
+    except (ImportError, AttributeError) as error:
+        raise UsageError(
+            f"detector: {name} ({found[name].value}) cannot be loaded: {error}; install what it "
+            "needs"
+        ) from None
+    if not (isinstance(detector, type) and issubclass(detector, Detector)):
+        raise UsageError(f"detector: {name} is no Detector: derive it from that class")
+    settings = read_options(f"detector: {name}", detector.Settings, options)
+    return ChosenDetector(name, detector, settings)

@@ -1,0 +1,111 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A gyroscope on the foot or the shoe."""
+
+import math
+from typing import Any
+
+from gait_entrainment.conventions import EventKind, Side
+from gait_entrainment_sensors.detection import Detection
+from gait_entrainment_sensors.gyroscope import GyroscopeDetector, Peaks
+
+# Rate that has left zero for certain [rad/s]: 14 deg/s, three times the offset that a gyroscope
+# for consumers may have.
+_LEFT_ZERO = 0.25
+# Rate at which a foot that came down on the heel is slapping flat [rad/s].
+_SLAPPING = 1.0
+# Shares of the peak of push-off: it is falling for certain; it will not come back.
+_FALLING = 0.75
+_FALLEN = 0.5
+
+
+class FootGyroscopeDetector(GyroscopeDetector):
+    """
+    Events from the sagittal rate of the foot.
+
+    The foot lies flat, turns toes down to a peak at push-off, swings back toes up, and turns down
+    again as it slaps flat (Sabatini, IEEE Trans. Biomed. Eng. 52, 217, 2005; Kotiadis et al., Gait
+    Posture 32, 2010; Mariani et al., IEEE Trans. Biomed. Eng. 60, 2013). Toe-off lies between the
+    peak, a plateau of several tens of milliseconds, and the zero crossing after it: taken is the
+    instant at which the rate has fallen to three quarters of the peak, the begin of the fall.
+    Heel strike is where the rate leaves the zero crossing after swing; of a foot that comes down
+    flat, where it comes to rest.
+
+    Latency: the delay of the filter and ``decision``; of what takes longer nothing is told.
+    Uncertainty: 6 ms each, measured beside motion capture (docs/sensors.md).
+    Fails: on steps whose swing turns the foot by less than half of the usual rate (turning on the
+    spot, shuffling); where the foot is flat throughout (no push-off: no toe-off).
+    """
+
+    name = "foot_gyroscope"
+    uncertainty = (0.006, 0.006)
+    foot = True
+
+    def __init__(self, side: Side, settings: Any = None) -> None:
+        super().__init__(side, settings)
+        self._pushes = Peaks(self.settings.least_peak, self.settings.peak_share)
+
+    def _restart(self) -> None:
+        super()._restart()
+        self._peak = 0.0  # of push-off; of a swing, its magnitude [rad/s]
+        self._fall = math.nan  # when the rate fell from that peak [s]
+        self._rest = self._turn = math.nan  # when it came to zero, and left it [s]
+
+    def _stance(self, time: float, before: float, rate: float) -> list[Detection]:
+        found: list[Detection] = []
+        if rate < -self._swings.threshold:  # a swing, whose toe-off was not seen
+            self._begin_swing(time)
+            return found
+        if time - self._changed < self.settings.shortest_stance:
+            return found
+        level = _FALLING * self._peak
+        if rate > self._peak:
+            self._peak, self._fall = rate, math.nan
+        elif rate > level:
+            self._fall = math.nan
+        elif before > level:
+            self._fall = self._crossing(time, before, rate, level)
+        if rate < _FALLEN * self._peak:
+            fall, peak = self._fall, self._peak
+            self._peak, self._fall = 0.0, math.nan
+            if self._pushes.add(peak):
+                found = self._found(EventKind.TOE_OFF, fall, time)
+                self._begin_swing(time)
+        return found
+
+    def _begin_swing(self, time: float) -> None:
+        self._enter(swinging=True, time=time)
+        self._peak, self._fall = 0.0, math.nan
+        self._rest = self._turn = math.nan
+
+    def _swing(self, time: float, before: float, rate: float) -> list[Detection]:
+        if rate < -_LEFT_ZERO:
+            self._rest = self._turn = math.nan
+            if -rate > self._peak:
+                self._peak = -rate
+            return []
+        if self._peak < self.settings.least_peak:
+            # Not swinging yet; or never, as when the heel was only lifted.
+            if time - self._changed > 1.0:
+                self._enter(swinging=False, time=time)
+            return []
+        if self._rest != self._rest:
+            self._rest = self._crossing(time, before, rate, -_LEFT_ZERO)
+        if rate <= 0.0:
+            self._turn = math.nan
+        elif before <= 0.0:
+            self._turn = self._crossing(time, before, rate, 0.0)
+        if before <= _LEFT_ZERO < rate:
+            self._turn = self._crossing(time, before, rate, _LEFT_ZERO)
+        turned = self._turn == self._turn
+        certain = (turned and rate > _SLAPPING) or time - self._rest >= self.settings.decision
+        if not certain or time - self._changed < self.settings.shortest_swing:
+            return []
+        strike, peak = self._turn if turned else self._rest, self._peak
+        self._enter(swinging=False, time=time)
+        self._peak, self._fall = 0.0, math.nan
+        if not self._swings.add(peak):
+            self.counts.rejected += 1
+            return []
+        return self._found(EventKind.HEEL_STRIKE, strike, time)

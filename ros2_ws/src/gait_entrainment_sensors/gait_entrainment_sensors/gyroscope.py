@@ -1,0 +1,199 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+What the detectors of a gyroscope on foot or shank share: mounting, filter, and the swing.
+
+Rates count positive where the toes turn down and the shank leans forward. So swing is negative.
+"""
+
+import math
+import statistics
+from abc import abstractmethod
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+from gait_entrainment.conventions import Side
+from gait_entrainment.settings import setting
+from gait_entrainment_sensors.detection import Detection, Detector, DetectorSettings
+from gait_entrainment_sensors.mounting import Mounting, find_mounting
+
+# Steps whose median peak is the person's own.
+_OWN_STEPS = 7
+# Lean of the axis of swing from which on the toes turn in [rad]: 9 degrees.
+_TOES_IN = 0.15
+# Time constant of one of two poles with -3 dB at one hertz [s].
+_TWO_POLES = math.sqrt(math.sqrt(2) - 1) / (2 * math.pi)
+
+
+@dataclass(frozen=True)
+class GyroscopeSettings(DetectorSettings):
+    """What a detector of a gyroscope can be told."""
+
+    axis_x: float = setting(0.0, "axis about which the toes turn down, x", "1", (-1.0, 1.0))
+    axis_y: float = setting(0.0, "the same, y; all zero: found in the first steps", "1", (-1, 1))
+    axis_z: float = setting(0.0, "the same, z", "1", (-1.0, 1.0))
+    calibration: float = setting(5.0, "time in which the axis is found or checked", "s", (2, 60))
+    cutoff: float = setting(30.0, "cutoff frequency of the filter", "Hz", (5.0, 200.0))
+    least_peak: float = setting(1.0, "least peak of a swing, and of a push-off", "rad/s", (0, 10))
+    peak_share: float = setting(0.5, "least peak, of the own median one", "1", (0.0, 0.9))
+    shortest_swing: float = setting(0.15, "shortest swing", "s", (0.01, 1.0))
+    shortest_stance: float = setting(0.25, "shortest stance", "s", (0.01, 1.0))
+    decision: float = setting(0.03, "longest time to be certain of an event", "s", (5e-3, 0.2))
+
+    @property
+    def axis(self) -> tuple[float, float, float] | None:
+        """The axis, of unit length; None if it is to be found."""
+        length = math.hypot(self.axis_x, self.axis_y, self.axis_z)
+        if length == 0.0:
+            return None
+        return self.axis_x / length, self.axis_y / length, self.axis_z / length
+
+
+class Peaks:
+    """Peaks of the person's own steps, and the threshold that follows from them."""
+
+    def __init__(self, least: float, share: float) -> None:
+        self._least, self._share = least, share
+        self._own: deque[float] = deque(maxlen=_OWN_STEPS)
+        self.threshold = least
+
+    def add(self, peak: float) -> bool:
+        """Take a peak; whether it is that of a step. Also one that is none moves the median."""
+        step = peak >= self.threshold
+        if peak >= self._least:
+            self._own.append(peak)
+            self.threshold = max(self._least, self._share * statistics.median(self._own))
+        return step
+
+
+class GyroscopeDetector(Detector):
+    """
+    The rate about one axis, filtered, and whether the leg stands or swings.
+
+    Two equal poles filter, with a coefficient made for each interval between samples, so that
+    irregular sampling does no harm; their delay is taken off each event. A derived class says
+    which features of the rate are the events.
+    """
+
+    signals: ClassVar[tuple[str, ...]] = ("gyro_x", "gyro_y", "gyro_z")
+    Settings: ClassVar[type[DetectorSettings]] = GyroscopeSettings
+    moving = 1.0
+    impossible = 100.0  # rad/s, the magnitudes of three axes: twice what a kick reaches
+    reached = 1.0
+    suspicion = "angular velocities in rad/s are expected, not in degrees per second"
+    foot: ClassVar[bool]  # on the foot, not on the shank
+
+    def __init__(self, side: Side, settings: Any = None) -> None:
+        super().__init__(side, settings)
+        self._mounting: Mounting | None = None
+        self._recorded: list[tuple[float, Sequence[float]]] | None = []
+        self._axis = self.settings.axis
+        self._pole = _TWO_POLES / self.settings.cutoff
+        self._interval = self._keep = math.nan
+        self._delay = 0.0
+        self._swings = Peaks(self.settings.least_peak, self.settings.peak_share)
+        self._restart()
+
+    @classmethod
+    def calibrated(
+        cls, settings: Any, times: Sequence[float], samples: Sequence[Sequence[float]]
+    ) -> Any:
+        """Return settings with the axis that a recorded walk tells, unless they name one."""
+        if settings.axis is not None:
+            return settings
+        recorded = [
+            (time, values)
+            for time, values in zip(times, samples, strict=True)
+            if math.isfinite(time + sum(values))
+        ]
+        found = find_mounting(recorded, foot=cls.foot)
+        if found is None:
+            return settings
+        x, y, z = found.axis
+        return replace(settings, axis_x=x, axis_y=y, axis_z=z)
+
+    @property
+    def latency(self) -> float:
+        """The delay of the filter, and the time to be certain."""
+        return float(2 * self._pole + self.settings.decision)
+
+    def _restart(self) -> None:
+        self._first_pole = self._rate = math.nan
+        self._swinging = False
+        self._changed = self._time  # when the stance or swing in progress began [s]
+        if self._recorded is not None:
+            self._recorded = []
+
+    def troubles(self, now: float | None = None) -> tuple[str, ...]:
+        """Add what the calibration found."""
+        told = super().troubles(now)
+        where = f"{self.side.name.lower()} {self.name}"
+        if self._axis is None:
+            return (*told, f"{where}: the axis is not known yet: walk straight on")
+        found, given = self._mounting, self.settings.axis
+        if found is None or given is None:
+            return told
+        if self.foot and given[1] > 0.9 and found.toes_out(self.side) < -_TOES_IN:
+            told = (*told, f"{where}: the toes turn in: are the sensors on the right feet?")
+        agreement = sum(a * b for a, b in zip(found.axis, given, strict=True))
+        if agreement < -0.5:
+            return (*told, f"{where}: put on the other way round: set {found.text}")
+        if agreement < 0.7:
+            return (*told, f"{where}: turns about another axis: set {found.text}")
+        return told
+
+    def _take(self, time: float, values: Sequence[float]) -> list[Detection]:
+        if self._recorded is not None:
+            self._calibrate(time, values)
+        axis = self._axis
+        if axis is None:
+            return []
+        rate = axis[0] * values[0] + axis[1] * values[1] + axis[2] * values[2]
+        self._watch(time, rate)
+        interval = time - self._before
+        if interval != self._interval:
+            self._interval = interval
+            keep = self._keep = math.exp(-interval / self._pole)
+            self._delay = 2 * interval * keep / (1 - keep) if interval > 0.0 else 0.0
+        before = self._rate
+        if before != before:
+            self._first_pole = self._rate = rate
+            return []
+        self._first_pole = first = rate + self._keep * (self._first_pole - rate)
+        self._rate = filtered = first + self._keep * (before - first)
+        if self._swinging:
+            return self._swing(time, before, filtered)
+        return self._stance(time, before, filtered)
+
+    def _calibrate(self, time: float, values: Sequence[float]) -> None:
+        """Record the first steps; then find the axis, and what peaks are usual."""
+        assert self._recorded is not None
+        self._recorded.append((time, tuple(values)))
+        if time - self._recorded[0][0] < self.settings.calibration:
+            return
+        recorded, self._recorded = self._recorded, []
+        self._mounting = find_mounting(recorded, foot=self.foot)
+        if self._mounting is None:
+            return  # nobody walked: go on
+        self._recorded = None
+        if self._axis is None:
+            self._axis = self._mounting.axis
+
+    def _crossing(self, time: float, before: float, rate: float, level: float) -> float:
+        """Return when the rate crossed a level between two samples, the delay taken off."""
+        share = (level - before) / (rate - before)
+        return time - (1 - share) * (time - self._before) - self._delay
+
+    def _enter(self, *, swinging: bool, time: float) -> None:
+        self._swinging, self._changed = swinging, time
+
+    @abstractmethod
+    def _stance(self, time: float, before: float, rate: float) -> list[Detection]:
+        """Take the rate while the leg stands; toe-off ends that."""
+
+    @abstractmethod
+    def _swing(self, time: float, before: float, rate: float) -> list[Detection]:
+        """Take the rate while the leg swings; heel strike ends that."""

@@ -1,0 +1,182 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Step numbers for what was detected, by a model of the period.
+
+A sensor does not know which step it sees, and one that counts loses count at the first event that
+it misses. Here a place in the gait follows from the time since the latest event of the same kind
+and side, in strides of the person's own median: a missed event leaves a gap in the numbers, a
+doubled one finds its place taken, and neither moves the number of any other event.
+"""
+
+import math
+import statistics
+from collections import deque
+from dataclasses import dataclass
+
+from gait_entrainment.conventions import EventKind, Side, nanoseconds
+from gait_entrainment.gait import GaitEvent, GaitLimits
+from gait_entrainment_sensors.detection import Detection
+
+# Heel strike and toe-off of each leg; a kind and side comes back after so many places.
+_PLACES = 4
+# Strides of either kind and side whose median is the period: two wrong ones do not move it.
+_OWN_STRIDES = 9
+# From so many on the median is known: one missed event can spoil one of them.
+_KNOWN_STRIDES = 3
+# Refused detections in a row after which it is the model that is wrong, not they: three strides.
+_CONVINCING = 3 * _PLACES
+# Strides for which places are remembered, to see which are taken.
+_REMEMBERED = 4 * _PLACES
+
+
+@dataclass(slots=True)
+class NumberingCounts:
+    """What became of the detections."""
+
+    numbered: int = 0
+    repeated: int = 0  # dropped: its place was taken
+    implausible: int = 0  # dropped: too early or too late for any place
+    before_first_strike: int = 0  # dropped: a run begins with a heel strike
+    missed: int = 0  # places that were passed by without a detection
+    restarts: int = 0  # times that the detections fitted together, but not what was known
+
+
+class Numbering:
+    """
+    Numbers the detections of both feet, given in the order in which they were detected.
+
+    The first heel strike is step 0; with ``first_side`` it is step 0 or 1, such that strikes of
+    that side have even numbers. Strikes and toe-offs of a side return once a stride, so each
+    belongs to the place of its kind and side that is nearest to where the period predicts it: half
+    a stride either way. While the period is not known, to the next such place after the latest
+    event before it. ``limits`` say which strides can be (`gait_entrainment.gait.GaitLimits`).
+    """
+
+    def __init__(self, first_side: Side | None = None, limits: GaitLimits | None = None) -> None:
+        self.limits = limits or GaitLimits()
+        self.counts = NumberingCounts()
+        self._even = first_side  # the side whose strikes have even numbers
+        self._known: dict[int, float] = {}  # remembered events: place -> time [s]
+        self._strides: deque[float] = deque(maxlen=_OWN_STRIDES)
+        self._latest = -1  # place
+        self._refused = 0  # in a row
+
+    @property
+    def period(self) -> float:
+        """The person's own stride period [s]; NaN before it is known."""
+        return statistics.median(self._strides) if self._known_period() else math.nan
+
+    def add(self, detection: Detection) -> GaitEvent | None:
+        """Return the event, numbered, or None if it can have no place in the gait."""
+        if not self._known:
+            if detection.kind is not EventKind.HEEL_STRIKE:
+                self.counts.before_first_strike += 1
+                return None
+            fate, place = "", self._begin(detection)
+        else:
+            fate, place = self._place(detection)
+        if fate:
+            setattr(self.counts, fate, getattr(self.counts, fate) + 1)
+            self._refused += 1
+            if self._refused < _CONVINCING:
+                return None
+            place = self._restart(detection)
+        self._refused = 0
+        self._accept(detection, place)
+        step = (place + 1) // 2
+        stamp, sure = nanoseconds(detection.time), detection.uncertainty
+        return GaitEvent(stamp, detection.kind, detection.side, step, sure)
+
+    def stopped(self, now: float) -> str:
+        """Return why nobody seems to walk at a time [s], or an empty text."""
+        if self._latest < 0:
+            return ""
+        stride = self.period if self._known_period() else self.limits.stride_most
+        silent = now - self._known[self._latest]
+        if silent <= self.limits.silence * stride:
+            return ""
+        return (
+            f"the gait has stopped: no event of either foot for {silent:.2f} s; allowed: "
+            f"{self.limits.silence:g} strides of {stride:.3g} s"
+        )
+
+    def troubles(self) -> tuple[str, ...]:
+        """Return what a person should know, each in one line; empty if all is well."""
+        counts = self.counts
+        told = []
+        if counts.repeated or counts.implausible:
+            told.append(
+                f"{counts.repeated} detections repeated an event, {counts.implausible} fitted no "
+                "place in the gait"
+            )
+        if counts.missed:
+            told.append(f"{counts.missed} events were missed")
+        if counts.restarts:
+            told.append(f"the count was begun anew {counts.restarts} times")
+        return tuple(told)
+
+    def _known_period(self) -> bool:
+        return len(self._strides) >= _KNOWN_STRIDES
+
+    def _begin(self, detection: Detection) -> int:
+        """Return the place of the first heel strike."""
+        self._even = self._even if self._even is not None else detection.side
+        return self._first_place(detection)
+
+    def _first_place(self, detection: Detection) -> int:
+        """Return the first place of a kind and side: strikes 0 and 2, toe-offs 3 and 1."""
+        even = detection.side is self._even
+        if detection.kind is EventKind.HEEL_STRIKE:
+            return 0 if even else 2
+        return 3 if even else 1
+
+    def _place(self, detection: Detection) -> tuple[str, int]:
+        """Return as what a detection must be dropped, or an empty text, and its place."""
+        time, first, least = detection.time, self._first_place(detection), self.limits.stride_least
+        before = max((p for p, known in self._known.items() if known < time), default=-1)
+        after = min((p for p, known in self._known.items() if known >= time), default=math.inf)
+        same = max((p for p in self._known if (p - first) % _PLACES == 0), default=None)
+        if same is not None and time - self._known[same] < least:
+            return "repeated", same
+        if before < 0:  # earlier than all that is remembered
+            return "implausible", first
+        place = before + 1 + (first - before - 1) % _PLACES  # the next of the kind and side
+        if self._known_period():
+            # By the latest of the kind and side; else by any, a quarter of a stride a place.
+            reference = before if same is None else same
+            strides = (time - self._known[reference]) / self.period
+            place = first + _PLACES * round((reference - first) / _PLACES + strides)
+            if place in self._known:
+                return "repeated", place
+            whole = (place - reference) / _PLACES
+            if same is not None and strides < (1 - self.limits.stride_change) * whole:
+                return "implausible", place
+        return ("" if before < place < after else "implausible"), place
+
+    def _accept(self, detection: Detection, place: int) -> None:
+        """Remember an event, and the stride that it closes."""
+        stride = detection.time - self._known.get(place - _PLACES, -math.inf)
+        if self.limits.stride_least <= stride <= self.limits.stride_most:
+            self._strides.append(stride)
+        counts, latest = self.counts, self._latest
+        counts.numbered += 1
+        if place < latest:
+            counts.missed -= 1
+        elif latest >= 0:
+            counts.missed += place - latest - 1
+        self._latest = max(latest, place)
+        self._known[place] = detection.time
+        self._known = {p: t for p, t in self._known.items() if p > self._latest - _REMEMBERED}
+
+    def _restart(self, detection: Detection) -> int:
+        """Believe the detections rather than the model; return the place to go on from."""
+        elapsed = detection.time - self._known[self._latest]
+        passed = max(round(_PLACES * elapsed / self.period), 0) if self._known_period() else 0
+        place = self._latest + passed + 1
+        place += (self._first_place(detection) - place) % _PLACES
+        self._known = {}
+        self._strides.clear()
+        self.counts.restarts += 1
+        return place

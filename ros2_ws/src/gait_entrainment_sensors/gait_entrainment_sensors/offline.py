@@ -1,0 +1,179 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Gait events of a recording, and the table that keeps them.
+
+The table is an ``events.tsv`` of BIDS (1.10, "Task events"): ``onset`` and ``duration`` in
+seconds, ``trial_type``, and columns of our own, which the JSON file beside it describes.
+"""
+
+import csv
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
+from gait_entrainment.gait import GaitEvent, GaitLimits
+from gait_entrainment_sensors.detection import ChosenDetector, Detection
+from gait_entrainment_sensors.numbering import Numbering
+from gait_entrainment_sensors.recording import (
+    RecordingError,
+    Stream,
+    column_numbers,
+    read_table,
+)
+
+COLUMNS: dict[str, dict[str, Any]] = {
+    "onset": {"Description": "Instant of the event, by the clock of the recording", "Units": "s"},
+    "duration": {"Description": "0: an event is an instant", "Units": "s"},
+    "trial_type": {
+        "Description": "What happened",
+        "Levels": {
+            "heel_strike": "The foot meets the ground",
+            "toe_off": "The foot leaves the ground",
+        },
+    },
+    "side": {"Description": "The foot", "Levels": {"left": "Left", "right": "Right"}},
+    "step": {
+        "Description": "Heel strike n closes step n; a toe-off belongs to the step in progress. "
+        "A gap in the numbers is an event that was not detected"
+    },
+    "detected_at": {"Description": "Time of the sample that decided it", "Units": "s"},
+    "uncertainty": {"Description": "Standard deviation of onset", "Units": "s"},
+    "detector": {"Description": "What found the event"},
+}
+KINDS = {kind.name.lower(): kind for kind in EventKind}
+
+
+@dataclass(frozen=True)
+class DetectedEvent:
+    """An event as it was detected, and its number."""
+
+    detection: Detection
+    event: GaitEvent
+    detector: str
+
+
+def detect(
+    chosen: ChosenDetector, streams: Sequence[Stream]
+) -> tuple[list[DetectedEvent], tuple[str, ...]]:
+    """Return the events in recorded signals, in the order of detection; and what was wrong."""
+    found: list[Detection] = []
+    troubles: list[str] = []
+    for stream in streams:
+        settings = chosen.detector.calibrated(chosen.settings, stream.times, stream.values)
+        detector = chosen.detector(stream.side, settings)
+        for time, values in zip(stream.times, stream.values, strict=True):
+            found += detector.add(time, values)
+        troubles += detector.troubles()
+    events, told = number(found, chosen.name)
+    return events, (*troubles, *told)
+
+
+def number(
+    found: Iterable[Detection], detector: str, limits: GaitLimits | None = None
+) -> tuple[list[DetectedEvent], tuple[str, ...]]:
+    """Return detections numbered, in the order of detection; and what was wrong."""
+    numbering = Numbering(limits=limits)
+    events = [
+        DetectedEvent(detection, event, detector)
+        for detection in sorted(found, key=lambda d: (d.detected_at, d.time))
+        if (event := numbering.add(detection)) is not None
+    ]
+    return events, numbering.troubles()
+
+
+def write_events(path: Path, events: Iterable[DetectedEvent]) -> None:
+    """
+    Write a table of events and the JSON file that describes it.
+
+    Raises RecordingError if either is there: nothing is overwritten.
+    """
+    sidecar = path.with_suffix(".json")
+    for file in (path, sidecar):
+        if file.exists():
+            raise RecordingError(f"{file}: is already there; choose another file with --out")
+    rows = [
+        (
+            f"{e.event.stamp / NANOSECONDS_PER_SECOND:.9f}",
+            "0",
+            e.event.kind.name.lower(),
+            e.event.side.name.lower(),
+            e.event.step,
+            f"{e.detection.detected_at:.9f}",
+            f"{e.detection.uncertainty:.6f}",
+            e.detector,
+        )
+        for e in sorted(events, key=lambda e: e.event.stamp)
+    ]
+    with path.open("w", encoding="utf-8", newline="") as table:
+        writer = csv.writer(table, delimiter="\t", lineterminator="\n")
+        writer.writerow(COLUMNS)
+        writer.writerows(rows)
+    sidecar.write_text(json.dumps(COLUMNS, indent=2) + "\n", encoding="utf-8")
+
+
+def read_events(path: Path) -> list[GaitEvent]:
+    """
+    Return the events of a table: columns onset [s], trial_type, side, and step if it has steps.
+
+    Without steps the events are numbered here, by the period. ``uncertainty`` is read if it is
+    there. Raises RecordingError if a column is missing or a field is none of what is allowed.
+    """
+    table = read_table(path)
+    if missing := [name for name in ("onset", "trial_type", "side") if name not in table]:
+        raise RecordingError(
+            f"{path}: lacks column {', '.join(missing)}; it has: {', '.join(table)}"
+        )
+    times = _finite(path, "onset", table["onset"])
+    sides = {side.name.lower(): side for side in Side}
+    kinds = [
+        _one_of(path, "trial_type", row, text, KINDS) for row, text in _rows(table, "trial_type")
+    ]
+    feet = [_one_of(path, "side", row, text, sides) for row, text in _rows(table, "side")]
+    sure = [0.0] * len(times)
+    if "uncertainty" in table:
+        sure = _finite(path, "uncertainty", table["uncertainty"])
+    detections = map(Detection, kinds, feet, times, times, sure)
+    if "step" not in table:
+        return [e.event for e in number(detections, "")[0]]
+    steps = _finite(path, "step", table["step"])
+    events = [
+        GaitEvent(round(d.time * NANOSECONDS_PER_SECOND), d.kind, d.side, int(step), d.uncertainty)
+        for d, step in zip(detections, steps, strict=True)
+    ]
+    return sorted(events, key=lambda event: event.stamp)
+
+
+def read_onsets(path: Path) -> list[int]:
+    """Return the instants at which pulses began [ns]: the column onset [s] of a table."""
+    table = read_table(path)
+    if "onset" not in table:
+        raise RecordingError(f"{path}: lacks column onset; it has: {', '.join(table)}")
+    onsets = _finite(path, "onset", table["onset"])
+    return sorted(round(onset * NANOSECONDS_PER_SECOND) for onset in onsets)
+
+
+def _rows(table: dict[str, list[str]], name: str) -> Iterable[tuple[int, str]]:
+    return enumerate(table[name], 2)
+
+
+def _one_of(path: Path, name: str, row: int, text: str, allowed: dict[str, Any]) -> Any:
+    if (value := allowed.get(text.strip().lower())) is None:
+        raise RecordingError(
+            f"{path}: row {row}, column {name}: {text!r}; allowed: {', '.join(allowed)}"
+        )
+    return value
+
+
+def _finite(path: Path, name: str, texts: Sequence[str]) -> list[float]:
+    numbers = column_numbers(path, name, texts)
+    for row, value in enumerate(numbers, 2):
+        if not abs(value) < 1e10:  # it may count from 1970
+            raise RecordingError(
+                f"{path}: row {row}, column {name}: {texts[row - 2]!r}; allowed: a finite number"
+            )
+    return numbers

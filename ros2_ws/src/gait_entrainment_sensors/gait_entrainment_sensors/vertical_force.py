@@ -1,0 +1,183 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The vertical force under one foot: force plate, belt of an instrumented treadmill, insole."""
+
+import math
+import statistics
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from gait_entrainment.conventions import EventKind, Side
+from gait_entrainment.settings import SettingError, setting
+from gait_entrainment_sensors.detection import Detection, Detector, DetectorSettings
+
+# Stances and swings whose median is the person's own.
+_OWN_STEPS = 7
+# From so many on it is known.
+_KNOWN_STEPS = 3
+
+
+@dataclass(frozen=True)
+class VerticalForceSettings(DetectorSettings):
+    """What the detector can be told."""
+
+    strike_force: float = setting(40.0, "force that a foot on the ground exceeds", "N", (1, 500))
+    toe_off_force: float = setting(20.0, "force at both events", "N", (0.5, 500.0))
+    refractory: float = setting(0.1, "after toe-off no strike for", "s", (0.0, 1.0))
+    zeroing_time: float = setting(0.5, "time constant of zeroing in swing", "s", (0.01, 100.0))
+    shortest_stance: float = setting(0.15, "shortest stance", "s", (0.01, 1.0))
+    longest_stance: float = setting(2.0, "longest stance in walking", "s", (0.2, 10.0))
+    least_share: float = setting(0.5, "shortest stance or swing, of the own median", "1", (0, 1))
+    most_share: float = setting(1.4, "longest stance, of the own median", "1", (1.0, 10.0))
+
+    def __post_init__(self) -> None:
+        """Check every field, and that there is hysteresis."""
+        super().__post_init__()
+        if self.strike_force <= self.toe_off_force:
+            raise SettingError(
+                f"toe_off_force: {self.toe_off_force:g} N; allowed: below strike_force, "
+                f"{self.strike_force:g} N"
+            )
+
+
+class VerticalForceDetector(Detector):
+    """
+    Events from the vertical force on one foot, upwards positive.
+
+    A foot is on the ground once the force exceeds ``strike_force``, and off it once it is below
+    ``toe_off_force``; both events are put where the force crossed the latter, interpolated between
+    samples. 20 N is the usual threshold (Tirosh and Sparrow, J. Appl. Biomech. 19, 2003), far
+    above the noise of a plate; a belt shakes more, hence the hysteresis. The zero follows the
+    force in swing, and is taken anew if a foot seems never to leave the ground.
+
+    Steps on the wrong belt: a strike after less than half of the own median swing, and a toe-off
+    after a stance that is too short or too long, are the other foot's, and rejected.
+
+    Latency: none but the sampling for toe-off; for heel strike the time from one threshold to the
+    other, up to 30 ms for a foot that is put down softly.
+    Uncertainty: 3 ms: the slope of the force, 10 N/ms, and 20 N of doubt about the threshold.
+    Fails: belts that are not zeroed within 150 N; both feet on one belt throughout; a foot that
+    scuffs in swing with more than ``strike_force``; insoles that load while in the air.
+    """
+
+    name = "vertical_force"
+    signals: ClassVar[tuple[str, ...]] = ("force_z",)
+    Settings: ClassVar[type[DetectorSettings]] = VerticalForceSettings
+    moving = 100.0
+    impossible = 10_000.0
+    reached = 100.0
+    suspicion = (
+        "the force of the ground on the foot is expected in N, upwards positive: not in kN or "
+        "body weights"
+    )
+    uncertainty = (0.003, 0.003)
+
+    def __init__(self, side: Side, settings: Any = None) -> None:
+        super().__init__(side, settings)
+        self._stances: deque[float] = deque(maxlen=_OWN_STEPS)
+        self._swings: deque[float] = deque(maxlen=_OWN_STEPS)
+        self._zero = 0.0  # [N]
+        self._downwards = 0  # samples that press the foot down
+        self._restart()
+
+    @property
+    def latency(self) -> float:
+        """The time in which a strike must go from one threshold to the other."""
+        return 0.03
+
+    def _restart(self) -> None:
+        self._on: bool | None = None  # on the ground; None before it is known
+        self._own = True  # the contact in progress is this foot's
+        self._force = math.nan
+        self._rise = math.nan  # when the force rose through the lower threshold [s]
+        self._strike = self._toe_off = math.nan  # of the contact or swing in progress [s]
+        self._lowest, self._on_since = math.inf, math.nan
+
+    def troubles(self, now: float | None = None) -> tuple[str, ...]:
+        """Add a force of the wrong sign."""
+        told = super().troubles(now)
+        if not self._downwards:
+            return told
+        where = f"{self.side.name.lower()} {self.name}"
+        return (*told, f"{where}: {self._downwards} samples below -100 N: {self.suspicion}")
+
+    def _take(self, time: float, values: Sequence[float]) -> list[Detection]:
+        self._watch(time, values[0])
+        settings, before = self.settings, self._force
+        force = self._force = values[0] - self._zero
+        lower = settings.toe_off_force
+        if self._on:
+            if force >= lower:
+                return self._zero_anew(time, force)
+            return self._leave(time, before, force)
+        if force < lower:
+            self._on, self._rise = False, math.nan
+            if force > -lower:
+                interval = time - self._before
+                self._zero += force * interval / (settings.zeroing_time + interval)
+            elif force < -100.0:
+                self._downwards += 1
+            return []
+        if before < lower:
+            self._rise = time - (time - self._before) * (force - lower) / (force - before)
+        if force < settings.strike_force:
+            return []
+        return self._meet(time)
+
+    def _meet(self, time: float) -> list[Detection]:
+        """Begin a contact; a strike if it is this foot's own."""
+        rise, swing = self._rise, self._rise - self._toe_off
+        seen_off = self._on is False
+        self._on, self._on_since, self._lowest = True, time, math.inf
+        self._strike = rise
+        if not seen_off:
+            self._strike = math.nan
+            return []
+        least = max(self.settings.refractory, self._bound(self._swings, self.settings.least_share))
+        self._own = not swing < least
+        if self.settings.refractory <= swing < self.settings.longest_stance:
+            self._swings.append(swing)
+        if not self._own:
+            self.counts.rejected += 1
+            return []
+        return self._found(EventKind.HEEL_STRIKE, rise, time)
+
+    def _leave(self, time: float, before: float, force: float) -> list[Detection]:
+        """End a contact; a toe-off if it was this foot's own, and a stance."""
+        settings = self.settings
+        lower = settings.toe_off_force
+        toe_off = time - (time - self._before) * (lower - force) / (before - force)
+        stance = toe_off - self._strike
+        least = max(settings.shortest_stance, self._bound(self._stances, settings.least_share))
+        most = self._bound(self._stances, settings.most_share) or math.inf
+        walks = stance < settings.longest_stance  # else somebody stood
+        # Of a contact that was there at the start the strike is not known.
+        believed = self._own and not stance < least and not (walks and stance > most)
+        self._on, self._rise = False, math.nan
+        if self._own:  # else the swing in progress goes on
+            self._toe_off = toe_off if believed else math.nan
+        if self._own and walks and stance >= settings.shortest_stance:
+            self._stances.append(stance)
+        if not believed:
+            self.counts.rejected += 1
+            return []
+        return self._found(EventKind.TOE_OFF, toe_off, time)
+
+    def _zero_anew(self, time: float, force: float) -> list[Detection]:
+        """Find a foot that seems never to leave the ground because the zero is wrong."""
+        if force < self._lowest:
+            self._lowest = force
+        if time - self._on_since > self.settings.longest_stance:
+            if self._lowest < 150.0:
+                self._zero += self._lowest
+                self._on = None
+            self._on_since, self._lowest = time, math.inf
+        return []
+
+    @staticmethod
+    def _bound(own: deque[float], share: float) -> float:
+        """Return a share of the own median [s]; zero before that is known."""
+        return share * statistics.median(own) if len(own) >= _KNOWN_STEPS else 0.0

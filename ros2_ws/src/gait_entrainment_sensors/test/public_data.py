@@ -1,0 +1,62 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Public gait recordings, which stand beside the repository and are not part of it."""
+
+import csv
+import math
+from pathlib import Path
+
+import pytest
+
+from gait_entrainment.conventions import EventKind, Side
+from gait_entrainment_sensors.recording import Stream
+
+DATA = Path(__file__).parents[5] / "shared" / "data"
+IMU_RATE = 204.8  # Hz, of the sample and of the indices of its reference
+
+
+def needed(path):
+    if not path.exists():
+        pytest.skip(f"public data are not here: {path}")
+    return path
+
+
+def foot_rates():
+    """Return the rates of both feet of gaitmap's sample [rad/s], x, y, z."""
+    with needed(DATA / "gaitmap" / "imu_sample.csv").open() as file:
+        sensors, axes, *rows = csv.reader(file)
+    streams = []
+    for side in Side:
+        sensor = f"{side.name.lower()}_sensor"
+        places = [
+            place
+            for axis in "xyz"
+            for place, (s, a) in enumerate(zip(sensors, axes, strict=True))
+            if (s, a) == (sensor, f"gyr_{axis}")
+        ]
+        times = [int(row[0]) / IMU_RATE for row in rows]
+        values = [tuple(math.radians(float(row[p])) for p in places) for row in rows]
+        streams.append(Stream(side, times, values))
+    return streams
+
+
+def foot_reference():
+    """Return what motion capture tells of that walk: (kind, side) -> instants [s]."""
+    with needed(DATA / "gaitmap" / "stride_events_sample.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    kinds = {EventKind.HEEL_STRIKE: ("ic", "pre_ic"), EventKind.TOE_OFF: ("tc",)}
+    return {
+        (kind, side): sorted(
+            {float(r[c]) / IMU_RATE for r in rows for c in columns if r["foot"] == leg}
+        )
+        for kind, columns in kinds.items()
+        for side, leg in ((side, side.name.lower()) for side in Side)
+    }
+
+
+def belt():
+    """Return times [s] and vertical force [N] of one belt, with 46 strikes."""
+    path = needed(DATA / "gaitanalysistoolkit" / "example_vertical_grf.csv")
+    with path.open() as file:
+        return [(float(time), (float(force),)) for time, force in csv.reader(file)]

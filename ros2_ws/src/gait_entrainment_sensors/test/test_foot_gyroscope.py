@@ -1,0 +1,130 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Foot gyroscope: a real walk beside motion capture, closed forms, and how it was put on."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from public_data import foot_rates, foot_reference
+from scoring import score
+from walks import OFFSET, STANCE, STRIDE, fed, foot_rate, sampled, times
+
+from gait_entrainment.conventions import EventKind, Side
+from gait_entrainment_sensors.detection import find_detector
+from gait_entrainment_sensors.foot_gyroscope import FootGyroscopeDetector
+from gait_entrainment_sensors.offline import detect
+
+STRIKE, TOE_OFF = EventKind
+UPRIGHT = FootGyroscopeDetector.Settings(axis_y=1.0)
+UNTIL = 15.0
+
+
+@pytest.mark.parametrize(
+    "text", ["foot_gyroscope", "foot_gyroscope:axis_y=1"], ids=["axis found", "axis given"]
+)
+def test_a_walk_beside_motion_capture(text):
+    events, _ = detect(find_detector(text), foot_rates())
+    found = [event.detection for event in events]
+    reference = foot_reference()
+
+    def scored(kind):
+        by_side = {side: [d for d in found if d.side is side] for side in Side}
+        return score((reference[kind, s], times(by_side[s], kind)) for s in Side)
+
+    strikes, toe_offs = scored(STRIKE), scored(TOE_OFF)
+    assert (strikes.reference, toe_offs.reference) == (59, 57)
+    assert (strikes.found >= 58, toe_offs.found >= 56) == (True, True)
+    assert (strikes.false, toe_offs.false) == (0, 0)
+    assert abs(strikes.bias) < 5e-3
+    assert strikes.deviation < 6e-3
+    assert abs(toe_offs.bias) < 5e-3
+    assert toe_offs.deviation < 12e-3
+    assert max(d.detected_at - d.time for d in found) <= 0.04
+
+
+@pytest.mark.parametrize("rate", [100.0, 200.0, 1000.0])
+def test_events_of_a_closed_form(rate):
+    detector = FootGyroscopeDetector(Side.RIGHT, UPRIGHT)
+    found = fed(detector, sampled(lambda t: (0.0, foot_rate(t), 0.0), UNTIL, rate))
+    strikes, toe_offs = times(found, STRIKE), times(found, TOE_OFF)
+    assert len(strikes) == 13  # of the first no swing comes before
+    # The slap passes 0.25 rad/s 2 ms after the strike; the fall three quarters after 5 ms.
+    for n, time in enumerate(strikes, 1):
+        assert time == pytest.approx(OFFSET[Side.RIGHT] + n * STRIDE + 2e-3, abs=6e-3)
+    for n, time in enumerate(toe_offs):
+        assert time == pytest.approx(OFFSET[Side.RIGHT] + n * STRIDE + STANCE + 5e-3, abs=8e-3)
+    assert all(d.detected_at - d.time <= detector.latency + 1 / rate for d in found)
+    assert detector.troubles() == ()
+
+
+@settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 2**31))
+def test_irregular_sampling_does_no_harm(seed):
+    import random
+
+    generator, time, samples = random.Random(seed), 0.0, []
+    while time < UNTIL:
+        samples.append((time, (0.0, foot_rate(time), 0.0)))
+        time += generator.uniform(1e-3, 12e-3)
+    found = fed(FootGyroscopeDetector(Side.RIGHT, UPRIGHT), samples)
+    assert len(times(found, STRIKE)) == 13
+    for n, strike in enumerate(times(found, STRIKE), 1):
+        assert strike == pytest.approx(OFFSET[Side.RIGHT] + n * STRIDE + 2e-3, abs=8e-3)
+
+
+def rotated(rate, axis):
+    return tuple(rate * component for component in axis)
+
+
+AXES = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, -1), (0.6, 0.6, -0.53)]
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_the_mounting_is_found_in_the_first_steps(axis):
+    length = math.hypot(*axis)
+    axis = tuple(component / length for component in axis)
+    detector = FootGyroscopeDetector(Side.RIGHT)
+    assert any("not known yet" in line for line in detector.troubles())
+    found = fed(detector, sampled(lambda t: rotated(foot_rate(t), axis), UNTIL))
+    assert len(times(found, STRIKE)) >= 8
+    assert sum(a * b for a, b in zip(detector._axis, axis, strict=True)) > 0.99
+
+
+def test_a_sensor_that_was_put_on_the_other_way_round_is_told():
+    detector = FootGyroscopeDetector(Side.RIGHT, UPRIGHT)
+    fed(detector, sampled(lambda t: (0.0, -foot_rate(t), 0.0), UNTIL))
+    assert any("other way round: set axis_x" in line for line in detector.troubles())
+    detector = FootGyroscopeDetector(Side.RIGHT, UPRIGHT)
+    fed(detector, sampled(lambda t: (foot_rate(t), 0.0, 0.0), UNTIL))
+    assert any("about another axis" in line for line in detector.troubles())
+
+
+def test_sensors_on_the_wrong_feet_are_told():
+    for stream in foot_rates():
+        for side in Side:
+            detector = FootGyroscopeDetector(side, UPRIGHT)
+            fed(detector, zip(stream.times[:2000], stream.values[:2000], strict=True))
+            swapped = [line for line in detector.troubles() if "right feet" in line]
+            assert bool(swapped) == (side is not stream.side)
+
+
+def test_degrees_per_second_are_told():
+    detector = FootGyroscopeDetector(Side.RIGHT, UPRIGHT)
+    fed(detector, sampled(lambda t: (0.0, math.degrees(foot_rate(t)), 0.0), UNTIL))
+    assert any("rad/s are expected" in line for line in detector.troubles())
+
+
+def test_a_gyroscope_at_the_end_of_its_range_is_told():
+    detector = FootGyroscopeDetector(Side.RIGHT, FootGyroscopeDetector.Settings(axis_x=1.0))
+    fed(detector, sampled(lambda t: (max(-2.0, min(foot_rate(t), 2.0)), 0.0, 0.0), UNTIL))
+    assert any("raise the range" in line for line in detector.troubles())
+
+
+def test_a_heel_that_is_lifted_and_put_down_is_no_step():
+    def lifted(time):
+        return (0.0, 0.6 * math.sin(2 * math.pi * time / 1.5), 0.0)
+
+    assert fed(FootGyroscopeDetector(Side.RIGHT, UPRIGHT), sampled(lifted, UNTIL)) == []

@@ -1,0 +1,131 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""C3D files, written by ezc3d: whose foot is on which plate, and events from markers."""
+
+import math
+
+import numpy as np
+import pytest
+from walks import OFFSET, STANCE, STRIDE, times
+
+from gait_entrainment.conventions import EventKind, Side
+from gait_entrainment_sensors.detection import find_detector
+from gait_entrainment_sensors.motion_capture import events_of_markers, events_on_plates, read_c3d
+from gait_entrainment_sensors.recording import RecordingError
+
+ezc3d = pytest.importorskip("ezc3d")
+STRIKE, TOE_OFF = EventKind
+FRAMES, RATE, PER_FRAME = 400, 100.0, 10
+FORCE = find_detector("vertical_force")
+# Contacts on plates of 0.6 m, one behind the other: plate, foot, strike [s], toe-off [s].
+CONTACTS = [(0, Side.RIGHT, 1.0, 1.7), (1, Side.LEFT, 1.55, 2.25)]
+LABELS = ["LHEE", "LTOE", "RHEE", "RTOE", "SACR"]
+
+
+def feet(side, time):
+    """Return heel and toe [mm] of a foot that steps on its plate, else is in the air."""
+    plate, _, strike, toe_off = next(c for c in CONTACTS if c[1] is side)
+    on = strike - 0.05 <= time <= toe_off + 0.05
+    middle = 300.0 + 600.0 * plate
+    x = middle if on else middle + 600.0 * (1 if time > toe_off else -1)
+    y, height = (150.0 if side is Side.LEFT else 250.0), (30.0 if on else 200.0)
+    return [x - 100.0, y, height], [x + 100.0, y, height]
+
+
+def write(path, *, sign=-1.0, wrong=False, units="mm", labels=LABELS, plates=2, points=None):
+    """Write two plates, and feet on them; ``wrong``: the left foot on the right foot's, too."""
+    file = ezc3d.c3d()
+    point, analog, plate = (file["parameters"][n] for n in ("POINT", "ANALOG", "FORCE_PLATFORM"))
+    point["LABELS"]["value"], point["UNITS"]["value"] = labels, [units]
+    point["RATE"]["value"], analog["RATE"]["value"] = [RATE], [RATE * PER_FRAME]
+    data = np.ones((4, len(LABELS), FRAMES))
+    for frame in range(FRAMES):
+        left, right = (feet(side, frame / RATE) for side in Side)
+        if wrong:
+            left = [[x, 330.0 - y, z] for x, y, z in right]
+        data[:3, :, frame] = np.array([*left, *right, [0.0, 0.0, 900.0]]).T
+    file["data"]["points"] = data if points is None else points
+    file["data"]["analogs"] = np.zeros((1, 6 * plates, FRAMES * PER_FRAME))
+    if not plates:
+        file.write(str(path))
+        return path
+    names = [f"{n}{p}" for p in range(plates) for n in ("Fx", "Fy", "Fz", "Mx", "My", "Mz")]
+    analog["LABELS"]["value"] = names
+    analog["UNITS"]["value"] = ["N", "N", "N", "Nmm", "Nmm", "Nmm"] * plates
+    time = np.arange(FRAMES * PER_FRAME) / RATE / PER_FRAME
+    for place, _, strike, toe_off in CONTACTS[:plates]:
+        loaded = 800.0 * np.sin(np.pi * np.clip((time - strike) / (toe_off - strike), 0, 1))
+        file["data"]["analogs"][0, 6 * place + 2] = sign * loaded
+    corners = np.array([[0, 600, 600, 0], [0, 0, 400, 400], [0, 0, 0, 0]], float)
+    plate["USED"]["value"] = np.array([plates])
+    plate["TYPE"]["value"] = np.full(plates, 2)
+    plate["CORNERS"]["value"] = np.stack(
+        [corners + np.array([[600.0 * p], [0], [0]]) for p in range(plates)], axis=-1
+    )
+    plate["ORIGIN"]["value"] = np.zeros((3, plates))
+    plate["CHANNEL"]["value"] = np.arange(1, 6 * plates + 1).reshape(plates, 6).T
+    file.write(str(path))
+    return path
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_contacts_are_the_feet_s_that_stand_there(tmp_path, sign):
+    found, told = events_on_plates(read_c3d(write(tmp_path / "a.c3d", sign=sign)), FORCE)
+    assert told == ()
+    for _, side, strike, toe_off in CONTACTS:
+        own = [d for d in found if d.side is side]
+        assert times(own, STRIKE) == [pytest.approx(strike, abs=0.012)]
+        assert times(own, TOE_OFF) == [pytest.approx(toe_off, abs=0.012)]
+
+
+def test_a_contact_of_both_feet_is_nobody_s_and_told(tmp_path):
+    found, told = events_on_plates(read_c3d(write(tmp_path / "a.c3d", wrong=True)), FORCE)
+    assert found == []
+    assert "plate 1: 1 contacts of both feet" in told[0]
+
+
+def test_belts_are_named_where_there_are_no_markers(tmp_path):
+    path = write(tmp_path / "a.c3d", labels=["A", "B", "C", "D", "E"])
+    with pytest.raises(RecordingError, match="lacks markers left_heel, left_toe, right_heel"):
+        events_on_plates(read_c3d(path), FORCE)
+    found, _ = events_on_plates(read_c3d(path), FORCE, [Side.RIGHT, Side.LEFT])
+    assert [d.side for d in found] == [Side.RIGHT] * 2 + [Side.LEFT] * 2
+    with pytest.raises(RecordingError, match="holds 2 plates; --plates names 1"):
+        events_on_plates(read_c3d(path), FORCE, [Side.RIGHT])
+    named = dict(zip(("left_heel", "left_toe", "right_heel", "right_toe"), "ABCD", strict=True))
+    assert len(events_on_plates(read_c3d(path, named), FORCE)[0]) == 4
+
+
+def test_a_file_that_is_none_and_markers_that_are_not_there_are_one_line(tmp_path):
+    path = tmp_path / "none.c3d"
+    path.write_bytes(b"nothing")
+    with pytest.raises(RecordingError, match="cannot be read as C3D"):
+        read_c3d(path)
+    with pytest.raises(RecordingError, match="has no marker X, which is to be left_heel"):
+        read_c3d(write(tmp_path / "a.c3d"), {"left_heel": "X"})
+    with pytest.raises(RecordingError, match="POINT:UNITS: 'feet'"):
+        read_c3d(write(tmp_path / "b.c3d", units="feet"))
+
+
+def test_heel_and_toe_relative_to_the_pelvis(tmp_path):
+    """Each marker swings as a cosine about the pelvis, furthest ahead at its foot's strikes."""
+    points = np.ones((4, len(LABELS), FRAMES))
+    time = np.arange(FRAMES) / RATE
+    for place, (side, late) in enumerate(
+        [(s, late) for s in Side for late in (0.0, STANCE - STRIDE / 2)]
+    ):
+        swing = np.cos(2 * math.pi * (time - OFFSET[side] - late) / STRIDE)
+        points[0, place] = 1300.0 * time + 300.0 * swing + (200.0 if late else 0.0)
+        points[1:3, place] = 100.0
+    points[0, 4], points[1:3, 4] = 1300.0 * time, 900.0
+    points[:3, 0, 100:105] = np.nan  # hidden
+    path = write(tmp_path / "a.c3d", plates=0, points=points)
+    found = events_of_markers(read_c3d(path))
+    for side in Side:
+        own = [d for d in found if d.side is side]
+        for kind, late in ((STRIKE, 0.0), (TOE_OFF, STANCE)):
+            assert len(times(own, kind)) >= 2
+            for instant in times(own, kind):
+                off = (instant - OFFSET[side] - late + STRIDE / 2) % STRIDE - STRIDE / 2
+                assert abs(off) < 0.011

@@ -1,0 +1,148 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Recordings made elsewhere: tables in, events.tsv out, and every refused input in one line."""
+
+import json
+
+import pytest
+from walks import force, sampled
+
+from gait_entrainment.conventions import EventKind, Side
+from gait_entrainment.errors import EntrainmentError
+from gait_entrainment_sensors.detection import find_detector
+from gait_entrainment_sensors.offline import (
+    COLUMNS,
+    detect,
+    read_events,
+    read_onsets,
+    write_events,
+)
+from gait_entrainment_sensors.recording import RecordingError, read_streams, read_table
+
+STRIKE, TOE_OFF = EventKind
+
+
+@pytest.fixture
+def walk(tmp_path):
+    """A table with the force under both feet."""
+    rows = [
+        f"{time:.3f},{force(time, Side.LEFT):.2f},{force(time, Side.RIGHT):.2f}"
+        for time, _ in sampled(lambda _: (), 12.0)
+    ]
+    path = tmp_path / "walk.csv"
+    path.write_text("\n".join(["time,left_force_z,right_force_z", *rows]))
+    return path
+
+
+def events_of(path, **options):
+    name, streams = read_streams(path, **options)
+    return detect(find_detector(name), streams)
+
+
+def test_a_table_goes_through_and_comes_back(walk, tmp_path):
+    events, troubles = events_of(walk)
+    assert troubles == ("1 events were missed",)  # the left toe-off before the first strike
+    out = tmp_path / "walk_events.tsv"
+    write_events(out, events)
+    assert [*read_table(out)] == [*COLUMNS]
+    sidecar = json.loads((tmp_path / "walk_events.json").read_text())
+    assert {name: told.get("Units") for name, told in sidecar.items()}["onset"] == "s"
+    again = read_events(out)
+    assert again == sorted((e.event for e in events), key=lambda e: e.stamp)
+    assert {e.uncertainty for e in again} == {0.003}
+
+
+def test_events_without_steps_are_numbered(walk, tmp_path):
+    events, _ = events_of(walk)
+    path = tmp_path / "theirs.csv"
+    rows = [
+        f"{e.event.stamp / 1e9:.9f};{e.event.kind.name};{e.event.side.name.title()}"
+        for e in events
+    ]
+    path.write_text("\n".join(["onset;trial_type;side", *rows]))
+    assert [(e.step, e.stamp) for e in read_events(path)] == [
+        (e.event.step, e.event.stamp) for e in sorted(events, key=lambda e: e.event.stamp)
+    ]
+
+
+def test_columns_of_other_names_and_units_are_read(walk, tmp_path):
+    text = walk.read_text().replace("time,left_force_z,right_force_z", "t,Fz1,Fz2")
+    theirs = tmp_path / "theirs.csv"
+    theirs.write_text(text)
+    columns = {"time": "t", "left_force_z": "Fz1", "right_force_z": "Fz2"}
+    assert events_of(theirs, columns=columns) == events_of(walk)
+    theirs.write_text("left_ankle_angle_deg\n180\n90\n")
+    name, (stream,) = read_streams(theirs, rate=100.0)
+    assert (name, stream.times) == ("ankle_encoder", [0.0, 0.01])
+    assert stream.values[0] == pytest.approx((3.14159265, 0.0))
+
+
+def test_a_missing_sample_is_told(walk):
+    lines = walk.read_text().splitlines()
+    lines[400] = lines[400].rpartition(",")[0] + ","
+    walk.write_text("\n".join(lines))
+    assert "right vertical_force: 1 samples are not numbers, left out" in events_of(walk)[1]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "holds no row"),
+        ("time,left_force_z", "holds no row"),
+        ("time,left_force_z\n0,1,2", "row 2 has 3 fields"),
+        ("time,time\n0,1", "column time appears twice"),
+        ("left_force_z\n1", "lacks the column time"),
+        ("time,left_force_z\n0,x", "row 2, column left_force_z: 'x'"),
+        ("time,left_force\n0,1", "lacks columns SIDE_force_z or"),
+        ("time,left_foot_gyro_x\n0,1", "lacks column left_foot_gyro_y, left_foot_gyro_z"),
+    ],
+)
+def test_a_refused_table_is_named_with_its_column(tmp_path, text, words):
+    path = tmp_path / "bad.csv"
+    path.write_text(text)
+    with pytest.raises(RecordingError) as refused:
+        read_streams(path)
+    assert str(refused.value).startswith(f"{path}: ")
+    assert words in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("onset,side\n1,left", "lacks column trial_type"),
+        ("onset,trial_type,side\n1,jump,left", "row 2, column trial_type: 'jump'; allowed: heel"),
+        ("onset,trial_type,side\n1,toe_off,both", "row 2, column side: 'both'; allowed: left"),
+        ("onset,trial_type,side\nn/a,toe_off,left", "row 2, column onset: 'n/a'"),
+        ("onset,trial_type,side,step\n1,toe_off,left,", "row 2, column step: ''"),
+    ],
+)
+def test_refused_events_are_named_with_row_and_column(tmp_path, text, words):
+    path = tmp_path / "bad.tsv"
+    path.write_text(text)
+    with pytest.raises(EntrainmentError) as refused:
+        read_events(path)
+    assert words in str(refused.value)
+
+
+def test_pulses_are_a_column_onset(tmp_path):
+    path = tmp_path / "pulses.tsv"
+    path.write_text("onset\tduration\n2.5\t0.1\n1.25\t0.1\n")
+    assert read_onsets(path) == [1_250_000_000, 2_500_000_000]
+    path.write_text("start\n1\n")
+    with pytest.raises(RecordingError, match="lacks column onset"):
+        read_onsets(path)
+
+
+def test_nothing_is_overwritten_and_no_file_is_one_line(walk, tmp_path):
+    events, _ = events_of(walk)
+    out = tmp_path / "walk_events.tsv"
+    write_events(out, events)
+    with pytest.raises(RecordingError, match="already there"):
+        write_events(out, events)
+    with pytest.raises(RecordingError, match="cannot be read"):
+        read_table(tmp_path / "none.csv")
+    out.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(RecordingError, match="is no text"):
+        read_table(out)

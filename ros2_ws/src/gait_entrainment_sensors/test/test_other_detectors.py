@@ -1,0 +1,128 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Foot switch, shank gyroscope, ankle encoder: closed forms."""
+
+import math
+from itertools import pairwise
+
+import pytest
+from walks import OFFSET, STANCE, STRIDE, fed, sampled, times
+
+from gait_entrainment.conventions import EventKind, Side
+from gait_entrainment.settings import SettingError
+from gait_entrainment_sensors.ankle_encoder import AnkleEncoderDetector
+from gait_entrainment_sensors.foot_switch import FootSwitchDetector, FootSwitchSettings
+from gait_entrainment_sensors.shank_gyroscope import ShankGyroscopeDetector
+
+STRIKE, TOE_OFF = EventKind
+UNTIL = 12.0
+
+
+def phase_of(time):
+    return (time - OFFSET[Side.RIGHT]) % STRIDE
+
+
+def contacts(time):
+    phase = phase_of(time)
+    return float(phase < 0.6 * STANCE), float(0.15 < phase < STANCE)
+
+
+def test_contacts_are_timed_to_half_a_sample():
+    detector = FootSwitchDetector(Side.RIGHT)
+    found = fed(detector, sampled(contacts, UNTIL, 200.0))
+    for kind, late in ((STRIKE, 0.0), (TOE_OFF, STANCE)):
+        assert len(times(found, kind)) >= 10
+        for time in times(found, kind):
+            off = (time - OFFSET[Side.RIGHT] - late + STRIDE / 2) % STRIDE - STRIDE / 2
+            assert abs(off) <= 0.0026
+    assert all(d.detected_at - d.time <= detector.latency + 0.005 for d in found)
+
+
+def test_a_contact_that_bounces_counts_once():
+    def bouncing(time):
+        phase = phase_of(time)
+        bounces = (phase < 0.01 or 0 < phase - STANCE < 0.01) and int(time * 1000) % 4 < 2
+        heel, toe = contacts(time)
+        return (1.0 - heel, toe) if bounces else (heel, toe)
+
+    found = fed(FootSwitchDetector(Side.RIGHT), sampled(bouncing, UNTIL, 1000.0))
+    assert abs(len(times(found, STRIKE)) - len(times(found, TOE_OFF))) <= 1
+    assert len(times(found, STRIKE)) in (10, 11)
+
+
+def test_a_contact_that_stays_closed_in_the_shoe_is_told():
+    detector = FootSwitchDetector(Side.RIGHT)
+    assert fed(detector, sampled(lambda _: (1.0, 1.0), UNTIL)) == []
+    assert any("did not change" in line for line in detector.troubles())
+
+
+def test_volts_and_thresholds_without_hysteresis_are_refused():
+    detector = FootSwitchDetector(Side.RIGHT)
+    fed(detector, sampled(lambda t: tuple(5.0 * c for c in contacts(t)), UNTIL))
+    assert any("not volts" in line for line in detector.troubles())
+    with pytest.raises(SettingError, match="open_below"):
+        FootSwitchSettings(closed_above=0.3)
+
+
+def shank_rate(time):
+    """Lean forward through stance, a peak at toe-off, swing back, a peak at strike [rad/s]."""
+    phase = phase_of(time)
+    if time < OFFSET[Side.RIGHT]:
+        return 0.0
+    strike = 2.5 * math.exp(-((min(phase, STRIDE - phase) / 0.015) ** 2))
+    push = 3.0 * math.exp(-(((phase - STANCE) / 0.05) ** 2))
+    stance = 1.0 if phase < STANCE else 0.0
+    swing = -6.0 * math.sin(math.pi * (phase - STANCE) / (STRIDE - STANCE))
+    return stance + push + (swing if phase > STANCE else 0.0) + strike
+
+
+def test_peaks_of_the_shank_are_its_events():
+    settings = ShankGyroscopeDetector.Settings(axis_y=1.0)
+    detector = ShankGyroscopeDetector(Side.RIGHT, settings)
+    found = fed(detector, sampled(lambda t: (0.0, shank_rate(t), 0.0), UNTIL))
+    for kind, late in ((STRIKE, 0.0), (TOE_OFF, STANCE)):
+        assert len(times(found, kind)) >= 9
+        for time in times(found, kind):
+            off = (time - OFFSET[Side.RIGHT] - late + STRIDE / 2) % STRIDE - STRIDE / 2
+            assert abs(off) < 0.02
+    assert all(d.detected_at - d.time <= detector.latency + 0.005 for d in found)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_mounting_of_the_shank_is_found(sign):
+    detector = ShankGyroscopeDetector(Side.RIGHT)
+    found = fed(detector, sampled(lambda t: (0.0, 0.0, sign * shank_rate(t)), UNTIL))
+    assert detector._axis == (0.0, 0.0, sign)
+    assert len(times(found, STRIKE)) >= 5
+
+
+def ankle(time, amplitude=0.3):
+    return amplitude * math.cos(2 * math.pi * (time - OFFSET[Side.RIGHT]) / STRIDE)
+
+
+def test_the_encoder_follows_the_period_and_says_what_it_is():
+    detector = AnkleEncoderDetector(Side.RIGHT)
+    found = fed(detector, sampled(lambda t: (ankle(t), 0.0), UNTIL))
+    strikes = times(found, STRIKE)
+    assert len(strikes) >= 8
+    for a, b in pairwise(strikes):
+        assert b - a == pytest.approx(STRIDE, abs=0.011)
+    assert times(found, TOE_OFF) == []
+    assert any("a fallback" in line for line in detector.troubles())
+
+
+def test_the_encoder_is_not_read_while_torque_moves_the_ankle():
+    def pulsed(time):
+        pushed = 0.3 < phase_of(time) < 0.4
+        return ankle(time) + (0.5 if pushed else 0.0), 10.0 if pushed else 0.0
+
+    plain = fed(AnkleEncoderDetector(Side.RIGHT), sampled(lambda t: (ankle(t), 0.0), UNTIL))
+    found = fed(AnkleEncoderDetector(Side.RIGHT), sampled(pulsed, UNTIL))
+    assert times(found, STRIKE) == times(plain, STRIKE)
+
+
+def test_an_angle_in_degrees_is_told():
+    detector = AnkleEncoderDetector(Side.RIGHT)
+    fed(detector, sampled(lambda t: (math.degrees(ankle(t)), 0.0), UNTIL))
+    assert any("in degrees?" in line for line in detector.troubles())

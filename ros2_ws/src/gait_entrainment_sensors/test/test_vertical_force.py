@@ -1,0 +1,103 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Vertical force: a real belt, closed forms, steps on the wrong belt, and what cannot be."""
+
+from itertools import pairwise
+
+import pytest
+from public_data import belt
+from walks import OFFSET, STANCE, STRIDE, fed, force, sampled, times
+
+from gait_entrainment.conventions import EventKind, Side
+from gait_entrainment.settings import SettingError
+from gait_entrainment_sensors.vertical_force import VerticalForceDetector, VerticalForceSettings
+
+STRIKE, TOE_OFF = EventKind
+UNTIL = 12.0
+
+
+def detected(signal, rate=1000.0, side=Side.RIGHT):
+    detector = VerticalForceDetector(side)
+    return detector, fed(detector, sampled(signal, UNTIL, rate))
+
+
+def test_every_strike_of_a_real_belt_and_none_else():
+    detector = VerticalForceDetector(Side.LEFT)
+    found = fed(detector, belt())
+    strikes = times(found, STRIKE)
+    assert len(strikes) == 46
+    # A walk without a gap: each stride is that of the others, to 10 %.
+    strides = [b - a for a, b in pairwise(strikes)]
+    assert max(strides) < 1.1 * min(strides)
+    assert len(times(found, TOE_OFF)) == 47  # the record begins in stance
+    assert all(d.detected_at - d.time <= detector.latency + 0.0101 for d in found)
+
+
+@pytest.mark.parametrize("rate", [100.0, 400.0, 1000.0])
+def test_crossings_of_a_half_sine_are_interpolated(rate):
+    _, found = detected(lambda t: (force(t),), rate)
+    # 20 N are crossed this long after the sine begins, and before it ends.
+    late = STANCE / 3.14159 * 20.0 / 800.0
+    for n, time in enumerate(times(found, STRIKE)):
+        assert time == pytest.approx(OFFSET[Side.RIGHT] + n * STRIDE + late, abs=0.15 / rate)
+    for n, time in enumerate(times(found, TOE_OFF)):
+        assert time == pytest.approx(OFFSET[Side.RIGHT] + n * STRIDE + STANCE - late, abs=1 / rate)
+    assert len(times(found, STRIKE)) == 11
+
+
+def test_the_zero_follows_a_drift_in_swing():
+    detector, found = detected(lambda t: (force(t) + 15.0 + 6.0 * t,))
+    assert len(times(found, STRIKE)) >= 10
+    assert detector._zero > 60.0
+
+
+def test_a_belt_that_was_never_zeroed_is_zeroed():
+    _, found = detected(lambda t: (force(t) + 90.0,))
+    assert len(times(found, STRIKE)) >= 8
+
+
+def test_a_step_of_the_other_foot_on_this_belt_is_no_event():
+    other = 5 * STRIDE + OFFSET[Side.RIGHT] + STANCE + 0.05
+
+    def signal(time):  # the other foot comes down on this belt in the middle of the swing
+        return (force(time) + (600.0 if other < time < other + 0.5 * STANCE else 0.0),)
+
+    detector, found = detected(signal)
+    plain = detected(lambda t: (force(t),))[1]
+    assert detector.counts.rejected == 2  # its strike and its toe-off
+    assert times(found, STRIKE) == pytest.approx(times(plain, STRIKE), abs=1e-3)
+    assert times(found, TOE_OFF) == pytest.approx(times(plain, TOE_OFF), abs=1e-3)
+
+
+def test_a_stance_that_both_feet_share_ends_without_a_toe_off():
+    start = OFFSET[Side.RIGHT] + 5 * STRIDE
+
+    def signal(time):  # the other foot keeps this belt loaded until the next strike
+        shared = start + 0.9 * STANCE < time < start + 1.5 * STANCE
+        return (max(force(time), 300.0 if shared else 0.0),)
+
+    _, found = detected(signal)
+    plain = detected(lambda t: (force(t),))[1]
+    ends = [t for t in times(plain, TOE_OFF) if not start < t < start + STRIDE]
+    assert times(found, TOE_OFF) == pytest.approx(ends, abs=1e-3)
+    assert times(found, STRIKE) == pytest.approx(times(plain, STRIKE), abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("signal", "words"),
+    [
+        (lambda t: (-force(t),), "upwards positive"),
+        (lambda t: (force(t) / 1e3,), "not in kN"),
+        (lambda t: (30.0 * force(t),), "cannot be"),
+        (lambda t: (min(force(t), 500.0),), "stuck while it moved"),
+    ],
+)
+def test_what_cannot_be_is_told(signal, words):
+    detector, _ = detected(signal)
+    assert any(words in line for line in detector.troubles())
+
+
+def test_thresholds_without_hysteresis_are_refused():
+    with pytest.raises(SettingError, match="toe_off_force"):
+        VerticalForceSettings(strike_force=20.0, toe_off_force=30.0)
