@@ -84,9 +84,9 @@ class RecordedRun(Run):
     toe_off_bias: float = 0.0  # [s] by which the toe-offs of the events are late
     detector_errors: dict[str, Any] | None = None  # None if nobody knows the exact events
     ended_early: str = ""  # why the recording ended before the run did
+    # How what the analyzer published live differs from an analysis anew of the same onsets, a
+    # line per topic; () if they are equal to the last bit, None if nothing was recorded.
     differences: tuple[str, ...] | None = None
-    """How what the analyzer published live differs from an analysis anew of the same onsets, a
-    line per topic; () if they are equal to the last bit, None if nothing was recorded."""
 
 
 def read_run(
@@ -102,24 +102,22 @@ def read_run(
     Read a bag, a folder or an ``.mcap`` file, and analyze it anew, whoever recorded it.
 
     ``settings`` are the numbers in the verdict. ``torques`` reads the ankle torque of the strides
-    that figures show. A pulse begins at its "commanded" or "measured" ``onset``; by default as
-    the live analysis took it. ``protocol`` and ``side`` are as `protocol_and_side` takes them.
-    Raises BagError if it is no bag, is damaged, or lacks the topics that are needed.
+    in figures. A pulse begins at its "commanded" or "measured" ``onset``, by default that of the
+    live analysis; ``protocol`` and ``side`` as in `protocol_and_side`. Raises BagError if it is no
+    bag, is damaged, or lacks the topics that are needed.
     """
     with BagReader(path) as bag:
         protocol, side = protocol_and_side(bag, protocol, side)
         record = _Record(bag)
         onsets = {"commanded": record.onsets, "measured": [t.onset for t in record.timings]}
-        live_onset = bag.custom_data.get("onset", "commanded")
-        if live_onset not in onsets:
+        if (live_onset := bag.custom_data.get("onset", "commanded")) not in onsets:
             raise BagError(f"{path}: its onset is {live_onset!r}; allowed: {', '.join(onsets)}")
-        live_side = _side_in(bag, topic_names.STRIDES)
-        live_side = side if live_side is None else live_side
+        recorded_side = _side_in(bag, topic_names.STRIDES)
+        live_side = side if recorded_side is None else recorded_side
         bias = _toe_off_bias(bag)
         told = settings_for(protocol.sequence if protocol else (), settings)
-        live = analyze(
-            record.events, onsets[live_onset], live_side, told, record.unknown, toe_off_bias=bias
-        )
+        begun = onsets[live_onset]
+        live = analyze(record.events, begun, live_side, told, record.unknown, 0, bias)
         blocks = _conducted(protocol, record.events) if protocol else ()
         begun = onsets[onset or live_onset]
         analysis, judged = analyze_blocks(

@@ -168,7 +168,7 @@ def parameters(
             ),
         },
         DISPLAY: _drawn(protocol),
-        PAGE: {"record": str(bag.absolute())},
+        PAGE: {"record": str(bag.absolute()) if bag else ""},
     }
     latency = 0.0
     if walker != "simulated":

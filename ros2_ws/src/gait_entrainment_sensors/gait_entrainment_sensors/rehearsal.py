@@ -87,10 +87,8 @@ def rehearse(protocol: Protocol, sensors: Sensors) -> Rehearsal:
     robot.activate()
     robot.begin(0)
     conductor = Conductor(protocol)
-    walker, ended = (
-        Walker(protocol.walker, protocol.side, variation=protocol.variation, seed=protocol.seed),
-        False,
-    )
+    walker = Walker(protocol.walker, protocol.side, None, protocol.variation, protocol.seed)
+    ended = False
     truth: list[GaitEvent] = []
     detected: list[GaitEvent] = []
     onsets: list[int] = []
@@ -113,7 +111,7 @@ def rehearse(protocol: Protocol, sensors: Sensors) -> Rehearsal:
         truth=tuple(truth),
         events=tuple(detected),
         onsets=tuple(onsets),
-        train=conductor.train,
+        train=conductor.block.train,
         analysis=analyze(detected, onsets, protocol.side),
         true_analysis=analyze(truth, onsets, protocol.side),
         ending=walker.ending,

@@ -54,7 +54,7 @@ class Run:
         self.number, self.side = number, side
         self.promised_until = 0  # all pulses up to this instant are known
         self.end: int | None = None  # of the walk, once it is known
-        self._analyzer = GaitAnalyzer(side, settings, toe_off_bias)
+        self._analyzer = GaitAnalyzer(side, settings, toe_off_bias=toe_off_bias)
         self._measured = MeasuredOnsets() if measured else None
         self._events = 0
         self._closed = False  # nothing will be promised any more
