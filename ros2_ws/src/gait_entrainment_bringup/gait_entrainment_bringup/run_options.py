@@ -44,14 +44,19 @@ _NUMBERS = {
 
 
 def add_run_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
+    """Add the options of one run."""
     add_protocol_options(parser)
+    add_conduct_options(parser, "folder of the bag; default bags/<time>_<name>")
+
+
+def add_conduct_options(parser: argparse.ArgumentParser, out: str) -> None:
+    """Add how whatever protocol is conducted, and what ``--out`` names."""
     for option, text in _SWITCHES.items():
         parser.add_argument(option, action="store_true", help=text)
     for name, told in _NUMBERS.items():
         text = f"{told.meaning}; {told.allowed}"
         parser.add_argument(_option(name), metavar="FLOAT", help=text)
-    parser.add_argument("--out", type=Path, help="folder of the bag; default bags/<time>_<name>")
+    parser.add_argument("--out", type=Path, help=out)
     add_onset_option(parser)
 
 
@@ -69,9 +74,7 @@ def checked_run(
     Raises UsageError, LimitError or DeviceError.
     """
     protocol = chosen_protocol(options)
-    for name, told in _NUMBERS.items():
-        if (text := getattr(options, name)) is not None:
-            setattr(options, name, told.parse(_option(name), text))
+    check_numbers(options)
     protocol.check_limits()
     if drives:
         switches = {"armed": options.arm, "unproved": options.unproved}
@@ -80,6 +83,13 @@ def checked_run(
     if records:
         check_output(bag, exactly=options.out is not None)
     return protocol, bag
+
+
+def check_numbers(options: argparse.Namespace) -> None:
+    """Turn the options that are numbers into such; raises SettingError."""
+    for name, told in _NUMBERS.items():
+        if (text := getattr(options, name)) is not None:
+            setattr(options, name, told.parse(_option(name), text))
 
 
 def check_robot(protocol: Protocol, *, real_time: bool, armed: bool, unproved: bool) -> None:
