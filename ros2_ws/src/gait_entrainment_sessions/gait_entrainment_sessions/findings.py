@@ -16,6 +16,8 @@ from gait_entrainment_sessions import statistics
 from gait_entrainment_sessions.runs import PlacedRun
 from gait_entrainment_sessions.statistics import Border, Direction, Estimate, Locking
 
+Rows = list[tuple[str, str]]  # what, and how it is, for people
+
 
 @dataclass(frozen=True)
 class Findings:
@@ -128,3 +130,29 @@ class StudyFindings:
             direction=statistics.direction(phases),
             rayleigh=statistics.rayleigh(phases),
         )
+
+    @property
+    def rows(self) -> Rows:
+        """What is told of them, in words."""
+        p = "cannot be told" if math.isnan(self.rayleigh) else f"{self.rayleigh:.2g}"
+        phase = "cannot be told"
+        if self.phases:
+            phase = f"{self.direction.phase:.3f} of the stride"
+        return [
+            ("persons that entrained in some block", shown(self.entrained, "%", 100)),
+            ("basin found, both sides, mean", shown(self.basin_mean, "% of the stride")),
+            ("basin, standard deviation", shown(self.basin_deviation, "% of the stride")),
+            ("mean phase of those that entrained", phase),
+            ("its resultant length over persons", f"{self.direction.resultant:.3f}"),
+            ("Rayleigh's p over persons", p),
+        ]
+
+
+def shown(estimate: Estimate, unit: str, factor: float = 1.0) -> str:
+    """Return an estimate with its interval in words."""
+    value, low, high = (factor * number for number in estimate)
+    if math.isnan(value):
+        return "cannot be told"
+    if math.isnan(low):
+        return f"{value:.3g} {unit}"
+    return f"{value:.3g} {unit} (95 %: {low:.3g} to {high:.3g})"

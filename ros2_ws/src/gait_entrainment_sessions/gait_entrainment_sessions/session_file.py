@@ -219,9 +219,10 @@ class _Reader:
         """Return what a part of the file, or the file that it names, says of a protocol."""
         source: Path | str
         if isinstance(node, yaml.ScalarNode):
-            source, name = self._path.parent / node.value, str(self._path.parent / node.value)
+            file = self._path.parent / node.value
+            source, name = file, str(file)
             self._read(source, {})  # so that what is wrong by itself is told with its line
-            root = yaml.compose(source.read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
+            root = yaml.compose(file.read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
         else:
             begin, end, root, name = node.start_mark, node.end_mark, node, str(self._path)
             # At its own place in the file, so that lines are those of the file.

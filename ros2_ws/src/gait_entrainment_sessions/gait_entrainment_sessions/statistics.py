@@ -111,8 +111,8 @@ def convergence(numbers: Sequence[float], lags: Sequence[float]) -> Estimate:
     Return the time constant, in pulses, of an exponential approach of the lags to a last one.
 
     Least squares of L + A exp(-n / tau); the interval is that of log(tau) by the covariance of the
-    fit. NaN if no approach can be told: A is not shown to differ from zero, or the interval spans
-    more than a factor of a thousand.
+    fit. NaN if no approach can be told: A is not shown to differ from zero, or the interval goes
+    beyond the pulses, so that a lag that drifts would do as well.
     """
     if len(lags) < 8:
         return UNKNOWN
@@ -127,9 +127,9 @@ def convergence(numbers: Sequence[float], lags: Sequence[float]) -> Estimate:
     except RuntimeError:  # it does not converge
         return UNKNOWN
     half = stats.t.ppf(0.5 + CONFIDENCE / 2, len(y) - 3) * np.sqrt(np.diag(covariance))
-    if not (abs(fitted[1]) > half[1] and half[2] < math.log(1000) / 2):
-        return UNKNOWN
     log = float(fitted[2])
+    if not (abs(fitted[1]) > half[1] and log + half[2] < math.log(n[-1])):
+        return UNKNOWN
     return Estimate(math.exp(log), math.exp(log - half[2]), math.exp(log + half[2]))
 
 

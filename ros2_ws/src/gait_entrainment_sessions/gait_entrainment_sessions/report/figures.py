@@ -33,11 +33,22 @@ def svg_of(figure: Any, name: str) -> str:
         figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
     svg = text.getvalue()
     svg = svg[svg.index("<svg") :]
-    # A hundredth of a point is more than any screen shows, and half of the page.
-    return re.sub(r' d="[^"]*"', lambda d: re.sub(r"(\.\d\d)\d+", r"\1", d[0]), svg)
+    return re.sub(r' d="([^"]*)"', lambda path: f' d="{_thinned(path[1])}"', svg)
 
 
-def circle(findings: Findings) -> Any:
+def _thinned(path: str) -> str:
+    """Return a path in hundredths of a point, without the points inside level lines."""
+    lines = re.sub(r"(\.\d\d)\d+", r"\1", path).strip().split("\n")
+    words = [line.split() for line in lines]
+    level = [word[0] == "L" and word[2:] for word in words]
+    inside = (
+        0 < n < len(words) - 1 and level[n] and level[n - 1] == level[n] == level[n + 1]
+        for n in range(len(words))
+    )
+    return " ".join(line for line, left_out in zip(lines, inside, strict=True) if not left_out)
+
+
+def draw_circle(findings: Findings) -> Any:
     """Draw the phase of each pulse, the first in the middle, the last at the rim."""
     from matplotlib.figure import Figure
 
@@ -56,7 +67,7 @@ def circle(findings: Findings) -> Any:
     return figure
 
 
-def directions(study: StudyFindings) -> Any:
+def draw_directions(study: StudyFindings) -> Any:
     """Draw the mean phase of each person, and their mean."""
     from matplotlib.figure import Figure
 
@@ -82,7 +93,7 @@ def _round(figure: Any) -> Any:
     return axes
 
 
-def verdicts(findings: Sequence[Findings]) -> Any:
+def draw_verdicts(findings: Sequence[Findings]) -> Any:
     """Draw the verdict of each run over its pulse period, a line per person."""
     persons = sorted({one.placed.place.person for one in findings})
     figure, axes = new_figure(size=(7.2, 1.6 + 0.28 * len(persons)))
