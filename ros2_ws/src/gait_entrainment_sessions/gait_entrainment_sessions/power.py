@@ -79,7 +79,7 @@ def power(plan: PowerPlan, offset: float, counts: Sequence[int] = COUNTS) -> lis
     for number, (row, generator) in enumerate(zip(noise, generators, strict=True)):
         free = plan.stride * (1 + plan.variation * row)
         locks = number % 2 == 0
-        events, onsets = _walk(plan, free, offset, longest, locks, generator)
+        events, onsets = walk(plan, free, offset, longest, locks=locks, generator=generator)
         found[locks].append(_verdicts(events, onsets))
 
     def chance(locks: bool, pulses: int, verdict: Verdict) -> Estimate:
@@ -104,15 +104,21 @@ def _verdicts(events: Sequence[GaitEvent], onsets: Sequence[int]) -> dict[int, V
     return {p.number: at[p.stride] for p in analysis.pulses if p.stride in at}
 
 
-def _walk(
+def walk(
     plan: PowerPlan,
     free: Floats,
     offset: float,
     pulses: int,
+    *,
     locks: bool,
     generator: np.random.Generator,
 ) -> tuple[list[GaitEvent], list[int]]:
-    """Return events and onsets of one experiment; the first pulse has a random phase."""
+    """
+    Return events and pulse onsets [ns] of one experiment, of the right leg.
+
+    ``free`` are the stride periods [s] without pulses, ``offset`` is that of the pulse period [s];
+    the first pulse has a random phase.
+    """
     measured = float(np.mean(free[: plan.baseline]))
     period = measured + offset
     first = float(np.sum(free[: plan.baseline])) + generator.uniform() * measured
