@@ -93,6 +93,13 @@ def test_a_sealed_session_is_unblinded_once_it_is_asked_for(conducted):
     assert [row.split("\t")[3] for row in rows] == names
 
 
+def test_tables_are_exported_over_all_of_a_study(conducted, tmp_path):
+    words = ("session", "export", conducted.path.parents[1], "--out", tmp_path)
+    code, out, err = ended(entrain(*words, "--format", "parquet"))
+    assert (code, err) == (0, "")
+    assert out.count("table ") == len(list(tmp_path.glob("*.parquet"))) == 4
+
+
 def test_the_space_bar_stops_a_block(short):
     ours, theirs = pty.openpty()
     study = short.parent / "stopped"

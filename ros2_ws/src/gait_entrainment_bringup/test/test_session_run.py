@@ -10,10 +10,12 @@ import pytest
 
 from gait_entrainment_bringup import session_run
 from gait_entrainment_bringup.session_run import BlockFailedError, SessionRun
+from gait_entrainment_drivers.proof import keep_preflight
 from gait_entrainment_sessions.folder import SessionFolder
 from gait_entrainment_sessions.session_file import SessionError, read_session
 
 TEXT = """\
+protocol: {driver: DRIVER}
 person: {code: P01, mass: 72, leg_length: 0.91}
 LIMITS
 blocks:
@@ -27,9 +29,9 @@ def conduct(tmp_path, monkeypatch):
     """Return a function that conducts what is left; blocks end as told, by default well."""
     conducted = []
 
-    def conducting(answers=(), ends=(), limits="", **options):
+    def conducting(answers=(), ends=(), limits="", driver="ideal", **options):
         path = tmp_path / "session.yaml"
-        path.write_text(TEXT.replace("LIMITS", limits))
+        path.write_text(TEXT.replace("LIMITS", limits).replace("DRIVER", driver))
         session = read_session(path)
         folder = SessionFolder.begin(tmp_path / "study", session)
         told = {"note": "", "repeat": None, "reason": "", "real_time": False, "no_rest": False}
@@ -119,3 +121,12 @@ def test_limits_of_a_session_hold_over_its_blocks(conduct):
         (folder.path / "bags" / name / "broken.mcap").write_bytes(b"no bag")
     with pytest.raises(SessionError, match=r"50 more pulses; allowed: 20, since 100 of 120"):
         conduct(limits=limits, repeat=1, reason="why")
+
+
+def test_the_checklist_of_a_real_robot_is_told_before_each_block(conduct, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    told = {"limits": "limits: {torque: 15}", "driver": "odrive_can"}
+    folder = conduct(**told)
+    assert ledger(folder)[0] == ("preflight", "1", "none")
+    keep_preflight("odrive_can", "")
+    assert ledger(conduct(**told, repeat=1, reason="why"))[-3][2].endswith(": passed")

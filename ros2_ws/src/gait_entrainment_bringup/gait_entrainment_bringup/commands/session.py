@@ -10,7 +10,7 @@ from gait_entrainment.errors import UsageError
 from gait_entrainment_bringup.commands.run import add_node_options, check_nodes
 from gait_entrainment_bringup.run_options import add_conduct_options, check_numbers, check_robot
 from gait_entrainment_bringup.session_run import SessionRun
-from gait_entrainment_bringup.signals import stop_on_signals
+from gait_entrainment_drivers.signals import stop_on_signals
 from gait_entrainment_sessions.dataset import complete
 from gait_entrainment_sessions.folder import SessionFolder
 from gait_entrainment_sessions.runs import read_runs
