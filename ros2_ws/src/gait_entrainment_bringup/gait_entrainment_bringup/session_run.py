@@ -10,6 +10,7 @@ import os
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -74,9 +75,12 @@ class SessionRun:
         """Ask the operator what is next; return whether the session goes on now."""
         assert self._ask is not None
         count = len(self._session.blocks)
+        question = f"block {number} of {count} ({self._session.shown(number)}): Enter, p, r, n? "
         while True:
-            question = f"block {number} of {count} ({self._session.shown(number)}): "
-            word, _, text = self._ask(question + "Enter, p, r, n? ").strip().partition(" ")
+            try:
+                word, _, text = self._ask(question).strip().partition(" ")
+            except EOFError:
+                word, text = "p", "the input ended"
             if not word:
                 return True
             if word not in ("p", "r", "n") or not text.strip():
@@ -225,4 +229,5 @@ def _conduct(parent: int, answer: Any, keyboard: int, conduct: Callable[..., Non
         reason = str(error)
     except KeyboardInterrupt:
         reason = "interrupted"
-    answer.send(reason)
+    with suppress(OSError):  # the parent was killed
+        answer.send(reason)

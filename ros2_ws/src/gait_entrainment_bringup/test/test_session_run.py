@@ -83,6 +83,15 @@ def test_the_operator_notes_pauses_and_repeats_with_a_reason(conduct, capsys):
     assert [bag for _, bag, _ in conduct.conducted] == ["block-01", "block-01_run-2", "block-02"]
 
 
+def test_the_end_of_the_input_is_a_pause(conduct, monkeypatch):
+    def ended(_question):
+        raise EOFError
+
+    monkeypatch.setattr(session_run.sys.stdin, "isatty", lambda: True, raising=False)
+    monkeypatch.setattr("builtins.input", ended)
+    assert ledger(conduct()) == [("pause", "1", "the input ended")]
+
+
 def test_a_block_that_fails_ends_the_session_and_is_the_next(conduct):
     with pytest.raises(BlockFailedError, match="block 2: it fell; the same command resumes"):
         conduct(ends=["", "it fell\n  walker_sim| more"])

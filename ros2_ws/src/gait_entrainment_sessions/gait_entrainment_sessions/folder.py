@@ -67,6 +67,7 @@ class SessionFolder:
             raise SessionError(
                 f"{folder.path}: holds something else; nothing is overwritten: give --out"
             )
+        cls._check_number(study, session)
         folder.path.mkdir(parents=True, exist_ok=True)
         names = [block.name for block in session.ordered]
         key = folder._seal(session, names) if session.blind else ""
@@ -204,6 +205,17 @@ class SessionFolder:
         _write(self.path / _KEY, text)
         (self.path / _KEY).chmod(0o400)
         return hashlib.sha256(text.encode()).hexdigest()
+
+    @classmethod
+    def _check_number(cls, study: Path, session: Session) -> None:
+        """Raise SessionError if another person has this number: orders would not be balanced."""
+        for file in sorted(study.glob(f"sub-*/ses-*/{_PLAN}")):
+            other, person = cls(file.parent).plan["person"], session.person
+            if (other["code"] == person.code) != (other["number"] == person.number):
+                raise SessionError(
+                    f"{session.file}: person.number: {person.number} of {person.code}; allowed: "
+                    f"one number for each person, and {other['code']} has {other['number']}"
+                )
 
     def _check_same(self, session: Session) -> None:
         copy = self.path / _COPY

@@ -87,6 +87,14 @@ def test_what_else_is_in_the_folder_is_left_alone(begun, tmp_path):
         begun()
 
 
+@pytest.mark.parametrize("other", [("code: P01", "code: P02"), ("number: 2", "number: 3")])
+def test_each_person_of_a_study_has_one_number(begun, other):
+    begun()
+    with pytest.raises(SessionError, match=r"person.number: . of P0.; allowed: one number for"):
+        begun(other, ('session: "1"', 'session: "2"'))
+    begun(("code: P01, number: 2", "code: P02, number: 3"))
+
+
 def test_two_do_not_conduct_it_at_once(begun):
     folder = begun()
     with (

@@ -4,9 +4,11 @@
 """entrain session: the blocks of a session one after the other, each a run with a bag."""
 
 import argparse
+from contextlib import suppress
 from pathlib import Path
 
 from gait_entrainment.errors import UsageError
+from gait_entrainment_bags import BagError
 from gait_entrainment_bringup.commands.run import add_node_options, check_nodes
 from gait_entrainment_bringup.run_options import add_conduct_options, check_numbers, check_robot
 from gait_entrainment_bringup.session_run import SessionRun
@@ -79,14 +81,20 @@ def _conduct(session: Session, options: argparse.Namespace) -> int:
     study = options.out or Path("sessions") / session.study
     folder = SessionFolder.begin(study, session)
     with folder.held():
-        conducting = SessionRun(session, folder, options)
         try:
-            conducting.conduct()
-        finally:
-            tables = complete(folder) if folder.runs() else []
+            SessionRun(session, folder, options).conduct()
+        except BaseException:
+            with suppress(BagError, OSError):  # why it ended is what counts
+                _complete(folder)
+            raise
+        tables = _complete(folder)
     print(f"session          {folder.path}")
     _print_paths(tables)
     return 0
+
+
+def _complete(folder: SessionFolder) -> list[Path]:
+    return complete(folder) if folder.runs() else []
 
 
 def _print_paths(paths: list[Path]) -> None:
