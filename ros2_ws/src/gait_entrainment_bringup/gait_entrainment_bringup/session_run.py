@@ -178,23 +178,24 @@ class SessionRun:
         Each block has a perturbator of its own, which knows only what it has delivered itself.
         """
         said, unsaid = protocol.limits, DeviceLimits()
-        names = ("session_pulses", "session_impulse")
-        if all(getattr(said, name) == getattr(unsaid, name) for name in names):
-            return protocol
-        pulses, impulse = 0, 0.0
-        for bag in sorted((self._folder.path / "bags").glob("*")):
-            given = _delivered(bag, protocol)
-            pulses += len(given)
-            impulse += sum(abs(torque) * width for torque, width in given)
-        planned, left = protocol.pulses.count, said.session_pulses - pulses
-        if planned > left:
-            raise SessionError(
-                f"limits.session_pulses: {planned} more pulses; allowed: {max(left, 0)}, since "
-                f"{pulses} of {said.session_pulses} were delivered"
-            )
-        rest = max(said.session_impulse - impulse, 0.0)
-        lower = replace(said, session_pulses=left, session_impulse=rest)
-        return replace(protocol, limits=lower)
+        lower: dict[str, Any] = {}
+        given = [
+            pulse
+            for bag in sorted((self._folder.path / "bags").glob("*"))
+            for pulse in _delivered(bag, protocol)
+        ]
+        if said.session_pulses != unsaid.session_pulses:
+            planned, left = protocol.pulses.count, said.session_pulses - len(given)
+            if planned > left:
+                raise SessionError(
+                    f"limits.session_pulses: {planned} more pulses; allowed: {max(left, 0)}, "
+                    f"since {len(given)} of {said.session_pulses} were delivered"
+                )
+            lower["session_pulses"] = left
+        if said.session_impulse != unsaid.session_impulse:
+            impulse = sum(abs(torque) * width for torque, width in given)
+            lower["session_impulse"] = max(said.session_impulse - impulse, 0.0)
+        return replace(protocol, limits=replace(said, **lower))
 
 
 def _delivered(bag: Path, protocol: Protocol) -> list[tuple[float, float]]:
