@@ -21,9 +21,12 @@ from harness import (
     stamp_of,
 )
 
+from gait_entrainment.protocol import read_protocol
+from gait_entrainment.simulation import simulate
 from gait_entrainment_bags import BagReader, check
 from gait_entrainment_bags.figures import draw_figures
 from gait_entrainment_bags.recorded_run import read_run
+from gait_entrainment_commands.outcome import outcome_of
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "scripts"))
 import make_figures
@@ -45,6 +48,44 @@ def test_events_are_those_of_the_simulation_to_the_nanosecond(paper_example):
     events = events_since_start(bag)
     assert len(events) > 4 * 80
     assert events == simulated_events(bag)
+
+
+BLOCKS = """
+name: blocks
+pulses: {count: 4, width: 0.2, torque: 6}
+baseline: 4
+washout: 2
+blocks:
+  - {name: sham, pulses: {torque: 0, jitter: 0.02}, rest: 4}
+  - {name: assisted, pulses: {phase: 0.42, shape: half_sine, rising: 2}}
+  - {name: own shape, pulses: {shape: samples, samples: [0, 1, 0.3, 0], catch_pulses: [2]}}
+"""
+
+
+def test_blocks_pulses_by_phase_and_shapes_are_those_of_the_simulation(tmp_path):
+    (tmp_path / "blocks.yaml").write_text(BLOCKS)
+    bag = tmp_path / "bag"
+    with entrain_run(bag, str(tmp_path / "blocks.yaml"), "--json") as run:
+        outcome = run.outcome()
+    simulation = simulate(read_protocol(BLOCKS))
+    assert events_since_start(bag) == simulated_events(bag)
+    recorded = read_run(bag)
+    start = recorded.events[0].stamp
+    assert tuple(onset - start for onset in recorded.onsets) == simulation.onsets
+    assert recorded.differences == ()
+    told = outcome_of(simulation)["blocks"]
+    assert [{**a, **b} for a, b in zip(told, outcome["blocks"], strict=True)] == told
+    with BagReader(bag) as reader:
+        states = [m for _, m in reader.decoded(["/experiment/state"])]
+        pulses = [m for _, m in reader.decoded(["/perturbation/pulses"])]
+    shown = [(m.block, m.block_name, m.phase) for m in states if 0 < m.phase < 4 or m.phase == 6]
+    assert list(dict.fromkeys(shown)) == [
+        *((1, "sham", phase) for phase in (1, 2, 3, 6)),
+        *((2, "assisted", phase) for phase in (1, 2, 3)),
+        *((3, "own shape", phase) for phase in (1, 2, 3)),
+    ]
+    assert [pulse.number for pulse in pulses] == list(range(1, 13))
+    assert [pulse.torque for pulse in pulses] == [0] * 4 + [2, 4, 6, 6] + [6, 0, 6, 6]
 
 
 def test_outcome_says_what_happened(paper_example):

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import chain
+from itertools import count
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.experiment import BlockRun
@@ -84,11 +84,13 @@ def analyze_blocks(
             )
         )
     parts = [block.analysis for block in judged]
-    pulses, entrainments, holes = (
-        tuple(chain.from_iterable(getattr(part, name) for part in parts))
-        for name in ("pulses", "entrainments", "holes")
-    )
-    return replace(whole, pulses=pulses, entrainments=entrainments, holes=holes), tuple(judged)
+    numbers = count(1)
+    return replace(
+        whole,
+        pulses=tuple(replace(p, number=next(numbers)) for part in parts for p in part.pulses),
+        entrainments=tuple(e for part in parts for e in part.entrainments),
+        holes=tuple(hole for part in parts for hole in part.holes),
+    ), tuple(judged)
 
 
 @dataclass(frozen=True)
