@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind
-from gait_entrainment.gait import Verdict
+from gait_entrainment.gait import Analysis, Verdict
 from gait_entrainment.robot.timing import lateness_ms
+from gait_entrainment.run import JudgedBlock
 from gait_entrainment_bags.recorded_run import RecordedRun, drawn_strides
 from gait_entrainment_commands.drawing import (
     BLACK,
@@ -61,14 +62,23 @@ def _new_figure(
         left=0.8 / _WIDTH, right=1 - right / _WIDTH, bottom=0.9 / height, top=1 - top / height
     )
     about = run.name if run.protocol is None else f"{run.name}, {run.protocol.driver}"
-    if last := run.analysis.entrainments[-1:]:
-        about += f": {last[0].verdict.name.lower()}"
-        if last[0].verdict is Verdict.ENTRAINED:
-            about += f" since stride {last[0].entrained_since_stride}"
+    verdicts = []
+    for name, part in _parts(run):
+        if last := part.entrainments[-1:]:
+            verdicts.append(f"{name} {last[0].verdict.name.lower()}".strip())
+            if last[0].verdict is Verdict.ENTRAINED:
+                verdicts[-1] += f" since stride {last[0].entrained_since_stride}"
+    if verdicts:
+        about += f": {', '.join(verdicts)}"
     place = {"x": 0.8 / _WIDTH, "ha": "left", "va": "top"}
     figure.text(s=title, y=1 - 0.08 / height, fontsize=11, **place)
     figure.text(s=about, y=1 - 0.3 / height, fontsize=8, color=GREY, **place)
     return figure, axes
+
+
+def _parts(run: RecordedRun) -> list[tuple[str, Analysis]]:
+    """Return the analysis of each block with its name; of a run without blocks, the whole."""
+    return [(block.name, block.analysis) for block in run.blocks] or [("", run.analysis)]
 
 
 def _add_legend_below(figure: Any, axes: Any) -> None:
@@ -89,15 +99,22 @@ def _add_percent(run: RecordedRun, add_axis: Any, place: str) -> None:
 
 def _stride_period(run: RecordedRun) -> Any:
     figure, axes = _new_figure(run, "Stride period")
-    if given := [pulse.stride for pulse in run.analysis.pulses]:
-        span = min(given) - 0.5, max(given) + 0.5
-        axes.axvspan(*span, color=ORANGE, alpha=0.10, lw=0, label="pulses")
-    for period, text, colour, style in (
-        (run.measured_period, "unperturbed", GREY, "--"),
-        (run.pulse_period, "pulse period", ORANGE, "-."),
-    ):
-        if np.isfinite(period):
-            axes.axhline(period, color=colour, ls=style, lw=1.2, label=f"{text} {period:.4f} s")
+    for _, part in _parts(run):
+        if given := [pulse.stride for pulse in part.pulses]:
+            span = min(given) - 0.5, max(given) + 0.5
+            axes.axvspan(*span, color=ORANGE, alpha=0.10, lw=0, label="pulses")
+    # Each block has periods of its own; those of a run without blocks hold throughout.
+    for one in run.blocks or [run]:
+        for period, text, colour, style in (
+            (one.measured_period, "unperturbed", GREY, "--"),
+            (one.pulse_period, "pulse period", ORANGE, "-."),
+        ):
+            line = {"color": colour, "ls": style, "lw": 1.2}
+            if isinstance(one, JudgedBlock):
+                strides = one.first_stride, one.last_stride or one.first_stride
+                axes.plot(strides, [period] * 2, label=text, **line)
+            elif np.isfinite(period):
+                axes.axhline(period, label=f"{text} {period:.4f} s", **line)
     periods = {s.number: s.period for s in run.strides}
     numbers = range(1, max(periods, default=0) + 1)
     axes.plot(numbers, [periods.get(number, np.nan) for number in numbers], **_DOTTED_LINE)
@@ -119,8 +136,8 @@ def _phase_lag(run: RecordedRun) -> Any:
         if pulse.toe_off is not None and (before := np.searchsorted(strikes, pulse.toe_off)):
             stance = (pulse.toe_off - strikes[before - 1]) / 1e6
         place, lag = pulse.stride + pulse.phase, pulse.phase_lag
-        # No line across a hole, nor from one end of the stride to the other.
-        if latest and pulse.number > latest.number + 1:
+        # No line across a hole or a pause, nor from one end of the stride to the other.
+        if latest and (pulse.number > latest.number + 1 or pulse.stride > latest.stride + 4):
             rows.append((np.nan, np.nan, np.nan))
         elif latest and abs(lag - latest.phase_lag) > 0.5 * run.measured_period:
             rows.append((place, np.nan, stance))
@@ -132,9 +149,9 @@ def _phase_lag(run: RecordedRun) -> Any:
     axes.axhline(0, color=GREY, ls="--", lw=1.2, label="toe-off")
     axes.plot(places, lags, label="pulse onset", **_DOTTED_LINE)
     _shade_holes(axes, run)
-    last = run.analysis.entrainments[-1] if run.analysis.entrainments else None
-    if last is not None and (since := last.entrained_since_stride):
-        axes.axvline(since, color=GREEN, lw=1.2, label="from here near its final lag")
+    for last in (entrainment for _, part in _parts(run) for entrainment in part.entrainments[-1:]):
+        if since := last.entrained_since_stride:
+            axes.axvline(since, color=GREEN, lw=1.2, label="from here near its final lag")
     axes.set(xlabel="stride", ylabel="onset minus toe-off [ms]")
     _add_percent(run, axes.secondary_yaxis, "right")
     _add_legend_below(figure, axes)
