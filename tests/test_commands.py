@@ -77,6 +77,7 @@ EXIT_CODES = [
     (0, ["bag", "info", BAG]),
     (0, ["bag", "check", BAG]),
     (0, ["driver", "list"]),
+    (0, ["plan", "--trials=20", "--pulses", "10"]),
     (1, ["simulate", "--torque=31"]),
     (1, ["simulate", "--torque=-29", "--width=0.4"]),  # the walker falls
     (1, ["simulate", "--driver=magic"]),
@@ -84,6 +85,7 @@ EXIT_CODES = [
     (1, ["bag", "info", "README.md"]),
     (1, ["bag", "check", "README.md"]),
     (1, ["driver", "check", "magic"]),
+    (1, ["report", "docs"]),
     (2, ["simulate", "--width=-1"]),
     (2, ["simulate", "nowhere.yaml"]),
     (2, ["analyze", "nowhere"]),
@@ -95,6 +97,12 @@ EXIT_CODES = [
     (2, ["replay", "nowhere"]),
     (2, ["replay", BAG, "--rate=-1"]),
     (2, ["node", "walker_sim", "--lead-time=20"]),
+    (2, ["plan", "--period-offset=-0.2"]),
+    (2, ["session", "nowhere.yaml"]),
+    (2, ["session", "unblind", "docs"]),
+    (2, ["session", "export", BAG]),
+    (2, ["report", BAG, "--out=nowhere/page.html"]),
+    (2, ["cohort", "nowhere.yaml"]),
 ]
 
 

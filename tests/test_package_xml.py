@@ -34,7 +34,7 @@ KEYS = {
 # controller_manager_msgs is used by the driver for ros2_control where it is installed.
 # The page's server comes with nicegui; foxglove is asked for where it is wanted.
 WITHOUT_KEY = {
-    *("controller_manager_msgs", "distributed", "ezc3d", "pyarrow"),
+    *("astropy", "controller_manager_msgs", "distributed", "ezc3d", "pyarrow"),
     *("fastapi", "foxglove", "nicegui", "uvicorn"),
 }
 # What is needed and not imported, and by what.

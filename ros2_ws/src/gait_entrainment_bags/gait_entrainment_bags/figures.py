@@ -33,9 +33,9 @@ _WIDTH, _HEIGHT = 7.2, 3.6  # [inch]
 _DOTTED_LINE = {"color": BLUE, "marker": ".", "lw": 0.8}
 
 
-def draw_figures(run: RecordedRun, folder: Path) -> list[Path]:
+def run_figures(run: RecordedRun) -> dict[str, Any]:
     """
-    Draw the figures of a run as PNG and SVG files into a folder; return their paths.
+    Return the figures of a run by name.
 
     Of a robot whose pulses all begin at their command there is no figure of their timing.
     """
@@ -43,7 +43,13 @@ def draw_figures(run: RecordedRun, folder: Path) -> list[Path]:
     if timing_summary(timing_outcome(run.timings, run.measured_period)):
         figures["pulse_timing"] = _pulse_timing(run)
     figures["ankle_torque"] = _ankle_torque(run)
-    return [path for name, one in figures.items() for path in save_figure(one, folder, name)]
+    return figures
+
+
+def draw_figures(run: RecordedRun, folder: Path) -> list[Path]:
+    """Draw the figures of a run as PNG and SVG files into a folder; return their paths."""
+    drawn = run_figures(run).items()
+    return [path for name, one in drawn for path in save_figure(one, folder, name)]
 
 
 def _new_figure(

@@ -50,6 +50,12 @@ def start_node(
     return process
 
 
+def end_with(parent: int) -> bool:
+    """Have this process get SIGTERM when its parent dies; return whether that still lives."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
+    return os.getppid() == parent  # else it died before the line above
+
+
 def _run(
     parent: int, module: str, words: Sequence[str], log: Path, environment: Mapping[str, str]
 ) -> None:
@@ -58,9 +64,7 @@ def _run(
     os.setsid()
     for number in STOPPING:  # the parent's handlers are not for a node
         signal.signal(number, signal.SIG_DFL)
-    library = ctypes.CDLL(None)
-    library.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
-    if os.getppid() != parent:  # it died before the line above
+    if not end_with(parent):
         return
     with log.open("wb") as file:
         os.dup2(file.fileno(), sys.stdout.fileno())
@@ -68,7 +72,7 @@ def _run(
     os.environ.clear()
     os.environ.update(environment)
     sys.argv = list(words)
-    library.prctl(_PR_SET_NAME, words[0].encode(), 0, 0, 0)
+    ctypes.CDLL(None).prctl(_PR_SET_NAME, words[0].encode(), 0, 0, 0)
     # What ps shows of the command line lies in memory that is the process's own.
     fields = Path("/proc/self/stat").read_text().rpartition(")")[2].split()
     start, end = map(int, fields[_ARGUMENTS])

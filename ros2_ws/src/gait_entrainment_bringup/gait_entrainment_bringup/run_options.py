@@ -53,8 +53,13 @@ _NUMBERS = {
 
 
 def add_run_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
+    """Add the options of one run."""
     add_protocol_options(parser)
+    add_conduct_options(parser, "folder of the bag; default bags/<time>_<name>")
+
+
+def add_conduct_options(parser: argparse.ArgumentParser, out: str) -> None:
+    """Add how whatever protocol is conducted, and what ``--out`` names."""
     for option, text in _SWITCHES.items():
         parser.add_argument(option, action="store_true", help=text)
     for name, told in _NUMBERS.items():
@@ -70,7 +75,7 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
         "--detector", default=DETECTOR, help=f"of a person's gait events; default {DETECTOR}"
     )
     parser.add_argument("--sensor", default="", help="to emulate; default: the detector's")
-    parser.add_argument("--out", type=Path, help="folder of the bag; default bags/<time>_<name>")
+    parser.add_argument("--out", type=Path, help=out)
     add_onset_option(parser)
 
 
@@ -88,9 +93,7 @@ def checked_run(
     Raises UsageError, LimitError or DeviceError.
     """
     protocol = chosen_protocol(options)
-    for name, told in _NUMBERS.items():
-        if (text := getattr(options, name)) is not None:
-            setattr(options, name, told.parse(_option(name), text))
+    check_numbers(options)
     protocol.check_limits()
     check_walker(options.walker, options.detector, real_time=options.real_time)
     if drives:
@@ -110,6 +113,13 @@ def check_walker(walker: str, detector: str, *, real_time: bool) -> None:
         from gait_entrainment_sensors import find_detector
 
         find_detector(detector)
+
+
+def check_numbers(options: argparse.Namespace) -> None:
+    """Turn the options that are numbers into such; raises SettingError."""
+    for name, told in _NUMBERS.items():
+        if (text := getattr(options, name)) is not None:
+            setattr(options, name, told.parse(_option(name), text))
 
 
 def check_robot(protocol: Protocol, *, real_time: bool, armed: bool, unproved: bool) -> None:

@@ -6,11 +6,10 @@
 import json
 from pathlib import Path
 
-from gait_entrainment_bags import BagReader
 from gait_entrainment_bags.figures import draw_figures
 from gait_entrainment_bags.recorded_run import messages_line, read_run, recorded_outcome
-from gait_entrainment_bags.topic_names import WALKER_TIMING
 from gait_entrainment_bags.truth import detection_lines
+from gait_entrainment_bags.walker_timing import walker_timing
 from gait_entrainment_commands.outcome import summary, timing_summary
 
 
@@ -43,24 +42,3 @@ def report(bag: Path, *, figures: bool, as_json: bool) -> None:
     print(f"bag              {bag}")
     for figure in drawn:
         print(f"figure           {figure}")
-
-
-def walker_timing(bag: Path) -> dict[str, dict[str, float]]:
-    """Return what the outcome says of how well the walker kept time, from its last word on it."""
-    with BagReader(bag) as reader:
-        names = [name for name in reader.topics if name.endswith(f"/{WALKER_TIMING}")]
-        told = [message for _, message in reader.decoded(names)][-1:]
-    timing = {}
-    for walker in told:
-        if walker.samples:
-            timing["publish_lateness_ms"] = {
-                name: 1e3 * getattr(walker, f"publish_late_{name}")
-                for name in ("p50", "p99", "worst")
-            }
-        timing["promises"] = {
-            "late_stretches": walker.late_stretches,
-            "late_ms": 1e3 * walker.late,
-            "starved_stretches": walker.starved_stretches,
-            "starved_ms": 1e3 * walker.starved,
-        }
-    return timing

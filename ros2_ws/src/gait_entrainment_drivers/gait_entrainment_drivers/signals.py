@@ -22,6 +22,23 @@ def stop_on_signals() -> None:
         signal.signal(number, signal.default_int_handler)
 
 
+def end_once() -> None:
+    """
+    Raise KeyboardInterrupt at the first of them alone.
+
+    For a process that gets it both from a terminal and from its parent: the second must not break
+    into the end that the first began.
+    """
+
+    def interrupt(_number: int, _frame: object) -> None:
+        for number in STOPPING:
+            signal.signal(number, signal.SIG_IGN)
+        raise KeyboardInterrupt
+
+    for number in STOPPING:
+        signal.signal(number, interrupt)
+
+
 @contextmanager
 def undisturbed() -> Iterator[None]:
     """Let none of them break in: for what is about to end."""

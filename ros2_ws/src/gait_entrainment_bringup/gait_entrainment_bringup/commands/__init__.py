@@ -9,4 +9,5 @@ COMMANDS = {
     "preflight": "the checklist before a session with a real ankle robot",
     "replay": "a bag played to the gait analyzer over ROS 2",
     "run": "the experiment over real ROS 2 nodes, recorded",
+    "session": "the blocks of a session with a person: ordered, blinded, recorded, resumed",
 }

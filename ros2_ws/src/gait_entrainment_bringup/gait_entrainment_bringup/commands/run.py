@@ -5,9 +5,11 @@
 
 import argparse
 import importlib
+import json
 import os
 import shutil
 import threading
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
@@ -55,6 +57,13 @@ DRAWING = ("matplotlib.figure", "matplotlib.backends.backend_agg")
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     add_run_options(parser)
+    add_node_options(parser)
+    parser.add_argument("--no-figures", action="store_true", help="draw no figures")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def add_node_options(parser: argparse.ArgumentParser) -> None:
+    """Add which nodes are not started here, and the page."""
     parser.add_argument(
         "--elsewhere",
         action="append",
@@ -62,10 +71,16 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="do not start this node: it runs on another host (entrain node); repeatable",
     )
-    parser.add_argument("--no-figures", action="store_true", help="draw no figures")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--page", action="store_true", help="show the run in a browser")
     add_page_options(parser)
+
+
+def check_nodes(options: argparse.Namespace, protocol: Protocol) -> None:
+    """Raise UsageError if nodes elsewhere could not be found, or a page not be shown."""
+    if options.elsewhere and "ROS_DOMAIN_ID" not in os.environ:
+        raise UsageError("--elsewhere: set ROS_DOMAIN_ID, to the same number on every host")
+    check_heartbeat(options, protocol)  # of a page that may have been started before
+    options.page_parameters = checked_page(options, protocol) if options.page else {}
 
 
 def run(options: argparse.Namespace) -> int:
@@ -73,26 +88,44 @@ def run(options: argparse.Namespace) -> int:
     # Stopping from outside takes the same path as Ctrl-C: torque first, then the rest.
     stop_on_signals()
     protocol, bag = checked_run(options)
-    if options.elsewhere and "ROS_DOMAIN_ID" not in os.environ:
-        raise UsageError("--elsewhere: set ROS_DOMAIN_ID, to the same number on every host")
-    check_heartbeat(options, protocol)  # of a page that may have been started before
-    options.page_parameters = checked_page(options, protocol) if options.page else {}
+    check_nodes(options, protocol)
     exactly = options.out is not None
     with claimed_domain() as domain, claimed_folder(bag, exactly=exactly) as folder:
-        run_experiment(protocol, folder, domain, options)
+        run_experiment(
+            protocol,
+            folder,
+            domain,
+            options,
+            while_walking=partial(load_report, not options.no_figures),
+            once_recorded=partial(tell, options=options),
+            quiet=options.json,
+        )
     return 0
 
 
 def run_experiment(
-    protocol: Protocol, bag: Path, domain: int, options: argparse.Namespace
+    protocol: Protocol,
+    bag: Path,
+    domain: int,
+    options: argparse.Namespace,
+    *,
+    while_walking: Callable[[], None] = lambda: None,
+    once_recorded: Callable[[Path], None] | None = None,
+    quiet: bool = False,
+    about: Mapping[str, str] | None = None,
 ) -> None:
-    """Start the nodes, conduct the protocol, stop the nodes, report."""
-    figures = not options.no_figures
+    """
+    Start the nodes, conduct the protocol, stop the nodes.
+
+    The bag keeps ``about`` beside what it says of every run.
+    """
     with supervised(
         domain, STOP_ORDER, partial(kept, bag), real_time=options.real_time
     ) as supervisor:
         given = chosen_parameters(protocol, bag, options)
         given[PAGE] |= options.page_parameters
+        custom_data = json.loads(given["bag_recorder"]["custom_data"])
+        given["bag_recorder"]["custom_data"] = json.dumps(custom_data | dict(about or {}))
         arguments = parameter_arguments(given, supervisor.folder)
         nodes = nodes_for(options.walker)
         for node in nodes:
@@ -107,12 +140,11 @@ def run_experiment(
 
         real = not find_driver(protocol.driver).simulated
         silence = PERSON_SILENCE if real else SILENCE_TIMEOUT
-        load = partial(load_report, figures)
         conduct(
             supervisor,
             protocol,
-            load,
-            quiet=options.json,
+            while_walking,
+            quiet=quiet,
             real_time=options.real_time,
             silence=silence,
             heartbeat=not options.heartbeat,
@@ -121,7 +153,14 @@ def run_experiment(
         # No torque is left and the record is closed: in which order the rest ends does not matter.
         supervisor.request_stop(nodes)
         (bag / "protocol.yaml").write_text(write_protocol(protocol))
-        importlib.import_module(REPORT).report(bag, figures=figures, as_json=options.json)
+        if once_recorded:
+            once_recorded(bag)
+
+
+def tell(bag: Path, options: argparse.Namespace) -> None:
+    """Print the outcome of a run, and draw its figures."""
+    figures = not options.no_figures
+    importlib.import_module(REPORT).report(bag, figures=figures, as_json=options.json)
 
 
 def load_report(figures: bool) -> None:

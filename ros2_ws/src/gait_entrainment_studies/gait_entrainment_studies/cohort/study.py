@@ -121,7 +121,8 @@ def run_study(subjects: Subjects, plan: StudyPlan) -> Study:
     for offset in plan.period_offsets:
         if not abs(offset) < shortest:
             raise UsageError(f"period_offset: {offset:g} s; allowed: within {shortest:.3g} s")
-        walk, trains = _conduct(population, noise, plan, offset)
+        torque = np.full(population.size, plan.torque)
+        walk, trains = conduct(population, noise, plan, offset, torque)
         for subject, gait in enumerate(gaits):
             lock = math.nan
             if plan.solvable:
@@ -135,10 +136,15 @@ def run_study(subjects: Subjects, plan: StudyPlan) -> Study:
     return Study(tuple(trials), np.reshape(basins, (-1, 2)))
 
 
-def _conduct(
-    population: Population, noise: Floats, plan: StudyPlan, offset: float
+def conduct(
+    population: Population, noise: Floats, plan: StudyPlan, offset: float, torque: Floats
 ) -> tuple[PopulationWalk, PulseTrains]:
-    """Walk the baseline, plan the pulses from it as a protocol does, walk all of it with them."""
+    """
+    Walk the baseline, plan the pulses from it as a protocol does, walk all of it with them.
+
+    ``noise`` (n,) is that of each walker's push-offs (`noise_for`), ``torque`` (n,) [N m] replaces
+    the plan's, and the pulse period is ``offset`` [s] off each measured stride period.
+    """
     steps = 2 * (plan.baseline + plan.pulses + plan.washout)
     seed = (plan.seed, _TRIAL, nanoseconds(offset) % 2**64)
     noise = noise * step_noise(seed, steps + 2, population.size, plan.hurst)
@@ -148,7 +154,7 @@ def _conduct(
         first_onset=baseline.heel_strikes[-1] + (1 + plan.initial_phase) * measured,
         period=measured + offset,
         count=plan.pulses,
-        torque=np.full(population.size, plan.torque),
+        torque=torque,
         width=plan.width,
     )
     return population.walk(noise[:steps], trains), trains
@@ -162,7 +168,7 @@ def _trial(
     if walk.fell[subject] or walk.flew_off[subject]:
         return Trial(subject, offset, measured, "fell" if walk.fell[subject] else "flew off")
     onsets = trains.first_onset[subject] + np.arange(trains.count) * period
-    events = _events(walk.heel_strikes[:, subject], walk.toe_offs[:, subject])
+    events = events_of(walk.heel_strikes[:, subject], walk.toe_offs[:, subject])
     analysis = analyze(events, [nanoseconds(float(t)) for t in onsets], Side.RIGHT)
     last = analysis.entrainments[-1].verdict if analysis.entrainments else Verdict.UNDECIDED
     lags = np.array([pulse.phase_lag for pulse in analysis.pulses])
@@ -174,10 +180,12 @@ def _trial(
     return Trial(subject, offset, measured, last.name.lower(), fraction, mean_run, lag)
 
 
-def _events(strikes: Floats, toe_offs: Floats) -> list[GaitEvent]:
-    """Events of a walk whose heel strike 0 is the right, perturbed leg's."""
+def events_of(strikes: Floats, toe_offs: Floats) -> list[GaitEvent]:
+    """Return the events of a walk to its end; heel strike 0 is the right, perturbed leg's."""
     events = [GaitEvent(0, EventKind.HEEL_STRIKE, Side.RIGHT, 0)]
     for step, (off, strike) in enumerate(zip(toe_offs, strikes[1:], strict=True), start=1):
+        if not np.isfinite(strike):  # it fell or flew off
+            break
         side = Side.LEFT if step % 2 else Side.RIGHT
         events.append(GaitEvent(nanoseconds(float(off)), EventKind.TOE_OFF, side, step))
         events.append(GaitEvent(nanoseconds(float(strike)), EventKind.HEEL_STRIKE, side, step))

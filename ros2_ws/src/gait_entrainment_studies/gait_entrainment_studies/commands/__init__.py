@@ -4,7 +4,6 @@
 """The commands that this package adds to `entrain`, one module each: name, and what it is for."""
 
 COMMANDS = {
-    "cohort": "the human study's experiment on simulated subjects (extension)",
     "existence": "for which ankle stiffness and leg angle a gait exists",
     "lock": "all phase-locked gaits, stable or not, and the borders of the basin, solved",
     "paper": "every published number and figure beside ours",

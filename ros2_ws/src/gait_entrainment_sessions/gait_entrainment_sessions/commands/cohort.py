@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""entrain cohort: the human study's experiment on simulated subjects."""
+"""entrain cohort: the human study's experiment, or a session file, on simulated subjects."""
 
 import argparse
 import csv
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -13,7 +14,14 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest
 
-from gait_entrainment.settings import Setting
+from gait_entrainment.errors import UsageError
+from gait_entrainment.settings import Setting, settings_of
+from gait_entrainment_commands.drawing import save_figure
+from gait_entrainment_sessions.findings import Findings, StudyFindings
+from gait_entrainment_sessions.rehearsal import rehearse
+from gait_entrainment_sessions.report.figures import draw_verdicts
+from gait_entrainment_sessions.session_file import read_session
+from gait_entrainment_sessions.tables import write_tables
 from gait_entrainment_studies.cohort.figures import draw_cohort
 from gait_entrainment_studies.cohort.study import (
     Study,
@@ -29,12 +37,14 @@ from gait_entrainment_studies.locking.roots import Floats
 DESCRIPTION = (
     "Draw subjects, give each its own stride-to-stride variability, conduct the experiment on "
     "each at several pulse periods relative to its measured stride period, and judge each "
-    "trial as a real one. Not in the paper: an extension."
+    "trial as a real one. Not in the paper: an extension. With a session file the subjects walk "
+    "its blocks instead: the rehearsal of a study, with what would have been found."
 )
 EXAMPLES = """examples:
   entrain cohort --out cohort               19 subjects, nine pulse periods
   entrain cohort --subjects 200 --variation 0.01 0
   entrain cohort --slope -0.02 --period-offset -0.05
+  entrain cohort session.yaml --subjects 12 --out rehearsal
 """
 
 _SUBJECTS = Setting("number of subjects", int, least=2)
@@ -45,6 +55,9 @@ _HEADLINE = -0.05
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
+    parser.add_argument(
+        "session", nargs="?", type=Path, metavar="SESSION.yaml", help="rehearse these blocks"
+    )
     experiment = parser.add_argument_group("experiment")
     question.add_setting(experiment, "subjects", _SUBJECTS, "19")
     question.add_settings(experiment, StudyPlan)
@@ -69,6 +82,8 @@ def run(options: argparse.Namespace) -> int:
     """Draw, conduct, judge, print."""
     drawn = (tuple(getattr(options, item.name)) for item in fields(SubjectDistributions))
     distributions = SubjectDistributions(*drawn)
+    if options.session is not None:
+        return _rehearse(options, distributions)
     texts = options.period_offset or _OFFSETS
     offsets = [_PERIOD_OFFSET.parse("period_offset", text) for text in texts]
     plan = question.chosen(options, StudyPlan, period_offsets=tuple(dict.fromkeys(offsets)))
@@ -86,6 +101,37 @@ def run(options: argparse.Namespace) -> int:
 
     outcome = _outcome(study, subjects, plan, asdict(distributions))
     return question.answer(options, outcome, _summary(outcome), write, "written          ")
+
+
+def _rehearse(options: argparse.Namespace, distributions: SubjectDistributions) -> int:
+    said = [name for name in settings_of(StudyPlan) if getattr(options, name) is not None]
+    if options.period_offset:
+        said.append("period_offset")
+    if other := [name for name in said if name not in ("seed", "hurst")]:
+        raise UsageError(f"{other[0]}: the session file says it; leave the option out")
+    plan = question.chosen(options, StudyPlan)
+    session = read_session(options.session)
+    count = _SUBJECTS.parse("subjects", options.subjects)
+    subjects = draw_subjects(distributions, count, plan.seed)
+    runs = list(rehearse(session, subjects, seed=plan.seed, hurst=plan.hurst))
+    findings = [one for placed in runs for one in Findings.of(placed)]
+    study = StudyFindings.of(findings)
+    blocks = {
+        block.name: dict(Counter(f.verdict for f in findings if f.placed.place.name == block.name))
+        for block in session.blocks
+    }
+    outcome = {"subjects": count, "blocks": blocks, "study": dict(study.rows)}
+    lines = ["| block | verdicts |", "| --- | --- |"]
+    for name, found in blocks.items():
+        told = ", ".join(f"{number} {verdict}" for verdict, number in sorted(found.items()))
+        lines.append(f"| {name} | {told} |")
+    lines += ["", *(f"{name}: {value}" for name, value in study.rows)]
+
+    def write(folder: Path) -> list[Path]:
+        tables = write_tables(runs, folder)
+        return [*tables, *save_figure(draw_verdicts(findings), folder, "verdicts")]
+
+    return question.answer(options, outcome, "\n".join(lines), write, "written          ")
 
 
 def _outcome(

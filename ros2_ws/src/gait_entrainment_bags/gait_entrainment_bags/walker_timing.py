@@ -1,0 +1,30 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""How well the walker of a recorded run kept time, as it said itself."""
+
+from pathlib import Path
+
+from gait_entrainment_bags.reader import BagReader
+from gait_entrainment_bags.topic_names import WALKER_TIMING
+
+
+def walker_timing(bag: Path) -> dict[str, dict[str, float]]:
+    """Return what the outcome says of it, from the walker's last word; {} of a bag without."""
+    with BagReader(bag) as reader:
+        names = [name for name in reader.topics if name.endswith(f"/{WALKER_TIMING}")]
+        told = [message for _, message in reader.decoded(names)][-1:]
+    timing = {}
+    for walker in told:
+        if walker.samples:
+            timing["publish_lateness_ms"] = {
+                name: 1e3 * getattr(walker, f"publish_late_{name}")
+                for name in ("p50", "p99", "worst")
+            }
+        timing["promises"] = {
+            "late_stretches": walker.late_stretches,
+            "late_ms": 1e3 * walker.late,
+            "starved_stretches": walker.starved_stretches,
+            "starved_ms": 1e3 * walker.starved,
+        }
+    return timing

@@ -1,0 +1,104 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""entrain session: the blocks of a session one after the other, each a run with a bag."""
+
+import argparse
+from contextlib import suppress
+from pathlib import Path
+
+from gait_entrainment.errors import UsageError
+from gait_entrainment_bags import BagError
+from gait_entrainment_bringup.commands.run import add_node_options, check_nodes
+from gait_entrainment_bringup.run_options import add_conduct_options, check_numbers, check_robot, check_walker
+from gait_entrainment_bringup.session_run import SessionRun
+from gait_entrainment_drivers.signals import stop_on_signals
+from gait_entrainment_sessions.dataset import complete
+from gait_entrainment_sessions.folder import SessionFolder
+from gait_entrainment_sessions.runs import read_runs
+from gait_entrainment_sessions.session_file import Session, read_session
+from gait_entrainment_sessions.tables import FORMATS, write_tables
+
+DESCRIPTION = (
+    "Conduct the blocks of a session file, with rests between them, into one folder. The same "
+    "command resumes a session that was paused or broke off, at the block where it stopped; "
+    "nothing is overwritten. At a terminal it asks before each block: Enter goes on, p REASON "
+    "pauses, r REASON repeats the block before, n TEXT notes something."
+)
+EXAMPLES = """examples:
+  entrain session session.yaml                 simulated, as fast as it goes: no rest is waited for
+  entrain session session.yaml --real-time --arm
+  entrain session session.yaml --repeat 2 --reason "the treadmill stopped"
+  entrain session unblind STUDY/sub-P01/ses-1  break the seal of a blinded session
+  entrain session export STUDY --out tables --format parquet    of all its sessions together
+"""
+_ACTIONS = {"unblind": "break the seal", "export": "write tables over all runs in a folder"}
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    told = "; ".join(f"{name}: {purpose}" for name, purpose in _ACTIONS.items())
+    parser.add_argument("action", nargs="?", choices=_ACTIONS, help=told)
+    parser.add_argument(
+        "path", type=Path, metavar="SESSION.yaml", help="with an action a folder instead"
+    )
+    add_conduct_options(parser, "folder of the study, or of the tables; default sessions/<study>")
+    add_node_options(parser)
+    parser.add_argument("--repeat", type=int, metavar="BLOCK", help="repeat a block, from 1")
+    parser.add_argument("--reason", default="", help="why, for the ledger")
+    parser.add_argument("--note", default="", metavar="TEXT", help="write it into the ledger")
+    parser.add_argument("--no-rest", action="store_true", help="do not wait between blocks")
+    parser.add_argument(
+        "--format", choices=FORMATS, default="tsv", help="of an export; default tsv"
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Conduct a session, unblind it, or export tables."""
+    if options.action == "unblind":
+        folder = SessionFolder(options.path)
+        for number, name in enumerate(folder.unblind(), start=1):
+            print(f"block {number}          {name}")
+        _print_paths(complete(folder))
+        return 0
+    if options.action == "export":
+        if options.out is None:
+            raise UsageError("--out: missing; allowed: a folder for the tables")
+        _print_paths(write_tables(read_runs(options.path), options.out, options.format))
+        return 0
+    return _conduct(read_session(options.path), options)
+
+
+def _conduct(session: Session, options: argparse.Namespace) -> int:
+    stop_on_signals()
+    check_numbers(options)
+    check_walker(options.walker, options.detector, real_time=options.real_time)
+    options.blinded |= session.blind  # what a page shows, too
+    check_nodes(options, session.blocks[0].protocol)
+    for block in session.blocks:
+        switches = {"armed": options.arm, "unproved": options.unproved}
+        check_robot(block.protocol, real_time=options.real_time, **switches)
+    if options.repeat is not None and not options.reason:
+        raise UsageError("--reason: missing; a repetition needs one")
+    study = options.out or Path("sessions") / session.study
+    folder = SessionFolder.begin(study, session)
+    with folder.held():
+        try:
+            SessionRun(session, folder, options).conduct()
+        except BaseException:
+            with suppress(BagError, OSError):  # why it ended is what counts
+                _complete(folder)
+            raise
+        tables = _complete(folder)
+    print(f"session          {folder.path}")
+    _print_paths(tables)
+    return 0
+
+
+def _complete(folder: SessionFolder) -> list[Path]:
+    return complete(folder) if folder.runs() else []
+
+
+def _print_paths(paths: list[Path]) -> None:
+    for path in paths:
+        print(f"table            {path}")

@@ -1,0 +1,153 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+How many pulses give which chance of a right verdict: the verdict itself, on drawn walks.
+
+A walk has long-range correlated stride periods (fractional Gaussian noise), and either ignores the
+pulses or makes good a share of the distance to its locked phase in each stride, up to a limit. No
+walker of the model is walked: what a person does in between, nobody knows before.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gait_entrainment.conventions import EventKind, Side, nanoseconds
+from gait_entrainment.errors import UsageError
+from gait_entrainment.gait import GaitEvent, Verdict, analyze
+from gait_entrainment.settings import check_settings, setting
+from gait_entrainment_sessions.statistics import Estimate, Floats, share
+from gait_entrainment_studies.cohort.population import step_noise
+
+# Toe-off within the stride, and its scatter [s]; those of docs/analysis.md.
+_TOE_OFF, _SCATTER = 0.68, 0.005
+COUNTS = (10, 20, 25, 30, 40, 50, 60, 80)
+
+
+@dataclass(frozen=True)
+class PowerPlan:
+    """What is known, or presumed, before a session."""
+
+    variation: float = setting(
+        0.02, "coefficient of variation of the stride period", "1", (0.0, 0.2)
+    )
+    hurst: float = setting(
+        0.75, "its correlation: 0.5 white, to below 1", "1", (0.5, 1.0), most_excluded=True
+    )
+    stride: float = setting(1.1, "stride period", "s", (0.3, 5.0))
+    baseline: int = setting(15, "strides before the pulses", "1", (2, 1000))
+    gain: float = setting(
+        0.5, "share of the way to its lock that a walker makes good in a stride", "1", (0.01, 1.0)
+    )
+    limit: float = setting(0.08, "the same, at most, as a share of the stride", "1", (0.001, 1.0))
+    trials: int = setting(100, "walks of each kind", "1", (20, 100_000))
+    seed: int = setting(0, "seed", "1", (0, 2**63 - 1))
+
+    def __post_init__(self) -> None:
+        """Check every field; raises SettingError."""
+        check_settings(self)
+
+
+@dataclass(frozen=True)
+class Power:
+    """Chances after so many pulses."""
+
+    pulses: int
+    entrained: Estimate  # that a walker that locks is called entrained
+    drifting: Estimate  # that one that ignores the pulses is called drifting
+    wrongly: Estimate  # that one that ignores them is called entrained
+
+
+def power(plan: PowerPlan, offset: float, counts: Sequence[int] = COUNTS) -> list[Power]:
+    """
+    Return the chances of the verdict after each number of pulses, ascending.
+
+    ``offset`` is the pulse period minus the stride period [s]. Raises UsageError for one at which
+    no walk of the plan could lock.
+    """
+    if not abs(offset) < plan.limit * plan.stride:
+        raise UsageError(
+            f"period_offset: {offset:g} s; allowed: within {plan.limit * plan.stride:g} s, the "
+            "limit of what a walker makes good in a stride: beyond it nobody locks"
+        )
+    longest = max(counts)
+    found: dict[bool, list[dict[int, Verdict]]] = {True: [], False: []}
+    noise = step_noise(plan.seed, plan.baseline + longest + 2, 2 * plan.trials, plan.hurst).T
+    generators = np.random.default_rng(plan.seed).spawn(2 * plan.trials)
+    for number, (row, generator) in enumerate(zip(noise, generators, strict=True)):
+        free = plan.stride * (1 + plan.variation * row)
+        locks = number % 2 == 0
+        events, onsets = walk(plan, free, offset, longest, locks=locks, generator=generator)
+        found[locks].append(_verdicts(events, onsets))
+
+    def chance(locks: bool, pulses: int, verdict: Verdict) -> Estimate:
+        at = [verdicts.get(pulses, Verdict.UNDECIDED) for verdicts in found[locks]]
+        return share(at.count(verdict), len(at))
+
+    return [
+        Power(
+            n,
+            chance(True, n, Verdict.ENTRAINED),
+            chance(False, n, Verdict.DRIFTING),
+            chance(False, n, Verdict.ENTRAINED),
+        )
+        for n in sorted(counts)
+    ]
+
+
+def _verdicts(events: Sequence[GaitEvent], onsets: Sequence[int]) -> dict[int, Verdict]:
+    """Return the verdict after each pulse, by its number."""
+    analysis = analyze(events, onsets, Side.RIGHT)
+    at = {one.stride: one.verdict for one in analysis.entrainments}
+    return {p.number: at[p.stride] for p in analysis.pulses if p.stride in at}
+
+
+def walk(
+    plan: PowerPlan,
+    free: Floats,
+    offset: float,
+    pulses: int,
+    *,
+    locks: bool,
+    generator: np.random.Generator,
+) -> tuple[list[GaitEvent], list[int]]:
+    """
+    Return events and pulse onsets [ns] of one experiment, of the right leg.
+
+    ``free`` are the stride periods [s] without pulses, ``offset`` is that of the pulse period [s];
+    the first pulse has a random phase.
+    """
+    measured = float(np.mean(free[: plan.baseline]))
+    period = measured + offset
+    first = float(np.sum(free[: plan.baseline])) + generator.uniform() * measured
+    locked = generator.uniform(-0.1, 0.0) * plan.stride  # lag of the lock
+    scatter = _SCATTER * generator.standard_normal(len(free))
+    strikes, toe_offs = [0.0], []
+    for k, alone in enumerate(free):
+        stride, start = float(alone), strikes[-1]
+        if locks and k >= plan.baseline:
+            expected = start + _TOE_OFF * plan.stride
+            nearest = round((expected - first) / period)
+            lag = first + nearest * period - expected
+            wanted = plan.gain * (lag - locked) + offset
+            if 0 <= nearest < pulses:
+                stride += min(max(wanted, -plan.limit * plan.stride), plan.limit * plan.stride)
+        strikes.append(start + stride)
+        toe_offs.append(start + _TOE_OFF * stride + float(scatter[k]))
+    onsets = [nanoseconds(first) + nanoseconds(n * period) for n in range(pulses)]
+    return list(_events(strikes, toe_offs)), onsets
+
+
+def _events(strikes: Sequence[float], toe_offs: Sequence[float]) -> Iterator[GaitEvent]:
+    """Give the events of strides of the right leg; the left one strikes in the middle."""
+    strike, off = EventKind.HEEL_STRIKE, EventKind.TOE_OFF
+    yield GaitEvent(nanoseconds(strikes[0]), strike, Side.RIGHT, 0)
+    for k, toe_off in enumerate(toe_offs):
+        start, end, step = strikes[k], strikes[k + 1], 2 * k + 1
+        middle = (start + end) / 2
+        yield GaitEvent(nanoseconds((start + middle) / 2), off, Side.LEFT, step)
+        yield GaitEvent(nanoseconds(middle), strike, Side.LEFT, step)
+        yield GaitEvent(nanoseconds(toe_off), off, Side.RIGHT, step + 1)
+        yield GaitEvent(nanoseconds(end), strike, Side.RIGHT, step + 1)

@@ -1,0 +1,199 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Whether the data of a run are sound: what a reader of its results should see first."""
+
+import hashlib
+import json
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gait_entrainment.conventions import nanoseconds
+from gait_entrainment_bags import BagReader
+from gait_entrainment_bags.messages import state_of
+from gait_entrainment_bags.reader import bag_files
+from gait_entrainment_bags.recorded_run import RecordedRun
+from gait_entrainment_bags.topic_names import ROBOT_SETUP, ROBOT_STATE, TROUBLE
+from gait_entrainment_bags.walker_timing import walker_timing
+from gait_entrainment_commands.outcome import holes_of, timing_outcome, timing_summary
+
+GOOD, DOUBTFUL, BAD = "good", "doubtful", "bad"
+ORIGIN: tuple[str, ...] = ("commit", "driver", "mode", "seed")  # of the custom data of a bag
+# Pulses whose torque is compared, evenly spread: of a robot read 1000 times a second a whole hour
+# would take minutes. A pulse is looked at from its command to this long after it [s].
+_COMPARED, _AFTER = 30, 0.2
+# Measured torque this far off the commanded one, as a share of the pulse, is told as doubtful.
+_FOLLOWS = 0.1
+
+
+@dataclass(frozen=True)
+class Check:
+    """What was looked at, how it is, and what was found."""
+
+    name: str
+    state: str  # GOOD, DOUBTFUL or BAD
+    finding: str
+
+
+def checks_of(run: RecordedRun, bag: Path) -> list[Check]:
+    """Return what is known of how sound a recorded run is."""
+    with BagReader(bag) as reader:
+        return [
+            _record(run),
+            _holes(run),
+            _events(run),
+            _pulses(run),
+            *_timing(run),
+            _torque(run, reader),
+            _clocks(reader, walker_timing(bag)),
+            _limits(reader),
+            _faults(reader),
+            _analysis(run),
+        ]
+
+
+def _record(run: RecordedRun) -> Check:
+    if run.ended_early:
+        return Check("record", BAD, f"ended early: {run.ended_early}")
+    lost = "nobody counted the lost ones" if run.lost is None else f"{run.lost} lost"
+    state = DOUBTFUL if run.lost is None else (BAD if run.lost else GOOD)
+    return Check("record", state, f"{run.messages} messages, {lost}")
+
+
+def _holes(run: RecordedRun) -> Check:
+    holes = holes_of(run)
+    told = "; ".join(sorted({hole.missing for hole in holes})) or "none"
+    return Check("holes", BAD if holes else GOOD, told)
+
+
+def _events(run: RecordedRun) -> Check:
+    counts = run.analysis.event_counts
+    odd = {
+        "missing": counts.missing,
+        "implausible": counts.implausible,
+        "contradictory": counts.contradictory,
+        "late": counts.late,
+        "repeated": counts.repeated,
+    }
+    told = ", ".join(f"{number} {name}" for name, number in odd.items() if number)
+    state = DOUBTFUL if any(odd.values()) else GOOD
+    return Check("gait events", state, f"{counts.accepted} believed; {told or 'none in doubt'}")
+
+
+def _pulses(run: RecordedRun) -> Check:
+    counts, given = run.analysis.pulse_counts, len(run.onsets)
+    told = f"{counts.placed} placed in strides"
+    if run.protocol is not None:
+        told += f" of {run.protocol.planned.count} planned"
+    if counts.without_lag:
+        told += f", {counts.without_lag} without a toe-off to refer to"
+    whole = run.protocol is None or given == run.protocol.planned.count == counts.placed
+    return Check("pulses", GOOD if whole and not counts.without_lag else DOUBTFUL, told)
+
+
+def _timing(run: RecordedRun) -> Iterator[Check]:
+    for line in timing_summary(timing_outcome(run.timings, run.measured_period)):
+        name, _, told = line.partition("  ")
+        state = DOUBTFUL if "never seen" in line else GOOD
+        yield Check(name.strip(), state, told.strip())
+
+
+def _torque(run: RecordedRun, reader: BagReader) -> Check:
+    """Hold measured against commanded torque, over pulses evenly spread."""
+    topic = _topic(reader, ROBOT_STATE)
+    if topic is None or run.protocol is None or not run.onsets:
+        return Check("torque", DOUBTFUL, "nothing to compare")
+    width = run.protocol.planned.duration
+    step = max(len(run.onsets) // _COMPARED, 1)
+    errors, resting, count = list[float](), 0.0, 0
+    for onset in run.onsets[::step]:
+        end = onset + nanoseconds(width + _AFTER)
+        states = [state_of(m) for _, m in reader.decoded([topic], onset, end)]
+        measured = [s for s in states if not math.isnan(s.measured)]
+        count += bool(measured)
+        late = [s for s in measured if s.commanded == 0 and s.stamp > onset + nanoseconds(width)]
+        errors += [abs(s.measured - s.commanded) for s in measured if s.commanded != 0]
+        resting = max([resting, *(abs(s.measured) for s in late[len(late) // 2 :])])
+    if not errors:
+        return Check("torque", DOUBTFUL, "the robot measures none")
+    mean, height = sum(errors) / len(errors), abs(run.protocol.pulse_torque)
+    told = (
+        f"measured off commanded by {mean:.2f} N m on average while a pulse lasts"
+        f" ({100 * mean / height if height else 0:.0f} % of it), at most {resting:.2f} N m left"
+        f" {_AFTER:g} s after; {count} of {len(run.onsets)} pulses compared"
+    )
+    follows = not height or (mean < _FOLLOWS * height and resting < _FOLLOWS * height)
+    return Check("torque", GOOD if follows else DOUBTFUL, told)
+
+
+def _clocks(reader: BagReader, timing: dict[str, dict[str, float]]) -> Check:
+    mode = reader.custom_data.get("mode", "of unknown mode")
+    promises = timing.get("promises", {})
+    late, starved = promises.get("late_stretches", 0), promises.get("starved_stretches", 0)
+    told = f"{mode}; torque came late in {late:.0f} stretches, not at all in {starved:.0f}"
+    if lateness := timing.get("publish_lateness_ms"):
+        told += f"; samples up to {lateness['worst']:.1f} ms late"
+    return Check("clocks", DOUBTFUL if late or starved or not timing else GOOD, told)
+
+
+def _limits(reader: BagReader) -> Check:
+    topic = _topic(reader, ROBOT_SETUP)
+    setups = [m for _, m in reader.decoded([topic])] if topic else []
+    if not setups:
+        return Check("limits", DOUBTFUL, "the robot did not tell them")
+    last = setups[-1]
+    limits = ", ".join(f"{n} {v:g}" for n, v in zip(last.limit_names, last.limits, strict=True))
+    told = f"{last.driver} {last.device}".strip()
+    armed = f"; armed by {last.armed_by}" if last.armed_by else ""
+    proofs = "".join(f"; {text}" for text in (last.watchdog, last.preflight) if text)
+    return Check("limits", GOOD, f"{told}{armed}{proofs}; {limits}")
+
+
+def _faults(reader: BagReader) -> Check:
+    topic = _topic(reader, TROUBLE)
+    told = [m.message or m.fault for _, m in reader.decoded([topic])] if topic else []
+    return Check("faults", BAD if told else GOOD, "; ".join(dict.fromkeys(told)) or "none")
+
+
+def _analysis(run: RecordedRun) -> Check:
+    if run.differences is None:
+        return Check("analysis", DOUBTFUL, "none was published live to compare with")
+    if run.differences:
+        return Check("analysis", BAD, f"differs from the live one: {'; '.join(run.differences)}")
+    return Check("analysis", GOOD, "anew, the same as live to the last bit")
+
+
+def _topic(reader: BagReader, relative: str) -> str | None:
+    return next((name for name in reader.topics if name.endswith(f"/{relative}")), None)
+
+
+def origin_of(bag: Path) -> dict[str, str]:
+    """Return where a run comes from: versions, commit, driver, and the SHA-256 of its files."""
+    with BagReader(bag) as reader:
+        custom = reader.custom_data
+    told = {key: custom.get(key, "not told") for key in ORIGIN}
+    versions = _loaded(custom.get("versions", "{}"))
+    told["versions"] = ", ".join(f"{name} {number}" for name, number in versions.items())
+    for file in bag_files(bag):
+        digest = hashlib.sha256()
+        with file.open("rb") as data:
+            while piece := data.read(1 << 20):
+                digest.update(piece)
+        told[f"SHA-256 of {file.name}"] = digest.hexdigest()
+    return told
+
+
+def _loaded(text: str) -> dict[str, Any]:
+    try:
+        found = json.loads(text)
+    except ValueError:
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def worst(checks: Sequence[Check]) -> str:
+    """Return the worst state of some checks."""
+    return max((check.state for check in checks), key=[GOOD, DOUBTFUL, BAD].index, default=GOOD)

@@ -1,0 +1,123 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Figures of a report, as SVG inside the page."""
+
+import io
+import math
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from gait_entrainment_commands.drawing import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PINK,
+    SKY,
+    add_legend,
+    new_figure,
+)
+from gait_entrainment_sessions.findings import Findings, StudyFindings
+
+COLOURS = {
+    "entrained": GREEN,
+    "drifting": ORANGE,
+    "lost": PINK,
+    "undecided": GREY,
+    "untestable": SKY,
+}
+_MARKERS = {"entrained": "o", "drifting": "x", "lost": "s", "undecided": "d", "untestable": "^"}
+
+
+def svg_of(figure: Any, name: str) -> str:
+    """Return a figure as an SVG element; ``name`` keeps its ids apart from other figures'."""
+    from matplotlib import rc_context
+
+    text = io.StringIO()
+    with rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
+        figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
+    svg = text.getvalue()
+    svg = re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)
+    return re.sub(r' d="([^"]*)"', lambda path: f' d="{_thinned(path[1])}"', svg)
+
+
+def _thinned(path: str) -> str:
+    """Return a path in hundredths of a point, without the points inside level lines."""
+    lines = re.sub(r"(\.\d\d)\d+", r"\1", path).strip().split("\n")
+    words = [line.split() for line in lines]
+    level = [word[0] == "L" and word[2:] for word in words]
+    inside = (
+        0 < n < len(words) - 1 and level[n] and level[n - 1] == level[n] == level[n + 1]
+        for n in range(len(words))
+    )
+    return " ".join(line for line, left_out in zip(lines, inside, strict=True) if not left_out)
+
+
+def draw_circle(findings: Findings) -> Any:
+    """Draw the phase of each pulse, the first in the middle, the last at the rim."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(4.6, 4.6), layout="constrained")
+    axes = _round(figure)
+    pulses = findings.part.analysis.pulses
+    last = {pulse.number for pulse in pulses[-findings.direction.count :]}
+    most = max((pulse.number for pulse in pulses), default=1)
+    for pulse in pulses:
+        colour = BLUE if pulse.number in last else GREY
+        axes.plot(2 * math.pi * pulse.phase, pulse.number / most, ".", color=colour, ms=5)
+    if findings.direction.count:
+        angle = 2 * math.pi * findings.direction.phase
+        arrow = {"arrowstyle": "-|>", "color": ORANGE, "lw": 2}
+        axes.annotate("", (angle, findings.direction.resultant), (0, 0), arrowprops=arrow)
+    return figure
+
+
+def draw_directions(study: StudyFindings) -> Any:
+    """Draw the mean phase of each person, and their mean."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(4.6, 4.6), layout="constrained")
+    axes = _round(figure)
+    axes.plot(2 * np.pi * np.array(study.phases), np.ones(len(study.phases)), "o", color=BLUE)
+    arrow = {"arrowstyle": "-|>", "color": ORANGE, "lw": 2}
+    angle = 2 * math.pi * study.direction.phase
+    axes.annotate("", (angle, study.direction.resultant), (0, 0), arrowprops=arrow)
+    return figure
+
+
+def _round(figure: Any) -> Any:
+    axes = figure.add_subplot(projection="polar")
+    axes.set_theta_zero_location("N")
+    axes.set_theta_direction(-1)
+    axes.set_ylim(0, 1.08)
+    axes.set_yticks([])
+    axes.set_xticks(
+        np.arange(8) * math.pi / 4,
+        ["0\nheel strike", "", "0.25", "", "0.5", "", "0.75", ""],
+    )
+    return axes
+
+
+def draw_verdicts(findings: Sequence[Findings]) -> Any:
+    """Draw the verdict of each run over its pulse period, a line per person."""
+    persons = sorted({one.placed.place.person for one in findings})
+    figure, axes = new_figure(size=(7.2, 1.6 + 0.28 * len(persons)))
+    axes.axvline(0, color=GREY, ls="--", lw=1.2)
+    for one in findings:
+        verdict = one.verdict
+        axes.plot(
+            one.offset_percent,
+            persons.index(one.placed.place.person),
+            _MARKERS[verdict],
+            color=COLOURS[verdict],
+            label=verdict,
+        )
+    axes.set_yticks(range(len(persons)), persons)
+    axes.set_ylim(len(persons) - 0.5, -0.5)
+    axes.set(xlabel="pulse period minus stride period [% of the stride]")
+    add_legend(axes, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure

@@ -1,0 +1,90 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The recorded runs in a folder: a bag, a session, a study, or bags without a session."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from gait_entrainment.run import JudgedBlock, Run
+from gait_entrainment_bags import BagError
+from gait_entrainment_bags.recorded_run import read_run
+from gait_entrainment_sessions.folder import SessionFolder
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a run is, and of whom and which block it is."""
+
+    bag: Path
+    study: str = ""
+    person: str = ""
+    session: str = ""
+    block: int = 1  # its place in the session, from 1
+    name: str = ""  # of the block; neutral while the session is sealed
+    folder: SessionFolder | None = None
+
+    @property
+    def sealed(self) -> bool:
+        """Whether nothing may be told yet by which the block would be known."""
+        return self.folder is not None and self.folder.sealed
+
+
+@dataclass(frozen=True)
+class PlacedRun:
+    """A run, simulated or recorded, and where it belongs."""
+
+    place: Place
+    run: Run
+
+    @property
+    def parts(self) -> tuple[JudgedBlock, ...]:
+        """The blocks of its protocol, each judged by itself; of a protocol without, all of it."""
+        run = self.run
+        whole = JudgedBlock("", 1, None, run.measured_period, run.pulse_period, run.analysis)
+        return run.blocks or (whole,)
+
+
+def sessions_in(path: Path) -> list[SessionFolder]:
+    """Return the sessions in a folder, which may be one itself."""
+    found = sorted(path.rglob("ledger.tsv")) if path.is_dir() else []
+    return [SessionFolder(file.parent) for file in found]
+
+
+def places_in(path: Path) -> list[Place]:
+    """
+    Return the runs of a bag, a session, a study or a folder of bags, in order.
+
+    Of a session those that stand for its blocks. Raises BagError if there are none.
+    """
+    sessions = sessions_in(path)
+    places = [place for folder in sessions for place in _of_session(folder)]
+    if not sessions:
+        is_bag = path.is_file() or (path / "metadata.yaml").exists() or any(path.glob("*.mcap"))
+        bags = [path] if is_bag else sorted(f.parent for f in path.rglob("metadata.yaml"))
+        places = [Place(bag, name=bag.stem, block=n) for n, bag in enumerate(bags, start=1)]
+    if not places:
+        why = "no block of it is done yet" if sessions else "a bag, a session, or a folder of them"
+        raise BagError(f"{path}: no recorded run: {why}")
+    return places
+
+
+def read_runs(path: Path, *, torques: bool = False) -> Iterator[PlacedRun]:
+    """Read the runs of places_in one by one; ``torques`` as in read_run."""
+    for place in places_in(path):
+        yield PlacedRun(place, read_run(place.bag, torques=torques))
+
+
+def _of_session(folder: SessionFolder) -> Iterator[Place]:
+    plan, names = folder.plan, folder.names()
+    for block, bag in folder.runs().items():
+        yield Place(
+            bag=bag,
+            study=plan["study"],
+            person=plan["person"]["code"],
+            session=plan["session"],
+            block=block,
+            name=names[block - 1],
+            folder=folder,
+        )

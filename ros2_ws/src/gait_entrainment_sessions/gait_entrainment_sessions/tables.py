@@ -1,0 +1,217 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Tidy tables over runs, for statistics software: a row per event, stride, pulse and block.
+
+Each begins with person, session and block. As TSV with a JSON file beside it that says what each
+column is and in which unit, as BIDS has it; or as Parquet with that in the columns' metadata.
+"""
+
+import json
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
+from gait_entrainment.gait import Verdict
+from gait_entrainment_bags import BagError
+from gait_entrainment_sessions.findings import Findings
+from gait_entrainment_sessions.runs import PlacedRun
+
+FORMATS = ("tsv", "parquet")
+Row = tuple[Any, ...]  # a cell per column; NaN and None are n/a
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column: its name, what it says, its unit, and the words that it may hold."""
+
+    name: str
+    meaning: str
+    unit: str = ""
+    words: Sequence[str] = ()
+
+
+_SIDES = tuple(side.name.lower() for side in Side)
+_PLACE = (
+    Column("person", "code of the person"),
+    Column("session", "label of the session"),
+    Column("block", "place of the block in the session, from 1"),
+    Column("name", "name of the block; only its number while the session is blinded"),
+)
+_FROM_START = "since the first heel strike of the perturbed leg"
+TABLES: dict[str, tuple[Column, ...]] = {
+    "events": (
+        Column("onset", f"instant {_FROM_START}", "s"),
+        Column("duration", "how long it lasted", "s"),
+        Column("trial_type", "what happened", words=("heel_strike", "toe_off", "pulse")),
+        Column("side", "leg", words=_SIDES),
+        Column("number", "step of a gait event, number of a pulse"),
+    ),
+    "strides": (
+        Column("stride", "number of the stride of the perturbed leg, from 1"),
+        Column("part", "part of the protocol", words=("baseline", "pulses", "washout")),
+        Column("side", "the perturbed leg", words=_SIDES),
+        Column("start", f"heel strike that starts it, {_FROM_START}", "s"),
+        Column("period", "stride period", "s"),
+        Column("first_step", "its first step, to the other leg's heel strike", "s"),
+        Column("second_step", "its second step", "s"),
+        Column("pulses", "pulses that began in it"),
+    ),
+    "pulses": (
+        Column("pulse", "number of the pulse in the run, from 1"),
+        Column("stride", "stride in which it began"),
+        Column("side", "the perturbed leg", words=_SIDES),
+        Column("onset", f"commanded onset {_FROM_START}", "s"),
+        Column("phase", "place of the onset in its stride, 0 to below 1", "1"),
+        Column("phase_lag", "onset minus the nearest toe-off of the perturbed leg", "s"),
+        Column("unwrapped_lag", "the same, followed across its wraps", "s"),
+        Column("sent_late", "sent onset minus the commanded one", "s"),
+        Column("measured_late", "measured onset minus the commanded one", "s"),
+    ),
+    "blocks": (
+        Column("part", "block of the protocol, if that has several"),
+        Column("verdict", "verdict at the end", words=[v.name.lower() for v in Verdict]),
+        Column("stride_period", "mean stride period before the pulses", "s"),
+        Column("pulse_period", "pulse period as planned", "s"),
+        Column("offset", "pulse period minus stride period, of the stride period", "percent"),
+        Column("variation", "coefficient of variation of the stride before the pulses", "percent"),
+        Column("slope", "slope of the lag over the last 10 pulses", "s"),
+        Column("slope_low", "lower end of its 95 % interval", "s"),
+        Column("slope_high", "upper end", "s"),
+        Column("phase", "mean direction of the last 20 pulses, in strides", "1"),
+        Column("resultant", "their mean resultant length", "1"),
+        Column("kappa", "their concentration (von Mises)", "1"),
+        Column("time_constant", "of an exponential approach of the lag, in pulses", "1"),
+        Column("time_constant_low", "lower end of its 95 % interval", "1"),
+        Column("time_constant_high", "upper end", "1"),
+        Column("locked", "share of the pulses within 5 % of the stride of most of them", "1"),
+        Column("mean_run", "mean length of the spans of such pulses", "1"),
+        Column("holes", "holes of the record"),
+    ),
+}
+
+
+def rows_of(placed: PlacedRun, kind: str) -> Iterator[Row]:
+    """Return the rows of a run in one of TABLES, without person, session and block."""
+    run = placed.run
+    strides = run.strides
+    start = strides[0].start if strides else min((e.stamp for e in run.events), default=0)
+    side = (strides[0].side if strides else Side.RIGHT).name.lower()
+
+    def seconds(stamp: int) -> float:
+        return (stamp - start) / NANOSECONDS_PER_SECOND
+
+    if kind == "events":
+        width = run.protocol.planned.duration if run.protocol else math.nan
+        events = [
+            (e.stamp, 0.0, EventKind(e.kind).name.lower(), Side(e.side).name.lower(), e.step)
+            for e in run.events
+        ]
+        pulses = [(t, width, "pulse", side, n) for n, t in enumerate(run.onsets, start=1)]
+        for stamp, *rest in sorted([*events, *pulses]):
+            yield seconds(stamp), *rest
+    elif kind == "strides":
+        given = [pulse.stride for pulse in run.analysis.pulses]
+        for s in strides:
+            part = "pulses"
+            if not given or s.number < min(given):
+                part = "baseline"
+            elif s.number > max(given):
+                part = "washout"
+            count = given.count(s.number)
+            yield s.number, part, side, seconds(s.start), s.period, *s.step_periods, count
+    elif kind == "pulses":
+        late = {timing.commanded: timing for timing in run.timings}
+        for p in run.analysis.pulses:
+            timing = late.get(p.onset)
+            yield (
+                p.number,
+                p.stride,
+                side,
+                seconds(p.onset),
+                p.phase,
+                p.phase_lag,
+                p.unwrapped_lag,
+                *(_seconds_late(timing, kind) for kind in ("sent", "measured")),
+            )
+    else:
+        yield from (one.row for one in Findings.of(placed))
+
+
+def _seconds_late(timing: Any, kind: str) -> float:
+    late = None if timing is None else timing.late_ms(kind)
+    return math.nan if late is None else late / 1e3
+
+
+def write_tables(runs: Iterable[PlacedRun], out: Path, format_name: str = "tsv") -> list[Path]:
+    """
+    Write each of TABLES over all runs into a folder; files of these names are replaced.
+
+    Returns the paths. Raises BagError if pyarrow is missing for Parquet.
+    """
+    rows: dict[str, list[Row]] = {name: [] for name in TABLES}
+    for placed in runs:
+        place = placed.place
+        head = (place.person or None, place.session or None, place.block, place.name)
+        for name, found in rows.items():
+            found += ((*head, *row) for row in rows_of(placed, name))
+    out.mkdir(parents=True, exist_ok=True)
+    paths = []
+    for name, columns in TABLES.items():
+        path = out / f"{name}.{format_name}"
+        if format_name == "parquet":
+            _write_parquet(path, (*_PLACE, *columns), rows[name])
+        else:
+            write_tsv(path, (*_PLACE, *columns), rows[name])
+            write_sidecar(path.with_suffix(".json"), (*_PLACE, *columns))
+        paths.append(path)
+    return paths
+
+
+def write_tsv(path: Path, columns: Sequence[Column], rows: Iterable[Row]) -> None:
+    """Write a table as BIDS has it: a head, tabs, n/a for what is not known."""
+    with path.open("w", encoding="utf-8") as file:
+        file.write("\t".join(column.name for column in columns) + "\n")
+        for row in rows:
+            file.write("\t".join(map(_text, row)) + "\n")
+
+
+def write_sidecar(path: Path, columns: Sequence[Column]) -> None:
+    """Write what a table's columns mean."""
+    path.write_text(json.dumps({c.name: _about(c) for c in columns}, indent=1) + "\n")
+
+
+def _about(column: Column) -> dict[str, Any]:
+    about: dict[str, Any] = {"Description": column.meaning}
+    if column.unit:
+        about["Units"] = column.unit
+    if column.words:
+        about["Levels"] = {word: word.replace("_", " ") for word in column.words}
+    return about
+
+
+def _text(value: Any) -> str:
+    if value is None or (isinstance(value, float) and not math.isfinite(value)):
+        return "n/a"
+    return repr(value) if isinstance(value, float) else str(value)
+
+
+def _write_parquet(path: Path, columns: Sequence[Column], rows: Sequence[Row]) -> None:
+    try:
+        import pyarrow
+        from pyarrow import parquet
+    except ImportError:
+        raise BagError("Parquet needs pyarrow: pip install pyarrow") from None
+    cells = zip(*rows, strict=True) if rows else [[] for _ in columns]
+    arrays = [
+        pyarrow.array([None if _text(c) == "n/a" else c for c in column]) for column in cells
+    ]
+    fields = []
+    for column, array in zip(columns, arrays, strict=True):
+        about = {"description": column.meaning} | ({"unit": column.unit} if column.unit else {})
+        fields.append(pyarrow.field(column.name, array.type, metadata=about))
+    parquet.write_table(pyarrow.Table.from_arrays(arrays, schema=pyarrow.schema(fields)), path)

@@ -1,0 +1,155 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The folder of a session: resumed where it stopped, never overwritten, sealed and unsealed."""
+
+import json
+
+import pytest
+
+from gait_entrainment_sessions.folder import SessionFolder
+from gait_entrainment_sessions.session_file import SessionError, read_session
+
+BLIND = ("rest: 30", "blind: true")
+
+
+@pytest.fixture
+def begun(write, tmp_path):
+    """Return a function that begins, or resumes, a session."""
+    return lambda *replaced: SessionFolder.begin(tmp_path / "s", read_session(write(*replaced)))
+
+
+def test_a_session_is_resumed_at_the_first_block_that_is_not_done(begun):
+    folder = begun()
+    assert folder.path.parts[-2:] == ("sub-P01", "ses-1")
+    assert folder.next_block() == 1
+    folder.note("begun", 1, "block-01")
+    folder.note("failed", 1, "block-01", "it\tbroke\noff")
+    assert begun().next_block() == 1
+    folder.note("done", 1, "block-01_run-2")
+    assert begun().next_block() == 2
+    assert folder.runs() == {1: folder.path / "bags/block-01_run-2"}
+    assert [entry.text for entry in folder.ledger] == ["", "it broke off", ""]
+    folder.note("repeat", 1, text="why")
+    folder.note("done", 2, "block-02")
+    assert begun().next_block() == 1
+    folder.note("done", 1, "block-01_run-3")
+    assert begun().next_block() is None
+    assert list(folder.runs()) == [1, 2]
+
+
+def test_no_bag_is_overwritten(begun):
+    folder = begun()
+    for name in ("block-02", "block-02_run-2", "block-02_run-3"):
+        bag = folder.new_bag(2)
+        assert bag.name == name
+        bag.mkdir(parents=True)
+
+
+def test_a_line_that_a_crash_cut_short_says_nothing_and_spoils_no_other(begun):
+    folder = begun()
+    folder.note("done", 1, "block-01")
+    with (folder.path / "ledger.tsv").open("a") as file:
+        file.write("2026-11-26T10:00:00\tdone\t2")
+    assert folder.next_block() == 2
+    folder.note("note", text="after it")
+    assert [entry.what for entry in folder.ledger] == ["done", "note"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line"),
+    [("count: 20", "count: 30", 9), ("name: slower", "name: slow", 15), ("left", "right", 7)],
+)
+def test_a_session_that_was_changed_is_not_resumed(begun, old, new, line):
+    begun()
+    with pytest.raises(SessionError) as error:
+        begun((old, new))
+    assert f"session.yaml:{line}: " in str(error.value)
+    assert "when the session began" in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_nor_is_one_whose_protocol_file_was_changed(begun, write):
+    by_file = ("{pulses: {period: 1.9, torque_fraction: 0.1}}", "slower.yaml")
+    protocol = write().parent / "slower.yaml"
+    protocol.write_text("pulses: {period: 1.9}\n")
+    begun(by_file)
+    begun(by_file)
+    protocol.write_text("pulses: {period: 1.8}\n")
+    with pytest.raises(SessionError, match=r"session.yaml:15: protocol: that of slower is not"):
+        begun(by_file)
+
+
+def test_what_else_is_in_the_folder_is_left_alone(begun, tmp_path):
+    (tmp_path / "s/sub-P01/ses-1").mkdir(parents=True)
+    (tmp_path / "s/sub-P01/ses-1/mine").touch()
+    with pytest.raises(SessionError, match="holds something else"):
+        begun()
+
+
+@pytest.mark.parametrize("other", [("code: P01", "code: P02"), ("number: 2", "number: 3")])
+def test_each_person_of_a_study_has_one_number(begun, other):
+    begun()
+    with pytest.raises(SessionError, match=r"person.number: . of P0.; allowed: one number for"):
+        begun(other, ('session: "1"', 'session: "2"'))
+    begun(("code: P01, number: 2", "code: P02, number: 3"))
+
+
+def test_two_do_not_conduct_it_at_once(begun):
+    folder = begun()
+    with (
+        folder.held(),
+        pytest.raises(SessionError, match="another entrain session"),
+        folder.held(),
+    ):
+        pass
+    with folder.held():
+        pass
+
+
+def test_a_sealed_session_tells_no_name_before_it_is_unblinded(begun):
+    folder = begun(BLIND)
+    assert folder.names() == ["block 1", "block 2"]
+    assert folder.plan["blocks"] is None
+    assert "faster" not in (folder.path / "session.json").read_text()
+    assert (folder.path / "key.json").stat().st_mode & 0o222 == 0
+    assert folder.unblind() == ["faster", "slower"]
+    assert folder.names() == folder.unblind() == ["faster", "slower"]
+    assert [entry.what for entry in folder.ledger] == ["unblinded"]
+
+
+def test_no_two_keys_have_the_same_hash(begun, write, tmp_path):
+    first = begun(BLIND).plan["key"]
+    again = SessionFolder.begin(tmp_path / "again", read_session(write(BLIND)))
+    assert again.plan["key"] != first
+
+
+def test_a_key_that_is_not_the_sealed_one_is_refused(begun):
+    folder = begun(BLIND)
+    key = folder.path / "key.json"
+    content = json.loads(key.read_text())
+    content["blocks"].reverse()
+    key.chmod(0o600)
+    key.write_text(json.dumps(content))
+    with pytest.raises(SessionError, match=r"key.json: its SHA-256 is \w{12}..., not \w{12}"):
+        folder.unblind()
+    assert folder.sealed
+    key.unlink()
+    with pytest.raises(SessionError, match=r"key.json: cannot be read"):
+        folder.unblind()
+
+
+def test_a_bag_that_names_another_key_is_told(done):
+    folder = done(BLIND)  # of bags that name none
+    with pytest.raises(SessionError, match=r"not any... as .*block-01 says"):
+        folder.unblind()
+
+
+def test_a_session_that_is_not_blinded_has_no_seal(begun):
+    with pytest.raises(SessionError, match="not blinded"):
+        begun().unblind()
+
+
+def test_what_is_no_session_is_told(tmp_path):
+    with pytest.raises(SessionError, match=r"no session: no readable session.json"):
+        SessionFolder(tmp_path).next_block()

@@ -1,0 +1,105 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Tables over runs say what the analysis says, with units, and words instead of numbers."""
+
+import csv
+import json
+
+import pytest
+from pyarrow import parquet
+
+from gait_entrainment.protocol import read_protocol
+from gait_entrainment.simulation import simulate
+from gait_entrainment_bags import BagError
+from gait_entrainment_bags.recorded_run import read_run
+from gait_entrainment_sessions.runs import Place, PlacedRun, places_in, read_runs
+from gait_entrainment_sessions.tables import TABLES, write_tables
+
+
+def rows(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file, delimiter="\t"))
+
+
+@pytest.fixture(scope="module")
+def bag(request):
+    return request.path.parents[4] / "bags/paper_example"
+
+
+def test_tables_are_what_the_analysis_says(bag, tmp_path):
+    run = read_run(bag)
+    paths = write_tables(read_runs(bag), tmp_path)
+    assert [path.name for path in paths] == [f"{name}.tsv" for name in TABLES]
+    strides, pulses = rows(tmp_path / "strides.tsv"), rows(tmp_path / "pulses.tsv")
+    assert [float(row["period"]) for row in strides] == [s.period for s in run.strides]
+    assert [row["part"] for row in strides] == ["baseline"] * 15 + ["pulses"] * 49 + [
+        "washout"
+    ] * 16
+    assert {row["side"] for row in strides} == {"right"}
+    assert sum(int(row["pulses"]) for row in strides) == 50
+    lags = [pulse.phase_lag for pulse in run.analysis.pulses]
+    assert [float(row["phase_lag"]) for row in pulses] == lags
+    assert {row["trial_type"] for row in rows(tmp_path / "events.tsv")} == {
+        "heel_strike",
+        "toe_off",
+        "pulse",
+    }
+    (block,) = rows(tmp_path / "blocks.tsv")
+    assert (block["verdict"], block["person"]) == ("entrained", "n/a")
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_each_column_is_explained_beside_and_in_parquet(bag, tmp_path, name):
+    runs = list(read_runs(bag))
+    write_tables(runs, tmp_path)
+    write_tables(runs, tmp_path, "parquet")
+    about = json.loads((tmp_path / f"{name}.json").read_text())
+    table = parquet.read_table(tmp_path / f"{name}.parquet")
+    texts = rows(tmp_path / f"{name}.tsv")
+    assert list(about) == table.column_names == list(texts[0])
+    for field in table.schema:
+        told = about[field.name]
+        metadata = field.metadata
+        assert metadata[b"description"].decode() == told["Description"]
+        assert metadata.get(b"unit", b"").decode() == told.get("Units", "")
+        words = told.get("Levels")
+        assert not words or {row[field.name] for row in texts} <= set(words)
+    for row, text in zip(table.to_pylist(), texts, strict=True):
+        shown = ["n/a" if value is None else str(value) for value in row.values()]
+        assert shown == list(text.values())
+
+
+def test_runs_of_a_study_come_by_person_session_and_block(done, tmp_path):
+    done()
+    done(("code: P01, number: 2", "code: P02, number: 3"))
+    found = [(p.person, p.session, p.block, p.name) for p in places_in(tmp_path / "study")]
+    assert found == [
+        ("P01", "1", 1, "faster"),
+        ("P01", "1", 2, "slower"),
+        ("P02", "1", 1, "faster"),
+        ("P02", "1", 2, "slower"),
+    ]
+    sealed = done(("rest: 30", "blind: true"), study="blind")
+    assert [place.name for place in places_in(sealed.path)] == ["block 1", "block 2"]
+
+
+def test_each_block_of_a_protocol_has_a_row_of_its_own(tmp_path):
+    protocol = read_protocol("blocks:\n- {name: faster}\n- {name: slower, pulses: {period: 1.95}}")
+    write_tables([PlacedRun(Place(tmp_path), simulate(protocol))], tmp_path / "out")
+    found = rows(tmp_path / "out/blocks.tsv")
+    assert [(row["part"], row["verdict"]) for row in found] == [
+        ("faster", "entrained"),
+        ("slower", "drifting"),
+    ]
+    assert [round(float(row["offset"]), 2) for row in found] == [-2.59, 0.87]
+
+
+def test_a_folder_without_runs_is_told(done, tmp_path):
+    with pytest.raises(BagError, match="no recorded run: a bag, a session"):
+        places_in(tmp_path)
+    folder = done()
+    folder.note("repeat", 1)
+    folder.note("repeat", 2)
+    with pytest.raises(BagError, match="no block of it is done yet"):
+        places_in(folder.path)

@@ -1,0 +1,120 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A session through the nodes: killed, resumed, valid as BIDS, unblinded, stopped by a key."""
+
+import json
+import os
+import pty
+import re
+import subprocess
+import termios
+import time
+from pathlib import Path
+
+import pytest
+from harness import PATIENCE
+
+from gait_entrainment_bags import BagReader
+from gait_entrainment_sessions.folder import SessionFolder
+
+EXAMPLE = Path(__file__).parents[2] / "examples/sessions/blinded_sham.yaml"
+FOLDER = "sub-P03/ses-1"
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory):
+    """Return the blinded example with few strides, in a folder of its own."""
+    text = EXAMPLE.read_text().replace("count: 50", "count: 4").replace("side: left", "washout: 1")
+    path = tmp_path_factory.mktemp("session") / "session.yaml"
+    path.write_text(re.sub("washout: 1", "washout: 1\n  baseline: 3", text))
+    return path
+
+
+def entrain(*words, **more):
+    command = ["entrain", *map(str, words)]
+    return subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **more
+    )
+
+
+def ended(process):
+    out, err = process.communicate(timeout=PATIENCE)
+    return process.returncode, out, err
+
+
+@pytest.fixture(scope="module")
+def conducted(short):
+    """Return the folder of a session whose process was killed in its first block, then resumed."""
+    study = short.parent / "study"
+    first = entrain("session", short, "--out", study, stdin=subprocess.DEVNULL)
+    assert first.stdout.readline().startswith("block 1 of 2")
+    first.kill()
+    first.communicate(timeout=PATIENCE)
+    code, out, err = ended(entrain("session", short, "--out", study, stdin=subprocess.DEVNULL))
+    assert (code, err) == (0, "")
+    assert f"session          {study / FOLDER}" in out
+    return SessionFolder(study / FOLDER)
+
+
+def test_a_session_that_was_killed_is_resumed_at_its_block(conducted):
+    what = [(entry.what, entry.block) for entry in conducted.ledger]
+    assert what == [("begun", "1"), ("begun", "1"), ("done", "1"), ("begun", "2"), ("done", "2")]
+    assert list(conducted.runs()) == [1, 2]
+
+
+def test_bags_name_the_key_and_no_block(conducted):
+    for number, bag in conducted.runs().items():
+        with BagReader(bag) as reader:
+            told = reader.custom_data
+        assert (told["person"], told["block_name"]) == ("P03", f"block {number}")
+        assert told["session_key"] == conducted.plan["key"]
+        assert not re.search(
+            "sham|name: pulses", " ".join(told.values()).replace("blinded_sham", "")
+        )
+
+
+def test_the_folder_is_a_valid_bids_data_set(conducted):
+    command = ["bids-validator-deno", "--format", "json", str(conducted.path.parents[1])]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE)
+    issues = json.loads(done.stdout)["issues"]["issues"]
+    errors = [issue for issue in issues if issue["severity"] == "error"]
+    assert errors == []
+    assert len(list(conducted.path.glob("motion/*_motion.tsv"))) == 2
+
+
+def test_a_sealed_session_is_unblinded_once_it_is_asked_for(conducted):
+    assert "block 2" in (conducted.path / "strides.tsv").read_text()
+    code, out, err = ended(entrain("session", "unblind", conducted.path))
+    assert (code, err) == (0, "")
+    names = [line.split()[-1] for line in out.splitlines() if line.startswith("block ")]
+    assert sorted(names) == ["pulses", "sham"]
+    rows = (conducted.path / "blocks.tsv").read_text().splitlines()[1:]
+    assert [row.split("\t")[3] for row in rows] == names
+
+
+def test_tables_are_exported_over_all_of_a_study(conducted, tmp_path):
+    words = ("session", "export", conducted.path.parents[1], "--out", tmp_path)
+    code, out, err = ended(entrain(*words, "--format", "parquet"))
+    assert (code, err) == (0, "")
+    assert out.count("table ") == len(list(tmp_path.glob("*.parquet"))) == 4
+
+
+def test_the_space_bar_stops_a_block(short):
+    ours, theirs = pty.openpty()
+    study = short.parent / "stopped"
+    process = entrain("session", short, "--out", study, "--real-time", stdin=theirs)
+    os.write(ours, b"\n")  # the answer to what is next
+    while not process.stdout.readline().endswith("block 1\n"):
+        pass
+    deadline = time.monotonic() + PATIENCE
+    while termios.tcgetattr(theirs)[3] & termios.ICANON:  # until keys are taken at once
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    os.write(ours, b" ")
+    code, _, err = ended(process)
+    os.close(ours)
+    os.close(theirs)
+    assert code == 1
+    assert "entrain session: block 1: stopped by the space bar" in err
+    assert SessionFolder(study / FOLDER).ledger[-1].what == "failed"
