@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from gait_entrainment.commands import main
+from gait_entrainment_commands import main
 from gait_entrainment_sessions.folder import SessionFolder
 from gait_entrainment_sessions.session_file import read_session
 
@@ -24,7 +24,7 @@ BAG = ROOT / "bags/paper_example"
 PHONE, DESKTOP = (390, 844), (1280, 900)
 SESSION = """\
 study: pilot
-person: {code: CODE, mass: 72, leg_length: 0.91}
+person: {code: CODE, number: NUMBER, mass: 72, leg_length: 0.91}
 blocks: [{name: first}, {name: second}]
 """
 
@@ -36,7 +36,7 @@ def pages(tmp_path_factory):
     for code, study in (("P01", "study"), ("P02", "study"), ("P03", "sealed")):
         blind = "blind: true\n" if study == "sealed" else ""
         file = folder / f"{code}.yaml"
-        file.write_text(blind + SESSION.replace("CODE", code))
+        file.write_text(blind + SESSION.replace("CODE", code).replace("NUMBER", code[1:]))
         session = SessionFolder.begin(folder / study, read_session(file))
         for number in (1,) if code == "P02" else (1, 2):
             bag = session.new_bag(number)

@@ -185,7 +185,7 @@ class SessionRun:
             for pulse in _delivered(bag, protocol)
         ]
         if said.session_pulses != unsaid.session_pulses:
-            planned, left = protocol.pulses.count, said.session_pulses - len(given)
+            planned, left = protocol.planned.count, said.session_pulses - len(given)
             if planned > left:
                 raise SessionError(
                     f"limits.session_pulses: {planned} more pulses; allowed: {max(left, 0)}, "
@@ -212,7 +212,7 @@ def _delivered(bag: Path, protocol: Protocol) -> list[tuple[float, float]]:
             found = reader.decoded(topics) if topics else ()
             return [(pulse.torque, pulse.duration) for _, pulse in found]
     except BagError:
-        return [(protocol.pulse_torque, protocol.pulses.width)] * protocol.pulses.count
+        return [(protocol.pulse_torque, protocol.planned.duration)] * protocol.planned.count
 
 
 def _conduct(parent: int, answer: Any, keyboard: int, conduct: Callable[..., None]) -> None:

@@ -11,7 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from gait_entrainment.outcome import holes_of
+from gait_entrainment.gait import Verdict
+from gait_entrainment.run import JudgedBlock
+from gait_entrainment_commands.outcome import holes_of
 from gait_entrainment_sessions import statistics
 from gait_entrainment_sessions.runs import PlacedRun
 from gait_entrainment_sessions.statistics import Border, Direction, Estimate, Locking
@@ -21,9 +23,10 @@ Rows = list[tuple[str, str]]  # what, and how it is, for people
 
 @dataclass(frozen=True)
 class Findings:
-    """The statistics of one run."""
+    """The statistics of one run, or of one block of its protocol if that has several."""
 
     placed: PlacedRun
+    part: JudgedBlock
     variation_percent: float  # of the strides before the pulses
     slope: Estimate  # [s per stride]
     direction: Direction
@@ -32,18 +35,23 @@ class Findings:
     holes: int
 
     @classmethod
-    def of(cls, placed: PlacedRun) -> "Findings":
-        """Compute them."""
-        run = placed.run
-        pulses = statistics.last_pulses(run.analysis)
+    def of(cls, placed: PlacedRun) -> list["Findings"]:
+        """Compute them, for each block of the protocol."""
+        return [cls._of_part(placed, part) for part in placed.parts]
+
+    @classmethod
+    def _of_part(cls, placed: PlacedRun, part: JudgedBlock) -> "Findings":
+        run, begin = placed.run, part.first_stride
+        pulses = statistics.last_pulses(part.analysis)
         final = pulses[-statistics.SLOPE_PULSES :]
-        first = min((p.stride for p in run.analysis.pulses), default=math.inf)
-        baseline = [s.period for s in run.strides if s.number < first]
+        first = min((p.stride for p in part.analysis.pulses), default=math.inf)
+        baseline = [s.period for s in run.strides if begin <= s.number < first]
         variation = math.nan
         if len(baseline) > 1:
             variation = 100 * float(np.std(baseline, ddof=1) / np.mean(baseline))
         return cls(
             placed=placed,
+            part=part,
             variation_percent=variation,
             slope=statistics.slope([p.stride for p in final], [p.unwrapped_lag for p in final]),
             direction=statistics.direction(
@@ -52,19 +60,31 @@ class Findings:
             time_constant=statistics.convergence(
                 [p.number for p in pulses], [p.unwrapped_lag for p in pulses]
             ),
-            locking=statistics.locking(pulses, run.measured_period),
+            locking=statistics.locking(pulses, part.measured_period),
             holes=len(holes_of(run)),
         )
 
     @property
+    def verdict(self) -> str:
+        """The verdict at its end."""
+        found = self.part.analysis.entrainments[-1:]
+        return (found[0].verdict if found else Verdict.UNDECIDED).name.lower()
+
+    @property
+    def offset_percent(self) -> float:
+        """Pulse period minus stride period, in percent of the latter; NaN if unknown."""
+        return 100 * (self.part.pulse_period / self.part.measured_period - 1)
+
+    @property
     def row(self) -> tuple[Any, ...]:
         """The cells of the table of blocks."""
-        run, runs = self.placed.run, self.locking.runs
+        part, runs = self.part, self.locking.runs
         return (
-            self.placed.verdict,
-            run.measured_period,
-            run.pulse_period,
-            self.placed.offset_percent,
+            part.name or None,
+            self.verdict,
+            part.measured_period,
+            part.pulse_period,
+            self.offset_percent,
             self.variation_percent,
             *self.slope,
             self.direction.phase,
@@ -113,8 +133,8 @@ class StudyFindings:
             by_person[one.placed.place.person].append(one)
         persons, phases = [], []
         for code, own in by_person.items():
-            offsets = [(f.placed.offset_percent, f.placed.verdict) for f in own]
-            held = [f for f in own if f.placed.verdict == "entrained"]
+            offsets = [(f.offset_percent, f.verdict) for f in own]
+            held = [f for f in own if f.verdict == "entrained"]
             told = [v for _, v in offsets if v in ("entrained", "drifting", "lost")]
             faster, slower = (statistics.border(offsets, sign) for sign in (-1, 1))
             persons.append(PersonFindings(code, faster, slower, len(held), len(told)))

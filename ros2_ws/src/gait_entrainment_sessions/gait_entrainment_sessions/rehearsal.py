@@ -11,12 +11,14 @@ walks each block from a fresh start: no order of blocks matters to them, and non
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from gait_entrainment.conventions import Side, nanoseconds
 from gait_entrainment.gait import analyze
-from gait_entrainment.outcome import Run
+from gait_entrainment.protocol import PulsePlan
+from gait_entrainment.run import Run
 from gait_entrainment_sessions.runs import Place, PlacedRun
 from gait_entrainment_sessions.session_file import Block, Session, SessionError
 from gait_entrainment_studies.cohort.population import Population, noise_for
@@ -58,6 +60,7 @@ def rehearse(
                 measured_period=period - offset,
                 pulse_period=period,
                 analysis=analyze(events, stamps, Side.RIGHT),
+                blocks=(),
             )
             code = f"S{subject + 1:02d}"
             place = Place(session.file, session.study, code, "1", number, block.name)
@@ -67,10 +70,17 @@ def rehearse(
 def _plan(block: Block, seed: int, hurst: float) -> tuple[StudyPlan, float]:
     """Return what the cohort's experiment calls a block, and its pulse period's offset [s]."""
     protocol, pulses = block.protocol, block.protocol.pulses
-    if pulses.period_offset is None:
+    # What the cohort's experiment has no word for, as it is by itself.
+    unsaid: dict[str, Any] = {
+        name: getattr(PulsePlan, name)
+        for name in ("sweep", "jitter", "shape", "rising", "catch_share", "catch_pulses")
+    }
+    simple = replace(pulses, **unsaid) == pulses
+    simple = simple and not (protocol.blocks or protocol.open_ended)
+    if pulses.period_offset is None or not simple:
         raise SessionError(
-            f"{block.place}: pulses: no period_offset; allowed in a rehearsal: pulses at a fixed "
-            "offset from each person's stride period"
+            f"{block.place}: pulses: no rehearsal of these; allowed: square pulses at a fixed "
+            "period_offset, in a protocol without blocks of its own, all parts counted in strides"
         )
     plan = StudyPlan(
         width=pulses.width,

@@ -7,8 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from gait_entrainment.gait import Verdict
-from gait_entrainment.outcome import Run
+from gait_entrainment.run import JudgedBlock, Run
 from gait_entrainment_bags import BagError
 from gait_entrainment_bags.recorded_run import read_run
 from gait_entrainment_sessions.folder import SessionFolder
@@ -40,15 +39,11 @@ class PlacedRun:
     run: Run
 
     @property
-    def verdict(self) -> str:
-        """The verdict at its end."""
-        found = self.run.analysis.entrainments[-1:]
-        return (found[0].verdict if found else Verdict.UNDECIDED).name.lower()
-
-    @property
-    def offset_percent(self) -> float:
-        """Pulse period minus stride period, in percent of the latter; NaN if unknown."""
-        return 100 * (self.run.pulse_period / self.run.measured_period - 1)
+    def parts(self) -> tuple[JudgedBlock, ...]:
+        """The blocks of its protocol, each judged by itself; of a protocol without, all of it."""
+        run = self.run
+        whole = JudgedBlock("", 1, None, run.measured_period, run.pulse_period, run.analysis)
+        return run.blocks or (whole,)
 
 
 def sessions_in(path: Path) -> list[SessionFolder]:

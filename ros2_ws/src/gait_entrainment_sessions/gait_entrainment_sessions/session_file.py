@@ -36,6 +36,7 @@ from gait_entrainment.protocol import (
     read_protocol,
     write_protocol,
 )
+from gait_entrainment.protocol.protocol import BLOCK_FIELDS
 from gait_entrainment.robot import DeviceLimits, LimitError, find_driver
 from gait_entrainment.settings import Setting, SettingError, setting, settings_of
 from gait_entrainment_sessions.order import ORDERS, block_order
@@ -150,7 +151,10 @@ def _said_in(root: Any, name: str) -> Iterator[tuple[str, tuple[object, str]]]:
         for inner, item in inside:
             field = str(key.value) + (f".{inner.value}" if inner else "")
             where = f"{name}:{(inner or key).start_mark.line + 1}"
-            yield field, (yaml.SafeLoader("").construct_object(item, deep=True), where)
+            value = yaml.SafeLoader("").construct_object(item, deep=True)
+            if isinstance(item, yaml.SequenceNode) and field != "blocks":
+                value = ", ".join(map(str, value))  # as read_protocol takes it
+            yield field, (value, where)
 
 
 class _Reader:
@@ -198,10 +202,19 @@ class _Reader:
         values = self._settings(Block, {n: v for n, v in given.items() if n != "protocol"}, "")
         if "name" not in values:
             raise SessionError(f"{place}: name: missing; allowed: a plain name")
-        own = self._piece(given["protocol"][0]).said if "protocol" in given else {}
+        own = self._piece(given["protocol"][0]) if "protocol" in given else _Piece(None, {})
         told = {"name": (values["name"], place), **told}
-        over = {key: value for key, value in told.items() if key not in common.said} | own
-        protocol = self._read(common.source, over)
+        over = {key: value for key, value in told.items() if key not in common.said} | own.said
+        source = common.source
+        if "blocks" in own.said:
+            if clash := next((key for key in common.said if key in BLOCK_FIELDS), ""):
+                raise SessionError(
+                    f"{common.said[clash][1]}: {clash}: does not go with the blocks that the "
+                    f"protocol of {values['name']} has of its own; say it in them"
+                )
+            source, over = own.source, told | common.said
+            over = {key: value for key, value in over.items() if key not in own.said}
+        protocol = self._read(source, over)
         driver = find_driver(protocol.driver)
         if not driver.simulated and "limits.torque" not in told:
             raise SessionError(
@@ -210,7 +223,7 @@ class _Reader:
                 "for this person [N m]"
             )
         try:
-            protocol.limits.check_pulse(protocol.pulse_torque, protocol.pulses.width)
+            protocol.check_limits()
         except LimitError as error:
             raise SessionError(f"{place}: {error}") from None
         return Block(values["name"], values.get("rest", rest), protocol, place)

@@ -73,6 +73,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("measured_late", "measured onset minus the commanded one", "s"),
     ),
     "blocks": (
+        Column("part", "block of the protocol, if that has several"),
         Column("verdict", "verdict at the end", words=[v.name.lower() for v in Verdict]),
         Column("stride_period", "mean stride period before the pulses", "s"),
         Column("pulse_period", "pulse period as planned", "s"),
@@ -105,7 +106,7 @@ def rows_of(placed: PlacedRun, kind: str) -> Iterator[Row]:
         return (stamp - start) / NANOSECONDS_PER_SECOND
 
     if kind == "events":
-        width = run.protocol.pulses.width if run.protocol else math.nan
+        width = run.protocol.planned.duration if run.protocol else math.nan
         events = [
             (e.stamp, 0.0, EventKind(e.kind).name.lower(), Side(e.side).name.lower(), e.step)
             for e in run.events
@@ -138,7 +139,7 @@ def rows_of(placed: PlacedRun, kind: str) -> Iterator[Row]:
                 *(_seconds_late(timing, kind) for kind in ("sent", "measured")),
             )
     else:
-        yield Findings.of(placed).row
+        yield from (one.row for one in Findings.of(placed))
 
 
 def _seconds_late(timing: Any, kind: str) -> float:

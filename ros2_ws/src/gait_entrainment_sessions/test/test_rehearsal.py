@@ -8,9 +8,9 @@ import json
 import numpy as np
 import pytest
 
-from gait_entrainment.commands import main
-from gait_entrainment.outcome import outcome_of
 from gait_entrainment.simulation import simulate
+from gait_entrainment_commands import main
+from gait_entrainment_commands.outcome import outcome_of
 from gait_entrainment_sessions.findings import Findings, StudyFindings
 from gait_entrainment_sessions.rehearsal import rehearse
 from gait_entrainment_sessions.session_file import SessionError, read_session
@@ -36,14 +36,14 @@ def test_steady_subjects_do_what_the_simulation_does(write):
         assert found["verdict"] == expected["verdict"]
         assert found["stride_period"] == pytest.approx(expected["stride_period"], abs=1e-6)
         assert found["final_phase_lag"] == pytest.approx(expected["final_phase_lag"], abs=1e-4)
-    study = StudyFindings.of([Findings.of(one) for one in runs])
+    study = StudyFindings.of([found for one in runs for found in Findings.of(one)])
     assert len(study.persons) == 2
 
 
 def test_pulses_without_an_offset_are_refused(write):
     session = read_session(write())
     subjects = Subjects((session.blocks[0].protocol.walker,) * 2, np.full(2, 0.01), 0)
-    with pytest.raises(SessionError, match=r"session.yaml:15: pulses: no period_offset"):
+    with pytest.raises(SessionError, match=r"session.yaml:15: pulses: no rehearsal of these"):
         list(rehearse(session, subjects, seed=0, hurst=0.5))
 
 

@@ -46,8 +46,25 @@ def test_a_protocol_may_be_a_file_beside_the_session(write):
         read_session(path)
 
 
+SLOWER = "{pulses: {period: 1.9, torque_fraction: 0.1}}"
+
+
+def test_a_protocol_may_have_blocks_and_lists_of_its_own(write):
+    shaped = "{pulses: {period: 1.9, shape: samples, samples: [0, 1, 0], catch_pulses: [3, 5]}}"
+    pulses = read_session(write((SLOWER, shaped))).blocks[1].protocol.pulses
+    assert (pulses.samples, pulses.catch_pulses) == ("0, 1, 0", "3, 5")
+    common = ("\n  pulses:\n    count: 20\n    torque: 9.0", "")
+    own = "{blocks: [{name: a}, {name: b, washout: 3}]}"
+    protocol = read_session(write((SLOWER, own), common)).blocks[1].protocol
+    assert [block.name for block in protocol.blocks] == ["a", "b"]
+    assert protocol.side is Side.LEFT
+    assert protocol.walker.mass == 72
+    with pytest.raises(SessionError, match=r":9: pulses.count: does not go with the blocks"):
+        read_session(write((SLOWER, own)))
+
+
 MISTAKES = [
-    ("count: 20", "count: x", 9, "pulses.count: 'x'; allowed: a whole number from 1"),
+    ("count: 20", "count: x", 9, "pulses.count: 'x'; allowed: a whole number from 0"),
     ("torque: 9.0", "torqe: 9", 10, "pulses.torqe: unknown field; allowed: "),
     ("torque: 9.0", "torque: 16", 12, "torque: 16 N m is outside the limit"),
     ("side: left", "limits: {torque: 4}", 7, "limits.torque: limits are the person's"),

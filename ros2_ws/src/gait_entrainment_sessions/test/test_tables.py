@@ -9,9 +9,11 @@ import json
 import pytest
 from pyarrow import parquet
 
+from gait_entrainment.protocol import read_protocol
+from gait_entrainment.simulation import simulate
 from gait_entrainment_bags import BagError
 from gait_entrainment_bags.recorded_run import read_run
-from gait_entrainment_sessions.runs import places_in, read_runs
+from gait_entrainment_sessions.runs import Place, PlacedRun, places_in, read_runs
 from gait_entrainment_sessions.tables import TABLES, write_tables
 
 
@@ -80,6 +82,17 @@ def test_runs_of_a_study_come_by_person_session_and_block(done, tmp_path):
     ]
     sealed = done(("rest: 30", "blind: true"), study="blind")
     assert [place.name for place in places_in(sealed.path)] == ["block 1", "block 2"]
+
+
+def test_each_block_of_a_protocol_has_a_row_of_its_own(tmp_path):
+    protocol = read_protocol("blocks:\n- {name: faster}\n- {name: slower, pulses: {period: 1.95}}")
+    write_tables([PlacedRun(Place(tmp_path), simulate(protocol))], tmp_path / "out")
+    found = rows(tmp_path / "out/blocks.tsv")
+    assert [(row["part"], row["verdict"]) for row in found] == [
+        ("faster", "entrained"),
+        ("slower", "drifting"),
+    ]
+    assert [round(float(row["offset"]), 2) for row in found] == [-2.59, 0.87]
 
 
 def test_a_folder_without_runs_is_told(done, tmp_path):

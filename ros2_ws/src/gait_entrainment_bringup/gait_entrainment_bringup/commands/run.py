@@ -63,7 +63,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def add_node_options(parser: argparse.ArgumentParser) -> None:
-    """Add which nodes this command does not start."""
+    """Add which nodes are not started here, and the page."""
     parser.add_argument(
         "--elsewhere",
         action="append",
@@ -76,7 +76,7 @@ def add_node_options(parser: argparse.ArgumentParser) -> None:
 
 
 def check_nodes(options: argparse.Namespace, protocol: Protocol) -> None:
-    """Raise UsageError if nodes elsewhere could not be found, or a page could not be shown."""
+    """Raise UsageError if nodes elsewhere could not be found, or a page not be shown."""
     if options.elsewhere and "ROS_DOMAIN_ID" not in os.environ:
         raise UsageError("--elsewhere: set ROS_DOMAIN_ID, to the same number on every host")
     check_heartbeat(options, protocol)  # of a page that may have been started before

@@ -77,9 +77,9 @@ def run(options: argparse.Namespace) -> int:
 def _conduct(session: Session, options: argparse.Namespace) -> int:
     stop_on_signals()
     check_numbers(options)
-    options.blinded |= session.blind  # on the page, too
-    check_nodes(options, session.blocks[0].protocol)
     check_walker(options.walker, options.detector, real_time=options.real_time)
+    options.blinded |= session.blind  # what a page shows, too
+    check_nodes(options, session.blocks[0].protocol)
     for block in session.blocks:
         switches = {"armed": options.arm, "unproved": options.unproved}
         check_robot(block.protocol, real_time=options.real_time, **switches)

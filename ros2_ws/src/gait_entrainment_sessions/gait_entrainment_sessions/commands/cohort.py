@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest
 
-from gait_entrainment.drawing import save_figure
 from gait_entrainment.errors import UsageError
 from gait_entrainment.settings import Setting, settings_of
+from gait_entrainment_commands.drawing import save_figure
 from gait_entrainment_sessions.findings import Findings, StudyFindings
 from gait_entrainment_sessions.rehearsal import rehearse
 from gait_entrainment_sessions.report.figures import draw_verdicts
@@ -114,10 +114,10 @@ def _rehearse(options: argparse.Namespace, distributions: SubjectDistributions) 
     count = _SUBJECTS.parse("subjects", options.subjects)
     subjects = draw_subjects(distributions, count, plan.seed)
     runs = list(rehearse(session, subjects, seed=plan.seed, hurst=plan.hurst))
-    findings = [Findings.of(placed) for placed in runs]
+    findings = [one for placed in runs for one in Findings.of(placed)]
     study = StudyFindings.of(findings)
     blocks = {
-        block.name: dict(Counter(one.verdict for one in runs if one.place.name == block.name))
+        block.name: dict(Counter(f.verdict for f in findings if f.placed.place.name == block.name))
         for block in session.blocks
     }
     outcome = {"subjects": count, "blocks": blocks, "study": dict(study.rows)}

@@ -12,13 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from gait_entrainment.conventions import nanoseconds
-from gait_entrainment.outcome import holes_of, timing_outcome, timing_summary
 from gait_entrainment_bags import BagReader
 from gait_entrainment_bags.messages import state_of
 from gait_entrainment_bags.reader import bag_files
 from gait_entrainment_bags.recorded_run import RecordedRun
 from gait_entrainment_bags.topic_names import ROBOT_SETUP, ROBOT_STATE, TROUBLE
 from gait_entrainment_bags.walker_timing import walker_timing
+from gait_entrainment_commands.outcome import holes_of, timing_outcome, timing_summary
 
 GOOD, DOUBTFUL, BAD = "good", "doubtful", "bad"
 ORIGIN: tuple[str, ...] = ("commit", "driver", "mode", "seed")  # of the custom data of a bag
@@ -87,10 +87,10 @@ def _pulses(run: RecordedRun) -> Check:
     counts, given = run.analysis.pulse_counts, len(run.onsets)
     told = f"{counts.placed} placed in strides"
     if run.protocol is not None:
-        told += f" of {run.protocol.pulses.count} planned"
+        told += f" of {run.protocol.planned.count} planned"
     if counts.without_lag:
         told += f", {counts.without_lag} without a toe-off to refer to"
-    whole = run.protocol is None or given == run.protocol.pulses.count == counts.placed
+    whole = run.protocol is None or given == run.protocol.planned.count == counts.placed
     return Check("pulses", GOOD if whole and not counts.without_lag else DOUBTFUL, told)
 
 
@@ -106,7 +106,7 @@ def _torque(run: RecordedRun, reader: BagReader) -> Check:
     topic = _topic(reader, ROBOT_STATE)
     if topic is None or run.protocol is None or not run.onsets:
         return Check("torque", DOUBTFUL, "nothing to compare")
-    width = run.protocol.pulses.width
+    width = run.protocol.planned.duration
     step = max(len(run.onsets) // _COMPARED, 1)
     errors, resting, count = list[float](), 0.0, 0
     for onset in run.onsets[::step]:

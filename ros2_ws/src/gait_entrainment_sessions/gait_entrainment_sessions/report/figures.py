@@ -11,7 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from gait_entrainment.drawing import BLUE, GREEN, GREY, ORANGE, PINK, SKY, add_legend, new_figure
+from gait_entrainment_commands.drawing import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PINK,
+    SKY,
+    add_legend,
+    new_figure,
+)
 from gait_entrainment_sessions.findings import Findings, StudyFindings
 
 COLOURS = {
@@ -54,7 +63,7 @@ def draw_circle(findings: Findings) -> Any:
 
     figure = Figure(figsize=(4.6, 4.6), layout="constrained")
     axes = _round(figure)
-    pulses = findings.placed.run.analysis.pulses
+    pulses = findings.part.analysis.pulses
     last = {pulse.number for pulse in pulses[-findings.direction.count :]}
     most = max((pulse.number for pulse in pulses), default=1)
     for pulse in pulses:
@@ -99,9 +108,9 @@ def draw_verdicts(findings: Sequence[Findings]) -> Any:
     figure, axes = new_figure(size=(7.2, 1.6 + 0.28 * len(persons)))
     axes.axvline(0, color=GREY, ls="--", lw=1.2)
     for one in findings:
-        verdict = one.placed.verdict
+        verdict = one.verdict
         axes.plot(
-            one.placed.offset_percent,
+            one.offset_percent,
             persons.index(one.placed.place.person),
             _MARKERS[verdict],
             color=COLOURS[verdict],

@@ -15,10 +15,10 @@ from pathlib import Path
 
 from jinja2 import Environment, PackageLoader
 
-from gait_entrainment.outcome import outcome_of, summary
 from gait_entrainment.protocol import write_protocol
 from gait_entrainment_bags.figures import run_figures
 from gait_entrainment_bags.recorded_run import RecordedRun, read_run
+from gait_entrainment_commands.outcome import outcome_of, summary
 from gait_entrainment_sessions.findings import Findings, Rows, StudyFindings, shown
 from gait_entrainment_sessions.report import figures
 from gait_entrainment_sessions.report.checks import Check, checks_of, origin_of, worst
@@ -45,10 +45,10 @@ class RunSection:
     origin: dict[str, str]
     sealed: bool
     # Empty while the session is sealed.
-    findings: Findings | None = None
+    findings: list[Findings] = field(default_factory=list)
     protocol: str = ""
     outcome: str = ""
-    statistics: Rows = field(default_factory=list)
+    statistics: list[tuple[str, Rows]] = field(default_factory=list)  # by block of the protocol
     figures: list[tuple[str, str]] = field(default_factory=list)  # title, SVG
 
     @property
@@ -74,7 +74,7 @@ def write_report(path: Path, out: Path) -> None:
     section = partial(_section, drawn=len(places) <= DRAWN_AT_MOST)
     with ProcessPoolExecutor(mp_context=multiprocessing.get_context("fork")) as pool:
         sections = list((pool.map if len(places) > 1 else map)(section, places))
-    findings = [section.findings for section in sections if section.findings]
+    findings = [one for section in sections for one in section.findings]
     study = StudyFindings.of(findings) if len(findings) > 1 else None
     told = {
         "title": sections[0].place.study or path.resolve().name,
@@ -109,19 +109,22 @@ def _section(place: Place, *, drawn: bool) -> RunSection:
         findings=findings,
         protocol="not told" if run.protocol is None else write_protocol(run.protocol),
         outcome=summary(outcome_of(run)),
-        statistics=_statistics(findings),
+        statistics=[(one.part.name, _statistics(one)) for one in findings],
         figures=_drawn(run, findings) if drawn else [],
     )
 
 
-def _drawn(run: RecordedRun, findings: Findings) -> list[tuple[str, str]]:
+def _drawn(run: RecordedRun, findings: list[Findings]) -> list[tuple[str, str]]:
     drawn = run_figures(run)
-    drawn["circle"] = figures.draw_circle(findings)
-    salt = f"{findings.placed.place.bag}"
+    for one in findings:
+        name = f"circle {one.part.name}".strip()
+        drawn[name] = figures.draw_circle(one)
+    salt = f"{findings[0].placed.place.bag}"
     return [
-        (title, figures.svg_of(drawn[name], salt + name))
-        for name, title in _TITLES.items()
-        if name in drawn
+        (title + name.removeprefix(key), figures.svg_of(drawn[name], salt + name))
+        for key, title in _TITLES.items()
+        for name in drawn
+        if name.startswith(key)
     ]
 
 
