@@ -168,7 +168,7 @@ def parameters(
             ),
         },
         DISPLAY: _drawn(protocol),
-        PAGE: {"record": str(bag.absolute())},
+        PAGE: {"record": "" if bag is None else str(bag.absolute())},
     }
     latency = 0.0
     if walker != "simulated":
