@@ -336,6 +336,8 @@ class Shown:
             seat = "You are the operator."
         elif not self.may_act:
             seat = "You look on. STOP works here too."
+        elif not self.page.seat.holder:
+            seat = "Nobody is the operator yet."
         else:
             away = "" if self.page.seat.watched else " and is away"
             seat = f"Another browser is the operator{away}. STOP works here too."
