@@ -123,3 +123,16 @@ def test_who_may_not_is_told_so_in_one_line(tmp_path):
     assert (taken.returncode, taken.stdout) == (2, "")
     assert f"--port: {served.port} is taken" in taken.stderr
     assert len(taken.stderr.splitlines()) == 1
+
+
+def test_the_web_server_is_loaded_only_where_it_runs():
+    program = (
+        "import sys; from gait_entrainment_commands import main\n"
+        "for words in (['--help'], ['run', '--help'], ['page', '--help']):\n"
+        "    try: main(words)\n"
+        "    except SystemExit: pass\n"
+        "loaded = {'nicegui', 'fastapi', 'uvicorn', 'rclpy'} & sys.modules.keys()\n"
+        "sys.exit(', '.join(loaded) or 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

@@ -137,7 +137,7 @@ def test_parameters_are_given_to_every_node(real_time):
 def test_whoever_walks_plays_the_role_to_the_experiment(walker):
     given = parameters(DEFAULT_PROTOCOL, Path("/bag"), real_time=True, walker=walker)
     role, lead = given["experiment"]["walker"], given["experiment"]["longest_lookahead"]
-    assert set(given) == {*nodes_for(walker), DISPLAY}
+    assert set(given) == {*nodes_for(walker), DISPLAY, PAGE}
     assert role in given["experiment"]["participants"]
     # What is known of a sensed walker is older by the detector's latency.
     assert (lead == 0.3) is (walker == "simulated")

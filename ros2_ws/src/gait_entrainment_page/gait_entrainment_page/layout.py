@@ -336,6 +336,8 @@ class Shown:
             seat = "You are the operator."
         elif not self.may_act:
             seat = "You look on. STOP works here too."
+        elif not self.page.seat.holder:
+            seat = "Nobody is the operator yet."
         else:
             away = "" if self.page.seat.watched else " and is away"
             seat = f"Another browser is the operator{away}. STOP works here too."
@@ -375,7 +377,9 @@ class Shown:
         if recorder and "messages" in recorder.values:
             rows.append(("messages", recorder.values["messages"]))
         if self.page.record:
-            free = shutil.disk_usage(self.page.record).free
+            record = Path(self.page.record)  # which the recorder may not have made yet
+            place = next(path for path in (record, *record.parents) if path.exists())
+            free = shutil.disk_usage(place).free
             little = ": little" if free < _LITTLE else ""
             rows.append(("disk", f"{free / 1e9:.1f} GB free{little}"))
         rows += [
