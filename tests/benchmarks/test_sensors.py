@@ -15,7 +15,7 @@ import pytest
 TESTS = Path(__file__).parents[2] / "ros2_ws/src/gait_entrainment_sensors/test"
 sys.path.insert(0, str(TESTS))
 
-from public_data import belt, foot_rates, foot_reference  # noqa: E402
+from public_data import belt, children, foot_rates, foot_reference  # noqa: E402
 from scoring import score  # noqa: E402
 
 from gait_entrainment.conventions import EventKind, Side  # noqa: E402
@@ -95,6 +95,14 @@ def test_a_real_belt():
     print(
         f"\nbelt: {len(strikes)} strikes of 46, strides {min(strides):.3f} to {max(strides):.3f} s"
     )
+
+
+def test_numbering_of_children():
+    total = refused = 0
+    for found in children():
+        total += len(found)
+        refused += len(found) - len(number(found, "")[0])
+    print(f"\n50 children, every tenth event lost: {refused} of {total} detections refused")
 
 
 @pytest.mark.parametrize(("kind", "detector"), CHAINS)

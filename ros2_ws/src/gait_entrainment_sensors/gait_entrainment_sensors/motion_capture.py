@@ -61,9 +61,10 @@ def read_c3d(
     path: Path, names: Mapping[str, str] | None = None, *, plates: bool = True
 ) -> MotionCapture:
     """
-    Read a C3D file; ``names`` says which of its markers is left_heel, right_toe, ..., pelvis;
-    ``plates`` whether its force plates are wanted.
+    Read a C3D file.
 
+    ``names`` says which of its markers is left_heel, right_toe, ..., pelvis; ``plates`` whether
+    its force plates are wanted.
     The sign of vertical forces is taken such that feet press the plates down.
     Raises RecordingError if it is none, or lacks a marker that is named.
     """
