@@ -26,7 +26,7 @@ _gait_entrainment_source() {
     source "$root/ros2_ws/install/local_setup.bash"
     [ -z "$nounset" ] || set -u
     _gait_entrainment_prepend PATH "$root/ros2_ws/install/gait_entrainment_drivers/bin"
-    _gait_entrainment_prepend PATH "$root/ros2_ws/install/gait_entrainment/bin"
+    _gait_entrainment_prepend PATH "$root/ros2_ws/install/gait_entrainment_commands/bin"
     _gait_entrainment_prepend PATH "$root/ros2_ws/install/gait_entrainment_nodes/lib/gait_entrainment_nodes"
 
     # Nobody else on the network hears a run, and the other way round, unless the user says so.

@@ -19,6 +19,7 @@ PROGRAMS = (
     "Makefile",
     "Dockerfile",
     ".ci/*",
+    "*/scripts/entrain",
 )
 # What must be the first line of a file to have its meaning.
 FIRST_LINES = ("#!", "# syntax=")

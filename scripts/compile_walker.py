@@ -15,12 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
-from gait_entrainment.commands import main
 from gait_entrainment.conventions import nanoseconds
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.walker import Walker
 from gait_entrainment.walker.compiled import CACHE_FOLDER
 from gait_entrainment.walker.model import make_model
+from gait_entrainment_commands import main
 from gait_entrainment_studies.walks import walk
 
 if __name__ == "__main__":

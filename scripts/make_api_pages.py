@@ -25,7 +25,8 @@ from pdoc import doc_ast
 ROOT = Path(__file__).resolve().parents[1]
 PUBLIC = (
     "gait_entrainment.simulation",
-    "gait_entrainment.outcome",
+    "gait_entrainment.run",
+    "gait_entrainment_commands.outcome",
     "gait_entrainment.protocol",
     "gait_entrainment.parameters",
     "gait_entrainment.gait",

@@ -24,7 +24,7 @@ import numpy as np
 from matplotlib.image import imread
 from PIL import Image
 
-from gait_entrainment.commands import main as entrain
+from gait_entrainment_commands import main as entrain
 from gait_entrainment_studies.commands.results import COMMAND, FIGURE, TEMPLATE
 from gait_entrainment_studies.paper.figures import draw_figures
 

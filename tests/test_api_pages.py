@@ -22,7 +22,7 @@ def pages(tmp_path_factory):
 
 
 def test_fields_have_their_units(pages):
-    assert "mean stride period before the pulses [s]" in pages["gait_entrainment/outcome.html"]
+    assert "mean stride period before the pulses [s]" in pages["gait_entrainment/run.html"]
 
 
 @pytest.mark.parametrize(
@@ -38,4 +38,4 @@ def test_pages_show_an_example(pages, page, program):
 
 
 def test_nothing_else_is_public(pages):
-    assert not [page for page in pages if "commands" in page or "walker" in page]
+    assert not [page for page in pages if "options" in page or "walker" in page]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from gait_entrainment.commands import main, make_parser
+from gait_entrainment_commands import main, make_parser
 
 ROOT = Path(__file__).parents[1]
 BAG = ROOT / "bags" / "paper_example"

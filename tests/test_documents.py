@@ -4,8 +4,11 @@
 """docs/architecture.md says what topics.py says, and names files and packages that exist."""
 
 import re
+from enum import Enum
+from operator import attrgetter
 from pathlib import Path
 
+from gait_entrainment.protocol import DEFAULT_PROTOCOL, FIELDS
 from gait_entrainment_nodes.messaging import topics
 
 ROOT = Path(__file__).parents[1]
@@ -22,9 +25,9 @@ QUALITIES = {
 }
 
 
-def rows(first_column):
+def rows(first_column, page=PAGE):
     """Return the rows of the table whose head begins with a word, cell by cell."""
-    table = re.search(rf"^\| {first_column} \|.*\n\|.*\n((?:\|.*\n)+)", PAGE, re.MULTILINE)[1]
+    table = re.search(rf"^\| {first_column} \|.*\n\|.*\n((?:\|.*\n)+)", page, re.MULTILINE)[1]
     return [[cell.strip(" `") for cell in line.split("|")[1:-1]] for line in table.splitlines()]
 
 
@@ -59,6 +62,18 @@ def test_packages_are_those_of_the_workspace():
     assert {row[0] for row in rows("package")} == {
         p.parent.name for p in SOURCES.glob("*/package.xml")
     }
+
+
+def test_fields_of_a_protocol_are_all_there_with_their_defaults():
+    page = (ROOT / "docs/protocols.md").read_text()
+    said = {name: default for name, default, _ in rows("field", page)}
+    fields = [name for name in FIELDS if not name.startswith(("walker.", "limits."))]
+    assert set(said) == set(fields)
+    for name in fields:
+        default = attrgetter(name)(DEFAULT_PROTOCOL)
+        told = default.name.lower() if isinstance(default, Enum) else default
+        told = "" if told is None else f"{told:g}" if isinstance(told, float) else str(told)
+        assert said[name].removesuffix(" s") == told, name
 
 
 def test_files_to_look_into_exist():

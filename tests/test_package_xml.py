@@ -32,7 +32,11 @@ KEYS = {
 }
 # rosdep knows no key for them; what needs them says so, or its tests are skipped.
 # controller_manager_msgs is used by the driver for ros2_control where it is installed.
-WITHOUT_KEY = {"controller_manager_msgs", "distributed", "ezc3d", "pyarrow"}
+# The page's server comes with nicegui; foxglove is asked for where it is wanted.
+WITHOUT_KEY = {
+    *("controller_manager_msgs", "distributed", "ezc3d", "pyarrow"),
+    *("fastapi", "foxglove", "nicegui", "uvicorn"),
+}
 # What is needed and not imported, and by what.
 NOT_IMPORTED = {
     "python3-msgpack": "python-can, for the bus of processes on one host",

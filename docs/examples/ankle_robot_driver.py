@@ -21,6 +21,8 @@ from gait_entrainment.robot import (
 from gait_entrainment_drivers.conformance.bench import DriverBench, run_check
 from gait_entrainment_drivers.conformance.checks import CHECKS
 
+STEP = 1_000_000  # of the torque during a pulse [ns]
+
 
 @dataclass(frozen=True)
 class Options:
@@ -55,16 +57,16 @@ class SquareRobot(AnkleRobot):
     def schedule(self, train):
         if self.stopped:
             raise DeviceError("stopped: close and configure first")
-        self.train = train
+        self.train = self.train.followed_by(train) if self.train else train
 
     def cancel(self):
         self.train = None
 
     def promise(self, until):
         begin, self.promised, train = self.promised, until, self.train
-        numbers = range(train.count) if train else ()
-        edges = {edge for n in numbers for edge in (train.onset(n), train.end(n))}
-        times = [begin, *sorted(edge for edge in edges if begin < edge < until)]
+        pulses = train.pulses if train else ()
+        steps = {step for p in pulses for step in (*range(p.onset, p.end, STEP), p.end)}
+        times = [begin, *sorted(step for step in steps if begin < step < until)]
         torques = [train.torque_at(time) if train else 0.0 for time in times]
         onsets = train.onsets_within(begin, until) if train else ()
         for time, torque in zip(times, torques, strict=True):

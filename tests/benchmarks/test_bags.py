@@ -163,7 +163,7 @@ def one_hour(folder: Path) -> Path:
 def measured(*arguments: object) -> tuple[float, float]:
     """Run a command; return how long it took [s] and the memory that it needed at most [MB]."""
     code = (
-        "import re, sys; from gait_entrainment.commands import main; code = main(sys.argv[1:]);"
+        "import re, sys; from gait_entrainment_commands import main; code = main(sys.argv[1:]);"
         "status = open('/proc/self/status').read();"
         "print(int(re.search(r'VmHWM:\\s+(\\d+)', status)[1]) / 1e3, file=sys.stderr);"
         "sys.exit(code)"

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from gait_entrainment.commands import main
+from gait_entrainment_commands import main
 from gait_entrainment_studies.paper.comparison import compare, explain
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "scripts"))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from gait_entrainment.commands import main
+from gait_entrainment_commands import main
 from gait_entrainment_studies.commands.results import COMMAND, TEMPLATE
 
 PAGE = (Path(__file__).parents[2] / "docs/results.md").read_text()

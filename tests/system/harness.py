@@ -69,7 +69,7 @@ def protocol_of(*options: str) -> Protocol:
     """Return the protocol that these options of the command line name."""
     import argparse
 
-    from gait_entrainment.commands.protocol_options import add_protocol_options, chosen_protocol
+    from gait_entrainment_commands.protocol_options import add_protocol_options, chosen_protocol
 
     parser = argparse.ArgumentParser()
     add_protocol_options(parser)

@@ -11,10 +11,13 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from std_srvs.srv import Trigger
 
+from gait_entrainment.conventions import Side
+from gait_entrainment.robot import Pulse, PulseTrain
 from gait_entrainment_bags import BagReader
 from gait_entrainment_msgs.action import DeliverPulseTrain, RunProtocol
 from gait_entrainment_msgs.msg import Progress
 from gait_entrainment_msgs.srv import Ready, StartRun
+from gait_entrainment_nodes.messaging.goals import goal_of
 from gait_entrainment_nodes.messaging.topics import (
     ANKLE_TORQUE,
     PULSES,
@@ -101,8 +104,7 @@ def conducted(tmp_path_factory):
 def test_second_protocol_second_train_and_reset_are_refused_in_mid_run(conducted):
     handle = conducted.start()
     assert not conducted.nodes.conduct().accepted
-    train = DeliverPulseTrain.Goal(run=1, side=1, period=1.0, count=1, torque=5.0, duration=0.1)
-    train.first_onset.sec = 2**31 - 1
+    train = goal_of(1, PulseTrain(Side.RIGHT, (Pulse((2**31 - 1) * 10**9, 5.0, 0.1),)))
     refused = conducted.probe.send_goal(
         DeliverPulseTrain, "perturbator/deliver_pulse_train", train
     )

@@ -11,9 +11,9 @@ import os
 import pytest
 from harness import QUICK, entrain_run, protocol_of, stamp_of
 
-from gait_entrainment.outcome import outcome_of
 from gait_entrainment.simulation import simulate
 from gait_entrainment_bags import BagReader
+from gait_entrainment_commands.outcome import outcome_of
 
 RATE = 1000
 # Near the locked phase, so that few pulses suffice; the verdict needs 25 of them.

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import pytest
 
-from gait_entrainment.commands import main
 from gait_entrainment.conventions import Side
 from gait_entrainment.robot import DeviceError, LimitError, PulseTrain, find_driver
+from gait_entrainment_commands import main
 from gait_entrainment_drivers.conformance.bench import DriverBench, Tolerances, run_check
 from gait_entrainment_drivers.conformance.checks import CHECKS
 from gait_entrainment_drivers.proof import proof_of
@@ -60,7 +60,7 @@ def pushed(robot, torque):
     robot.arm()
     robot.begin(time.time_ns())
     onset = time.time_ns() + 50_000_000
-    robot.schedule(PulseTrain(Side.RIGHT, onset, 1.0, 1, torque, 0.4))
+    robot.schedule(PulseTrain.periodic(Side.RIGHT, onset, 1.0, 1, torque, 0.4))
     states, give_up = [], time.monotonic() + 10
     while not states or abs(states[-1].measured - torque) > 0.05 * abs(torque):
         assert time.monotonic() < give_up, robot.faults

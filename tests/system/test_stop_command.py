@@ -10,6 +10,8 @@ import subprocess
 from harness import entrain_run
 from test_drivers import entrain
 
+from gait_entrainment_drivers.stop_channel import StopListener
+
 
 def test_stop_from_the_command_line_ends_a_run(tmp_path):
     with entrain_run(tmp_path / "bag", "--real-time", "--baseline=2") as run:
@@ -25,6 +27,18 @@ def test_stop_that_finds_nobody_says_so():
     code, out, err = entrain(None, "stop")
     assert (code, out) == (1, "")
     assert "no robot is driven by this machine" in err
+
+
+def test_stop_is_sent_before_anything_of_the_project_is_loaded():
+    listener = StopListener("somebody")
+    broken = {"PATH": os.environ["PATH"]}  # without PYTHONPATH there is no project
+    done = subprocess.run(["entrain", "stop"], capture_output=True, text=True, env=broken)
+    assert done.returncode == 1
+    assert "gait_entrainment_commands" in done.stderr
+    assert len(listener.requests()) == 1
+    subprocess.run(["entrain", "stop", "--help"], capture_output=True, check=True)
+    assert not listener.requests()
+    listener.close()
 
 
 def test_stop_needs_no_home_and_no_ros():

@@ -68,10 +68,10 @@ class PneumaticAnkleRobot(AnkleRobot):
         self._states = []
 
     def schedule(self, train: PulseTrain) -> None:
-        """Take over a train."""
+        """Take over a train, to follow those before."""
         if self._stopped:
             raise DeviceError("stopped: close and configure first")
-        self._train = train
+        self._train = self._train.followed_by(train) if self._train else train
 
     def cancel(self) -> None:
         """Vent."""
@@ -118,11 +118,5 @@ class PneumaticAnkleRobot(AnkleRobot):
         train = self._train
         if train is None:
             return 0.0
-        torque = 0.0
-        latest = train.latest(instant)
-        for number in range(max(latest - 1, 0), latest + 1):
-            on = min(instant, train.end(number)) - max(
-                instant - self._filling, train.onset(number)
-            )
-            torque += train.torque * max(on, 0) / self._filling
-        return torque
+        steps = range(instant - self._filling, instant, STEP)
+        return sum(train.torque_at(step + STEP // 2) for step in steps) / len(steps)

@@ -59,7 +59,7 @@ def push(robot):
     robot.arm()
     robot.begin(time.time_ns())
     onset = time.time_ns() + 50_000_000
-    robot.schedule(PulseTrain(Side.RIGHT, onset, 1.0, 1, 8.0, 0.4))
+    robot.schedule(PulseTrain.periodic(Side.RIGHT, onset, 1.0, 1, 8.0, 0.4))
 
 
 def test_a_fault_of_the_robot_is_named():

@@ -20,7 +20,4 @@ setup(
     install_requires=["setuptools"],
     extras_require={"test": ["pytest"]},  # so that colcon test runs pytest
     zip_safe=False,
-    entry_points={
-        "console_scripts": ["entrain = gait_entrainment.__main__:main"],
-    },
 )

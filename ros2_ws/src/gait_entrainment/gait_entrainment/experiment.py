@@ -5,23 +5,33 @@
 The conductor of an experiment: a pure function from received stamps to pulses and promises.
 
 It is told which gait events happened and up to which instant all of them are known, and answers
-with a horizon, the promise to request no pulse that begins earlier. It plans the pulses one
-stride ahead, at the strike that starts the last baseline stride. So a robot has its lead time, and
-a walker that never computes past the promises is never held back by the very event that everybody
+with a horizon, the promise to request no pulse that begins earlier. Pulses at a period it plans
+one stride ahead, at the strike that starts the last baseline stride; a pulse by phase at the
+strike that starts its stride, whose length it predicts. So a robot has its lead time, and a
+walker that never computes past the promises is never held back by the very event that everybody
 is waiting for.
 """
 
 import enum
 import math
 import statistics
+from collections import deque
 from dataclasses import dataclass
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, nanoseconds
 from gait_entrainment.errors import EntrainmentError
 from gait_entrainment.gait import GaitEvent, GaitLimits, StrideTracker
 from gait_entrainment.gait.strides import PLACES
-from gait_entrainment.protocol import Protocol, ProtocolError
+from gait_entrainment.protocol import Block, Protocol, ProtocolError
 from gait_entrainment.robot import PulseTrain
+
+# A stride is predicted to last as long as the mean of so many before it, as the timing of
+# exoskeletons by heel strikes does: more would follow a change of the gait too slowly.
+PREDICTED_FROM = 5
+# Strides whose coefficient of variation says whether a gait is steady, and how many may go by
+# before it has to be.
+STEADY_STRIDES = 10
+_MOST_UNSTEADY = 200
 
 
 class Part(enum.IntEnum):
@@ -33,6 +43,7 @@ class Part(enum.IntEnum):
     WASHOUT = 3
     FINISHED = 4
     FAILED = 5
+    REST = 6
 
 
 @dataclass(frozen=True)
@@ -45,6 +56,29 @@ class Horizon:
 
 class GaitError(EntrainmentError):
     """The gait is not one that torque may follow; the message says why, with the figures."""
+
+
+@dataclass
+class BlockRun:
+    """One block as it is conducted."""
+
+    plan: Block
+    number: int  # from 1
+    start: int | None = None  # heel strike that starts its first stride [ns]
+    strides_before: int = 0  # of the perturbed leg in the run
+    doubted_before: int = 0  # events that were not believed
+    baseline: int = 0  # strides that it lasted; 0 while it does
+    train: PulseTrain | None = None  # planned so far
+    # Mean stride period over the baseline [s] and its standard error; NaN if not measured.
+    measured_period: float = math.nan
+    measured_period_error: float = math.nan
+    pulse_period: float = math.nan  # the first one as planned [s]; NaN without a plan, or by phase
+    end: int | None = None  # heel strike that ends its last stride [ns]
+
+    @property
+    def pulses_left(self) -> int:
+        """Pulses that are not planned yet."""
+        return self.plan.pulses.count - (len(self.train.pulses) if self.train else 0)
 
 
 class Conductor:
@@ -64,23 +98,25 @@ class Conductor:
         limits: GaitLimits | None = None,
     ) -> None:
         self.protocol = protocol
-        self.train: PulseTrain | None = None  # planned when the last baseline stride starts
-        # Mean stride period over the baseline [s] and its standard error; NaN if not measured.
-        self.measured_period = math.nan
-        self.measured_period_error = math.nan
+        self.blocks = [BlockRun(protocol.sequence[0], 1)]  # those that have begun
         self._limits = limits or GaitLimits()
         own = self._limits.scaled(protocol.walker.time_scale)
         self._tracker = StrideTracker(protocol.side, own)
-        self._periods: list[float] = []  # of the baseline strides [s]
+        self._recent: deque[float] = deque(maxlen=STEADY_STRIDES)  # latest stride periods [s]
+        self._periods = self._baseline_periods()
         self._longest_lookahead = longest_lookahead
-        self._lookahead = min(_shortest_stride(protocol), longest_lookahead)
+        self._shortest = _shortest_stride(protocol)
+        self._lookahead = min(self._shortest, longest_lookahead)
         self._longest_promise = self._lookahead
+        self._promised = 0  # up to this instant [ns]
+        self._heights: list[float] = []  # of the pulses of the block [N m]
+        self._resting_until: int | None = None  # between two blocks [ns]
         self._closing_strike: int | None = None  # strike that closes the last stride [ns]
 
     @property
-    def pulse_period(self) -> float:
-        """Period of the pulses as planned [s]; NaN without a plan."""
-        return math.nan if self.train is None else self.train.period
+    def block(self) -> BlockRun:
+        """The block under way, or the one before a rest."""
+        return self.blocks[-1]
 
     @property
     def strides(self) -> int:
@@ -89,12 +125,16 @@ class Conductor:
 
     def part(self, known_until: int) -> Part:
         """Return the part of the protocol that is under way at an instant [ns]."""
-        train = self.train
+        block, train = self.block, self.block.train
         if self._closing_strike is not None:
             return Part.FINISHED
-        if train is None or known_until < train.first_onset:
+        if self._resting_until is not None:
+            return Part.REST
+        if train is None and not block.plan.pulses.count and self._started > block.baseline > 0:
+            return Part.WASHOUT
+        if train is None or known_until < train.onsets[0]:
             return Part.BASELINE
-        return Part.PULSES if known_until < train.end(train.count - 1) else Part.WASHOUT
+        return Part.PULSES if known_until < train.end or block.pulses_left else Part.WASHOUT
 
     def add_event(self, event: GaitEvent) -> PulseTrain | None:
         """
@@ -107,18 +147,21 @@ class Conductor:
         stride = self._tracker.add(event)
         if self._tracker.latest_strike == strike:
             return None  # not a heel strike of the leg, or not believed
-        if stride is not None and self.train is None:
-            self._periods.append(stride.period)
-            # A promise must end before the next strike can be an onset's reference: see horizon.
-            self._lookahead = min(self._longest_lookahead, *self._periods)
-            self._longest_promise = max(self._longest_promise, self._lookahead)
-        started = self._tracker.stride_in_progress
-        if started > self.protocol.strides and self._closing_strike is None:
-            self._closing_strike = event.stamp
-        if started < self.protocol.baseline or self.train is not None:
+        if stride is not None:
+            self._recent.append(stride.period)
+            if not self.block.baseline:
+                self._periods.append(stride.period)
+                # A promise must end before the next strike can be an onset's reference.
+                self._lookahead = min(self._longest_lookahead, *self._periods)
+                self._longest_promise = max(self._longest_promise, self._lookahead)
+        if self._closing_strike is not None or not self._in_block(event.stamp):
             return None
-        self.train = self._plan(event.stamp)
-        return self.train
+        block = self.block
+        if not block.baseline:
+            return self._plan(event.stamp) if self._baseline_is_over(event.stamp) else None
+        if block.plan.pulses.phase is not None and block.pulses_left:
+            return self._plan_by_phase(event.stamp)
+        return None
 
     def horizon(self, known_until: int) -> Horizon:
         """
@@ -126,7 +169,11 @@ class Conductor:
 
         The first onset lies (1 + P) measured periods after a strike that was not yet known when
         the promise before was made, and no lookahead is longer than the shortest stride that
-        entered the measured period: so no promise ever covers an onset that is not yet planned.
+        entered the measured period: so no promise covers an onset that is not yet planned. If the
+        latest stride was that short and changes the mean, the onset is put off to the promise's
+        end. A pulse at phase P lies P predicted periods after its strike, and no lookahead is
+        longer than the least that this can be, as far as strides are believed at all.
+
         The run ends at a fixed distance after its closing strike, which no promise made before
         that strike can have passed: the end does not depend on how the run was cut into grants.
 
@@ -134,46 +181,163 @@ class Conductor:
         """
         if self._closing_strike is not None:
             return Horizon(self._closing_strike + nanoseconds(self._longest_promise), last=True)
-        stopped = self._tracker.watch.stopped(known_until) if self.train is not None else ""
-        if stopped:
+        walking = self.block.train is not None and self._resting_until is None
+        if walking and (stopped := self._tracker.watch.stopped(known_until)):
             raise GaitError(stopped)
-        return Horizon(known_until + nanoseconds(self._lookahead), last=False)
+        lookahead = min(self._lookahead, self._lookahead_by_phase())
+        self._promised = max(self._promised, known_until + nanoseconds(lookahead))
+        return Horizon(known_until + nanoseconds(lookahead), last=False)
 
-    def _plan(self, strike: int) -> PulseTrain:
+    # Blocks
+
+    @property
+    def _started(self) -> int:
+        """Number of the stride in progress in its block, from 1."""
+        return self._tracker.stride_in_progress - self.block.strides_before
+
+    def _in_block(self, strike: int) -> bool:
+        """Whether a stride of a block starts with a strike [ns]; ends and begins blocks."""
+        if self._resting_until is not None:
+            if strike < self._resting_until:
+                return False
+            self._resting_until = None
+        elif self._is_over(strike):
+            self.block.end = strike
+            if self.block.number == len(self.protocol.sequence):
+                self._closing_strike = strike
+                return False
+            if rest := self.block.plan.rest:
+                self._resting_until = strike + nanoseconds(rest)
+                return False
+        else:
+            if self.block.start is None:
+                self.block.start = strike
+            return True
+        number = self.block.number
+        self.blocks.append(
+            BlockRun(
+                self.protocol.sequence[number],
+                number + 1,
+                strike,
+                self._tracker.stride_in_progress - 1,
+                self._tracker.counts.implausible,
+            )
+        )
+        self._periods = self._baseline_periods()
+        return True
+
+    def _baseline_periods(self) -> deque[float]:
+        """Return a place for the periods [s] of the latest complete strides of a baseline."""
+        return deque(maxlen=max(self.block.plan.baseline - 1, 1))
+
+    def _baseline_is_over(self, strike: int) -> bool:
+        """Whether the stride that starts with a strike [ns] is the last one of the baseline."""
+        plan, started = self.block.plan, self._started
+        end = strike + nanoseconds(statistics.fmean(self._periods or [0.0]))
+        start = end if self.block.start is None else self.block.start
+        if started < plan.baseline or end - start < nanoseconds(plan.baseline_time):
+            return False
+        steady = self._is_steady(plan.baseline_steady)
+        if not steady and started > _MOST_UNSTEADY:
+            raise GaitError(
+                f"baseline: not steady after {started} strides; allowed: a higher baseline_steady "
+                f"than {plan.baseline_steady:g}"
+            )
+        return steady
+
+    def _is_over(self, strike: int) -> bool:
+        """Whether the block has ended at a strike [ns]."""
+        block, plan, train = self.block, self.block.plan, self.block.train
+        washout = self._started - block.baseline - plan.pulses.count
+        if not block.baseline or washout <= plan.washout:
+            return False
+        pulses_end = train.end if train else block.start or 0
+        # The last block ends with its strides, whatever the pulse period.
+        if block.number < len(self.protocol.sequence) and strike < pulses_end:
+            return False
+        if strike - pulses_end < nanoseconds(plan.washout_time):
+            return False
+        return self._is_steady(plan.washout_steady) or washout > _MOST_UNSTEADY
+
+    def _is_steady(self, most: float) -> bool:
+        """Whether the latest strides vary by at most a share of their mean; 0 asks nothing."""
+        recent = self._recent
+        if most == 0:
+            return True
+        full = len(recent) == STEADY_STRIDES
+        return full and statistics.stdev(recent) <= most * statistics.fmean(recent)
+
+    # Pulses
+
+    def _predicted(self) -> list[float]:
+        """Return the stride periods [s] whose mean is the prediction of the next one."""
+        return list(self._recent)[-PREDICTED_FROM:]
+
+    def _lookahead_by_phase(self) -> float:
+        """Return how far [s] a promise may go, so that it covers no pulse by phase to come."""
+        phase = self.block.plan.pulses.phase
+        if phase is None or not self.block.pulses_left:
+            return math.inf
+        periods = self._predicted() or [self._shortest]
+        # The next stride, as short as can be believed, changes the mean by its share.
+        change, share = self._limits.stride_change, 1 / min(len(periods) + 1, PREDICTED_FROM)
+        lookahead = phase * min(periods) * (1 - change * share)
+        if self.block.baseline:
+            return lookahead
+        # The strike that ends the baseline is not known: a whole stride lies before the pulse.
+        return max(lookahead, (1 + phase) * min(periods) * (1 - change))
+
+    def _plan_by_phase(self, strike: int) -> PulseTrain:
+        """Plan the pulse of the stride that starts with a strike [ns]."""
+        block, plan = self.block, self.block.plan.pulses
+        assert plan.phase is not None
+        period = statistics.fmean(self._predicted() or [block.measured_period])
+        onset = max(strike + nanoseconds(plan.phase * period), self._promised)
+        height = self._heights[-block.pulses_left]
+        planned = PulseTrain(self.protocol.side, (plan.pulse(onset, height),))
+        block.train = block.train.followed_by(planned) if block.train else planned
+        return planned
+
+    def _plan(self, strike: int) -> PulseTrain | None:
         """Plan the pulses at the strike [ns] that starts the last baseline stride."""
-        protocol, plan = self.protocol, self.protocol.pulses
-        self._require_steady_baseline()
+        protocol, block, plan = self.protocol, self.block, self.block.plan.pulses
+        lasted = self._started if block.plan.open_baseline else block.plan.baseline
+        block.baseline = lasted
+        self._require_plausible_baseline()
         if self._periods:
-            stride = self.measured_period = statistics.fmean(self._periods)
+            stride = block.measured_period = statistics.fmean(self._periods)
         elif plan.period is not None:  # the best guess if no complete stride was asked for
             stride = plan.period
+        elif plan.count == 0:
+            return None
         else:
             raise ProtocolError(
                 "baseline: no complete stride was seen from which period_offset could be measured"
             )
         if len(self._periods) > 1:
-            spread = statistics.stdev(self._periods, self.measured_period)
-            self.measured_period_error = spread / math.sqrt(len(self._periods))
+            spread = statistics.stdev(self._periods, block.measured_period)
+            block.measured_period_error = spread / math.sqrt(len(self._periods))
+        seed = protocol.seed, block.number
+        self._heights = plan.heights(block.plan.torque(protocol.walker), seed)
+        if plan.count == 0 or plan.phase is not None:
+            return None
         delay = nanoseconds((1 + plan.initial_phase) * stride)
         if self._periods:
             # The stamps of a constant gait are rounded, so its next stride can be a nanosecond
             # longer than the mean: a pulse at phase 0 is not to come before the strike.
             delay = math.floor((1 + plan.initial_phase) * stride * NANOSECONDS_PER_SECOND) + 1
-        return PulseTrain(
-            side=protocol.side,
-            first_onset=strike + delay,
-            period=plan.period_for(stride),
-            count=plan.count,
-            torque=protocol.pulse_torque,
-            duration=plan.width,
-        )
+        block.pulse_period = plan.period_for(stride)
+        onsets = plan.onsets(max(strike + delay, self._promised), block.pulse_period, seed)
+        pulses = (plan.pulse(*pulse) for pulse in zip(onsets, self._heights, strict=True))
+        block.train = PulseTrain(protocol.side, tuple(pulses))
+        return block.train
 
-    def _require_steady_baseline(self) -> None:
-        """Raise GaitError if the baseline's strides are not those of one steady gait."""
+    def _require_plausible_baseline(self) -> None:
+        """Raise GaitError if the baseline's strides are not those of one gait."""
         periods = self._periods
-        doubted = math.ceil(
-            self._tracker.counts.implausible / PLACES
-        )  # a stride's worth of events
+        # By a stride's worth of events.
+        events = self._tracker.counts.implausible - self.block.doubted_before
+        doubted = math.ceil(events / PLACES)
         if doubted > len(periods):
             raise GaitError(
                 f"baseline: {doubted} of {doubted + len(periods)} strides cannot be: check the "
@@ -199,4 +363,4 @@ def _shortest_stride(protocol: Protocol) -> float:
     """
     walker = protocol.walker
     stride = 4 * walker.leg_angle * math.sqrt(walker.leg_length / walker.gravity)
-    return stride if protocol.pulses.period is None else min(stride, protocol.pulses.period)
+    return min(stride, *(block.pulses.period or stride for block in protocol.sequence))

@@ -11,10 +11,10 @@ which a lock-step run drives them. So both give the same events to the nanosecon
 from dataclasses import dataclass
 
 from gait_entrainment.experiment import Conductor
-from gait_entrainment.gait import GaitEvent, VerdictSettings, analyze
-from gait_entrainment.outcome import Run
+from gait_entrainment.gait import GaitEvent, VerdictSettings
 from gait_entrainment.protocol import Protocol
 from gait_entrainment.robot import LimitError, MeasuredOnsets, PulseTrain, find_driver
+from gait_entrainment.run import Run, analyze_blocks
 from gait_entrainment.walker import Ending, Walker
 
 
@@ -23,7 +23,7 @@ class Simulation(Run):
     """What came of a simulated experiment; stamps count from its start."""
 
     protocol: Protocol
-    train: PulseTrain | None  # as planned; None if the walker did not come so far
+    train: PulseTrain | None  # as planned in the last block; None if nobody walked so far
     ending: Ending | None  # fall or fly-off; None if every stride was walked
 
 
@@ -48,7 +48,7 @@ def simulate(
             f"driver: {driver.name} runs in real time only; use entrain run --real-time"
         )
     robot = driver.make(protocol.side, protocol.limits, protocol.seed)
-    protocol.limits.check_pulse(protocol.pulse_torque, protocol.pulses.width)
+    protocol.check_limits()
     robot.configure()
     robot.activate()
     robot.begin(0)
@@ -63,9 +63,10 @@ def simulate(
         profile = robot.promise(horizon.until)
         onsets += profile.onsets
         measured.add_promise(profile.onsets, profile.valid_until)
-        for number, onset in enumerate(profile.onsets, robot.delivered - len(profile.onsets)):
+        for onset in profile.onsets:
             assert robot.train is not None
-            measured.add_pulse(onset, robot.train.height(number), protocol.pulses.width)
+            pulse = robot.train.pulses[robot.train.latest(onset)]
+            measured.add_pulse(onset, pulse.torque, pulse.duration)
         for state in robot.read():
             measured.add_state(state)
         walker.promise(profile)
@@ -79,14 +80,16 @@ def simulate(
     measured.finish()
     if measured_onsets:
         onsets = [timing.onset for timing in measured.timings]
+    analysis, blocks = analyze_blocks(conductor.blocks, events, onsets, protocol.side, settings)
     return Simulation(
         protocol=protocol,
         events=tuple(events),
         onsets=tuple(onsets),
         timings=tuple(measured.timings),
-        train=conductor.train,
-        measured_period=conductor.measured_period,
-        pulse_period=conductor.pulse_period,
+        train=conductor.block.train,
+        measured_period=conductor.block.measured_period,
+        pulse_period=conductor.block.pulse_period,
         ending=walker.ending,
-        analysis=analyze(events, onsets, protocol.side, settings),
+        analysis=analysis,
+        blocks=blocks,
     )

@@ -9,7 +9,10 @@ from typing import Any
 import numpy as np
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind
-from gait_entrainment.drawing import (
+from gait_entrainment.gait import Verdict
+from gait_entrainment.robot.timing import lateness_ms
+from gait_entrainment_bags.recorded_run import RecordedRun, drawn_strides
+from gait_entrainment_commands.drawing import (
     BLACK,
     BLUE,
     GREEN,
@@ -19,10 +22,12 @@ from gait_entrainment.drawing import (
     new_figure,
     save_figure,
 )
-from gait_entrainment.gait import Verdict
-from gait_entrainment.outcome import holes_of, timing_outcome, timing_summary
-from gait_entrainment.robot.timing import distribution, lateness_ms
-from gait_entrainment_bags.recorded_run import RecordedRun, drawn_strides
+from gait_entrainment_commands.outcome import (
+    distribution,
+    holes_of,
+    timing_outcome,
+    timing_summary,
+)
 
 _WIDTH, _HEIGHT = 7.2, 3.6  # [inch]
 _DOTTED_LINE = {"color": BLUE, "marker": ".", "lw": 0.8}

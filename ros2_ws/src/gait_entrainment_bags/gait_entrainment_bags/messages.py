@@ -18,7 +18,7 @@ from gait_entrainment.conventions import EventKind, Side, nanoseconds_of
 from gait_entrainment.errors import UsageError
 from gait_entrainment.gait import GaitEvent, PulsePhase, Stride
 from gait_entrainment.gait.analyzer import Result
-from gait_entrainment.robot import RobotState, TorqueProfile
+from gait_entrainment.robot import Pulse, PulseTrain, RobotState, Shape, TorqueProfile
 
 _E = TypeVar("_E", bound=IntEnum)
 
@@ -68,6 +68,23 @@ def profile_of(message: Any, start: int = 0) -> TorqueProfile:
 def pulse_of(message: Any, start: int = 0) -> tuple[int, float, float]:
     """Return onset [ns], height [N m] and width [s] of a TorquePulse message."""
     return nanoseconds_of(message.header.stamp) - start, message.torque, message.duration
+
+
+def train_of(message: Any, start: int = 0) -> PulseTrain:
+    """Return the pulses of a goal; raises MessageError for an unknown side or shape."""
+    pulses = (
+        Pulse(
+            onset=nanoseconds_of(pulse.onset) - start,
+            torque=pulse.torque,
+            duration=pulse.duration,
+            shape=_member(Shape, "shape", pulse.shape),
+            rise=pulse.rise,
+            fall=pulse.fall,
+            samples=tuple(pulse.samples),
+        )
+        for pulse in message.pulses
+    )
+    return PulseTrain(side_of(message), tuple(pulses))
 
 
 def state_of(message: Any, start: int = 0) -> RobotState:

@@ -22,12 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.experiment import Conductor, GaitError
+from gait_entrainment.experiment import BlockRun, Conductor, GaitError
 from gait_entrainment.gait import Analysis, GaitEvent, Stride, VerdictSettings, analyze
-from gait_entrainment.gait.analyzer import TOE_OFF_BIAS, Result
-from gait_entrainment.outcome import Run, final_phase_lag, outcome_of, timing_outcome
+from gait_entrainment.gait.analyzer import Result
 from gait_entrainment.protocol import Protocol, ProtocolError, read_protocol
 from gait_entrainment.robot import MeasuredOnsets, TorqueProfile
+from gait_entrainment.run import Run, analyze_blocks, settings_for
 from gait_entrainment.settings import SettingError
 from gait_entrainment_bags import messages, topic_names
 from gait_entrainment_bags.decoding import decoder_for
@@ -36,8 +36,9 @@ from gait_entrainment_bags.holes import hole_before
 from gait_entrainment_bags.mcap_records import BagMessage
 from gait_entrainment_bags.reader import BagReader
 from gait_entrainment_bags.recovery import RECOVERY_KEY
-from gait_entrainment_bags.truth import detector_errors
+from gait_entrainment_bags.truth import TOE_OFF_BIAS, detector_errors, without_bias
 from gait_entrainment_bags.writer import ENDED_EARLY
+from gait_entrainment_commands.outcome import final_phase_lag, outcome_of, timing_outcome
 
 # Strides of which the ankle torque is drawn: more would not be told apart in a figure. Those while
 # a lock forms are drawn one by one, the latest of them if they are many.
@@ -115,11 +116,15 @@ def read_run(
         live_side = _side_in(bag, topic_names.STRIDES)
         live_side = side if live_side is None else live_side
         bias = _toe_off_bias(bag)
-        live, analysis = (
-            analyze(record.events, onsets[kind], leg, settings, record.unknown, bias)
-            for kind, leg in ((live_onset, live_side), (onset or live_onset, side))
+        events = without_bias(record.events, bias)
+        told = settings_for(protocol.sequence if protocol else (), settings)
+        live = analyze(events, onsets[live_onset], live_side, told, record.unknown)
+        blocks = _conducted(protocol, record.events) if protocol else ()
+        begun = onsets[onset or live_onset]
+        analysis, judged = analyze_blocks(
+            blocks, events, begun, side, settings, record.unknown
         )
-        measured_period, pulse_period = periods_of(protocol, record.events, analysis)
+        measured_period, pulse_period = _periods(blocks, analysis)
         run = RecordedRun(
             protocol=protocol,
             name=Path(path).stem if protocol is None else protocol.name,
@@ -129,6 +134,7 @@ def read_run(
             measured_period=measured_period,
             pulse_period=pulse_period,
             analysis=analysis,
+            blocks=judged,
             timings=tuple(record.timings),
             onset=live_onset,
             differences=record.differences_from(live, live_side),
@@ -186,20 +192,30 @@ def _side_in(bag: BagReader, relative: str) -> Side | None:
     return None
 
 
-def periods_of(
-    protocol: Protocol | None, events: Sequence[GaitEvent], analysis: Analysis
-) -> tuple[float, float]:
-    """Return unperturbed and pulse period [s]: as a protocol plans them, else as analyzed."""
-    if protocol is None:
-        last = analysis.entrainments[-1] if analysis.entrainments else None
-        return (last.unperturbed_period, last.pulse_period) if last else (math.nan, math.nan)
+def _conducted(protocol: Protocol, events: Sequence[GaitEvent]) -> Sequence[BlockRun]:
+    """Return the blocks of a protocol, as they were planned on a walk."""
     conductor = Conductor(protocol)
     try:
         for event in events:
             conductor.add_event(event)
     except (GaitError, ProtocolError):
         pass  # too few events are left to plan by: the periods stay unknown
-    return conductor.measured_period, conductor.pulse_period
+    return conductor.blocks
+
+
+def periods_of(
+    protocol: Protocol | None, events: Sequence[GaitEvent], analysis: Analysis
+) -> tuple[float, float]:
+    """Return unperturbed and pulse period [s]: as a protocol plans them, else as analyzed."""
+    return _periods(_conducted(protocol, events) if protocol else (), analysis)
+
+
+def _periods(blocks: Sequence[BlockRun], analysis: Analysis) -> tuple[float, float]:
+    """Return unperturbed and pulse period [s]: as a protocol plans them, else as analyzed."""
+    if blocks:
+        return blocks[-1].measured_period, blocks[-1].pulse_period
+    last = analysis.entrainments[-1] if analysis.entrainments else None
+    return (last.unperturbed_period, last.pulse_period) if last else (math.nan, math.nan)
 
 
 def _toe_off_bias(bag: BagReader) -> float:

@@ -41,6 +41,7 @@ EXPERIMENT_STATE = "experiment/state"
 
 # Of whoever started the run.
 OPERATOR_HEARTBEAT = "operator/heartbeat"
+OPERATOR_NOTES = "operator/notes"
 
 # Of the analyzer.
 STRIDES = "gait/strides"

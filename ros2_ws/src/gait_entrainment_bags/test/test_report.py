@@ -13,7 +13,6 @@ import pytest
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.gait import analyze
-from gait_entrainment.outcome import outcome_of, summary
 from gait_entrainment.protocol import Protocol, PulsePlan
 from gait_entrainment.robot import PulseTiming
 from gait_entrainment.simulation import Simulation, simulate
@@ -24,6 +23,7 @@ from gait_entrainment_bags.recorded_run import (
     RecordedRun,
     drawn_strides,
 )
+from gait_entrainment_commands.outcome import outcome_of, summary
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,9 @@ def test_a_slow_passage_is_not_taken_for_a_lock_and_says_so():
 def test_what_is_not_known_is_null_in_json():
     protocol = Protocol(baseline=2, washout=0, pulses=PulsePlan(count=1))
     nothing = analyze([], [], Side.RIGHT)
-    told = outcome_of(Simulation(protocol, (), (), (), math.nan, math.nan, nothing, None, None))
+    told = outcome_of(
+        Simulation(protocol, (), (), (), math.nan, math.nan, nothing, (), None, None)
+    )
     text = json.dumps(told, allow_nan=False)
     assert json.loads(text)["unperturbed_stride_period"] is None
     assert json.loads(text)["verdict"] == "undecided"
@@ -70,8 +72,9 @@ def test_the_figures_are_drawn(simulation, tmp_path):
         events=simulation.events,
         onsets=simulation.onsets,
         measured_period=simulation.measured_period,
-        pulse_period=simulation.train.period,
+        pulse_period=simulation.pulse_period,
         analysis=simulation.analysis,
+        blocks=(),
         timings=simulation.timings,
         torques=AnkleTorques(stamps, zeros + 50, zeros, zeros),
         messages=0,
@@ -115,6 +118,7 @@ def test_a_run_without_pulses_or_strides_can_be_drawn_too(tmp_path):
         measured_period=math.nan,
         pulse_period=math.nan,
         analysis=analyze([], [], Side.RIGHT),
+        blocks=(),
         timings=(),
         torques=AnkleTorques(empty.astype(np.int64), empty, empty, empty),
         messages=0,

@@ -15,12 +15,12 @@ from pathlib import Path
 from gait_entrainment.protocol import Protocol
 from gait_entrainment.robot import DeviceError, GuardedRobot, find_driver
 from gait_entrainment.robot.faults import STOPPED
-from gait_entrainment.stop_channel import StopAnswer, stop_all
 from gait_entrainment_bags.messages import nanoseconds_of
 from gait_entrainment_bringup.node_list import CLOCK_OFFSET, gentle_limits
 from gait_entrainment_bringup.operator_console import STOP_KEY, pressed_key
 from gait_entrainment_drivers.monitor import NEAR_ZERO_SHARE
 from gait_entrainment_drivers.proof import proof_of
+from gait_entrainment_drivers.stop_channel import StopAnswer, stop_all
 from gait_entrainment_nodes.messaging.domain import wanted_domain
 from gait_entrainment_nodes.messaging.environment import set_environment
 from gait_entrainment_nodes.nodes.stop_thread import StopThread
@@ -74,8 +74,9 @@ def points(
 def _limits(protocol: Protocol) -> Point:
     limits = asdict(protocol.limits) | gentle_limits(protocol)
     told = ", ".join(f"{name} {value:g}" for name, value in limits.items())
-    plan = protocol.pulses
-    pulses = f"{plan.count} pulses of {protocol.pulse_torque:g} N m for {plan.width:g} s"
+    plan = protocol.planned
+    most = "" if len(protocol.sequence) == 1 else "at most "
+    pulses = f"{plan.count} pulses of {most}{protocol.pulse_torque:g} N m for {plan.duration:g} s"
     return Point("limits", True, f"{pulses}; {told}")
 
 

@@ -23,7 +23,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.utilities import make_namespace_absolute, prefix_namespace
 
 from gait_entrainment.errors import EntrainmentError
-from gait_entrainment_bringup.node_list import DISPLAY, MOVED, Parameters, settings_file
+from gait_entrainment_bringup.node_list import DISPLAY, MOVED, PAGE, Parameters, settings_file
 from gait_entrainment_nodes.messaging.client import Client
 from gait_entrainment_nodes.messaging.environment import PACKAGE, dds_variables, shared_file
 
@@ -31,6 +31,7 @@ from gait_entrainment_nodes.messaging.environment import PACKAGE, dds_variables,
 Argument = tuple[str, str | None, str]
 NAMESPACE: Argument = ("namespace", "", "of all nodes and topics, for several side by side")
 PARAMETERS_FILE: Argument = ("params_file", str(settings_file()), "values for the nodes (YAML)")
+SHOW_PAGE: Argument = ("page", "false", "serve the operator's page: true or false")
 RVIZ: Argument = ("rviz", "false", "show the walker in RViz: true or false")
 
 
@@ -117,6 +118,14 @@ def rviz(context: LaunchContext, namespace: str, given: Parameters) -> list[Acti
         *(make_node(context, name, namespace, given[name]) for name in drawing),
         make_node(context, "rviz", namespace, time, **program),
     ]
+
+
+def page(context: LaunchContext, namespace: str, given: Parameters) -> list[Action]:
+    """Return the operator's page, if wanted; the launch does not end with it."""
+    if not is_true(context, "page"):
+        return []
+    package = {"package": "gait_entrainment_page"}
+    return [make_node(context, PAGE, namespace, given[PAGE], **package)]
 
 
 def in_background(context: LaunchContext, work: Callable[[Client], None]) -> None:

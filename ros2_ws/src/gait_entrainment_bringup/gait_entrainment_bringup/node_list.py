@@ -18,8 +18,9 @@ import yaml
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.gait import GaitLimits
-from gait_entrainment.protocol import Protocol, said_of, write_protocol
+from gait_entrainment.protocol import Protocol, said_limits, write_protocol
 from gait_entrainment.robot import find_driver
+from gait_entrainment.run import settings_for
 from gait_entrainment_bags import BagError, BagReader
 from gait_entrainment_bags.recorded_run import protocol_and_side
 from gait_entrainment_bags.topic_names import WALKER_PROGRESS, WALKER_PROGRESS_BEFORE
@@ -44,16 +45,12 @@ def nodes_for(walker: str) -> tuple[str, ...]:
 NODES = nodes_for("simulated")
 # Only looks on: started if somebody wants to see the walk, waited for by nobody.
 DISPLAY = "walker_display"
+# The operator's page: looks on as well, and is what one looks at, so it outlives the torque.
+PAGE = "operator_page"
 # In the order in which they are stopped: torque first, the record last.
 STOP_ORDER = (
-    "perturbator",
-    "experiment",
-    "walker_sim",
-    "gait_detector",
-    "sensor_sim",
-    "gait_analyzer",
-    DISPLAY,
-    "bag_recorder",
+    *("perturbator", "experiment", "walker_sim", "gait_detector", "sensor_sim", "gait_analyzer"),
+    *(DISPLAY, PAGE, "bag_recorder"),
 )
 DETECTOR = "vertical_force"
 # In real time promises are short, so that more can be decided late, but longer than a hiccup [s].
@@ -149,12 +146,10 @@ def parameters(
             "seed": protocol.seed,
             "armed": armed,
             "unproved": unproved,
-            "planned.torque": abs(protocol.pulse_torque),
-            "planned.duration": protocol.pulses.width,
-            "planned.count": protocol.pulses.count,
-            **{f"limits.{name}": value for name, value in said_of(protocol, "limits").items()},
+            **{f"planned.{name}": value for name, value in asdict(protocol.planned).items()},
+            **{f"limits.{name}": value for name, value in said_limits(protocol).items()},
         },
-        "gait_analyzer": {"side": side, "onset": onset, "toe_off_bias": toe_off_bias},
+        "gait_analyzer": {"side": side, "onset": onset, "toe_off_bias": toe_off_bias} | _verdict(protocol),
         "experiment": {
             "participants": [n for n in nodes if n != "experiment" and (bag or n != RECORDER)],
             "walker": WALKERS[walker][-1],
@@ -168,6 +163,7 @@ def parameters(
             ),
         },
         DISPLAY: _drawn(protocol),
+        PAGE: {"record": str(bag.absolute()) if bag else ""},
     }
     latency = 0.0
     if walker != "simulated":
@@ -221,10 +217,19 @@ def gentle_limits(protocol: Protocol) -> dict[str, float]:
     # No two pulses closer than the shortest stride that is believed.
     most = 60 / GaitLimits().stride_least
     gentle: dict[str, float] = {"rising": RISING, "pulses_per_minute": most}
-    if protocol.pulse_torque:
-        rate = abs(protocol.pulse_torque) / (FLANK_SHARE * protocol.pulses.width)
-        gentle["rate"] = min(rate, 1e6)
-    return gentle | said_of(protocol, "limits")
+    rates = [
+        abs(block.torque(protocol.walker)) / (FLANK_SHARE * block.pulses.width)
+        for block in protocol.sequence
+    ]
+    if any(rates):
+        gentle["rate"] = min(max(rates), 1e6)
+    return gentle | said_limits(protocol)
+
+
+def _verdict(protocol: Protocol | None) -> dict[str, Any]:
+    """Return what the analyzer must know of the protocol: whether there is something to test."""
+    told = settings_for(protocol.sequence if protocol else ())
+    return {"verdict.smallest_difference": told.smallest_difference} if told else {}
 
 
 def _drawn(protocol: Protocol) -> dict[str, Any]:
@@ -283,6 +288,7 @@ def replay_parameters(
             "onset": onset,
             "toe_off_bias": float(custom_data.get("toe_off_bias", "0")),
             "use_sim_time": True,
+            **_verdict(protocol),
         },
     }
     if out is not None:
@@ -295,6 +301,7 @@ def replay_parameters(
     if f"{recorded}/robot_description" not in topics:
         drawn = {} if protocol is None else _drawn(protocol)
         given[DISPLAY] = drawn | {"use_sim_time": True}
+    given[PAGE] = {"use_sim_time": True}
     return namespace, given
 
 

@@ -11,7 +11,7 @@ import tty
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from gait_entrainment.stop_channel import stop_all
+from gait_entrainment_drivers.stop_channel import stop_all
 from gait_entrainment_nodes.messaging.client import Client
 from gait_entrainment_nodes.messaging.errors import NodeError
 from gait_entrainment_nodes.messaging.topics import OPERATOR_HEARTBEAT
@@ -20,16 +20,22 @@ STOP_KEY = " "
 
 
 class Operator:
-    """Called in each round of a client: says that somebody watches, and looks at the keyboard."""
+    """
+    Called in each round of a client: says that somebody watches, and looks at the keyboard.
 
-    def __init__(self, client: Client) -> None:
+    It says nothing if the operator's page is the ``heartbeat`` instead.
+    """
+
+    def __init__(self, client: Client, *, heartbeat: bool = True) -> None:
+        self._says_so = heartbeat
         self._heartbeat = client.node.create_publisher(
             OPERATOR_HEARTBEAT.type, OPERATOR_HEARTBEAT.name, OPERATOR_HEARTBEAT.qos
         )
 
     def __call__(self) -> None:
         """Publish the heartbeat; raise NodeError if the stop key was pressed."""
-        self._heartbeat.publish(OPERATOR_HEARTBEAT.type())
+        if self._says_so:
+            self._heartbeat.publish(OPERATOR_HEARTBEAT.type())
         if pressed_key() == STOP_KEY:
             told = [f"{name}: {a.message if a else 'no answer'}" for name, a in stop_all().items()]
             raise NodeError("stopped by the space bar: " + "; ".join(told), "")

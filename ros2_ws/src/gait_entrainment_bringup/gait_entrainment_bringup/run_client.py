@@ -36,13 +36,14 @@ def conduct(
     quiet: bool,
     real_time: bool,
     silence: float,
+    heartbeat: bool = True,
 ) -> None:
     """
     Conduct a protocol through the experiment node to its end, and watch the processes meanwhile.
 
     ``on_start`` is called once the experiment has accepted it. In ``real_time`` this process comes
     before others. Nodes that nobody else watches may
-    be silent for ``silence`` [s].
+    be silent for ``silence`` [s]. Without ``heartbeat`` somebody else says that a person watches.
 
     Raises
     ------
@@ -66,7 +67,7 @@ def conduct(
         client.action(RunProtocol, ACTION)
         # The recorder ends by itself once the record is complete.
         watch = Watch(client, supervisor, may_end=("bag_recorder",), asked=ASKED, silence=silence)
-        operator = Operator(client)
+        operator = Operator(client, heartbeat=heartbeat)
 
         def look() -> None:
             watch()

@@ -11,13 +11,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from gait_entrainment.commands.outcome_options import add_onset_option
-from gait_entrainment.commands.protocol_options import add_protocol_options, chosen_protocol
 from gait_entrainment.errors import UsageError
-from gait_entrainment.gait.analyzer import TOE_OFF_BIAS
 from gait_entrainment.protocol import Protocol
 from gait_entrainment.robot import LimitError, find_driver
 from gait_entrainment.settings import Setting
+from gait_entrainment_bags.truth import TOE_OFF_BIAS
 from gait_entrainment_bringup.node_list import (
     DETECTOR,
     LEAD_TIME,
@@ -26,6 +24,8 @@ from gait_entrainment_bringup.node_list import (
     bag_folder,
     parameters,
 )
+from gait_entrainment_commands.outcome_options import add_onset_option
+from gait_entrainment_commands.protocol_options import add_protocol_options, chosen_protocol
 from gait_entrainment_drivers.proof import require_proof
 
 _SWITCHES = {
@@ -91,7 +91,7 @@ def checked_run(
     for name, told in _NUMBERS.items():
         if (text := getattr(options, name)) is not None:
             setattr(options, name, told.parse(_option(name), text))
-    protocol.limits.check_pulse(protocol.pulse_torque, protocol.pulses.width)
+    protocol.check_limits()
     check_walker(options.walker, options.detector, real_time=options.real_time)
     if drives:
         switches = {"armed": options.arm, "unproved": options.unproved}

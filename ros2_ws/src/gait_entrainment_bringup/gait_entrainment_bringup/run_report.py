@@ -6,12 +6,12 @@
 import json
 from pathlib import Path
 
-from gait_entrainment.outcome import summary, timing_summary
 from gait_entrainment_bags import BagReader
 from gait_entrainment_bags.figures import draw_figures
 from gait_entrainment_bags.recorded_run import messages_line, read_run, recorded_outcome
 from gait_entrainment_bags.topic_names import WALKER_TIMING
 from gait_entrainment_bags.truth import detection_lines
+from gait_entrainment_commands.outcome import summary, timing_summary
 
 
 def report(bag: Path, *, figures: bool, as_json: bool) -> None:

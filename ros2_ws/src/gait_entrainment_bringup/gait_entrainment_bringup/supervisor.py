@@ -43,10 +43,13 @@ class Supervisor:
         self.folder, self._method = folder, method
         self._environment = dict(environment)
         self._processes: dict[str, BaseProcess] = {}
+        self._onlookers: set[str] = set()
 
-    def start(self, node: str, arguments: Sequence[str]) -> None:
-        """Start a node of the package."""
-        module = f"{PACKAGE}.nodes.{node}"
+    def start(self, node: str, arguments: Sequence[str], onlooker_of: str = "") -> None:
+        """Start a node of the package, or one of another that only looks on: it may end."""
+        module = f"{onlooker_of or f'{PACKAGE}.nodes'}.{node}"
+        if onlooker_of:
+            self._onlookers.add(node)
         self._processes[node] = start_node(
             self._method, module, arguments, self._log(node), self._environment
         )
@@ -60,6 +63,8 @@ class Supervisor:
         """Return ``ended``; NodeError if one has failed, or is not one that may end."""
         ended = self.ended()
         for node, code in ended.items():
+            if node in self._onlookers:
+                continue
             if code != 0 or node not in may_end:
                 raise NodeError(f"{node} ended unexpectedly with exit code {code}", node)
         return ended

@@ -47,7 +47,7 @@ def nodes(context: LaunchContext) -> list[Action]:
         check_output(bag, "bag")
     elif shared.value(context, "bag"):
         raise shared.LaunchError("bag: there is none with recorder:=none; leave one of them out")
-    protocol.limits.check_pulse(protocol.pulse_torque, protocol.pulses.width)
+    protocol.check_limits()
     check_robot(protocol, real_time=real_time, **switches)
     walking = {
         "walker": shared.choice(context, "walker", *WALKERS),
@@ -65,7 +65,8 @@ def nodes(context: LaunchContext) -> list[Action]:
     ending = shared.ended_by(made, {"experiment", RECORDER} & set(names), over, bag)
     *others, experiment = made  # as in the list of nodes
     later = TimerAction(period=delay, actions=[experiment]) if delay else experiment
-    return [*ending, *shared.rviz(context, namespace, given), *others, later]
+    seen = [*shared.rviz(context, namespace, given), *shared.page(context, namespace, given)]
+    return [*ending, *seen, *others, later]
 
 
 def tell(_: LaunchContext, bag: Path) -> None:
@@ -93,4 +94,5 @@ def generate_launch_description() -> LaunchDescription:
         shared.NAMESPACE,
         shared.PARAMETERS_FILE,
         shared.RVIZ,
+        shared.SHOW_PAGE,
     )

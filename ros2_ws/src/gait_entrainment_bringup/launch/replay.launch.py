@@ -41,7 +41,8 @@ def nodes(context: LaunchContext) -> list[Action]:
 
     last_word = OpaqueFunction(function=shared.in_background, args=[finish])
     ending = shared.ended_by(made, {"bag_player"}, [last_word])
-    return [*ending, *shared.rviz(context, place, given), *made]
+    seen = [*shared.rviz(context, place, given), *shared.page(context, place, given)]
+    return [*ending, *seen, *made]
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -53,4 +54,5 @@ def generate_launch_description() -> LaunchDescription:
         ("namespace", "", "to play into; empty: the one that was recorded"),
         shared.PARAMETERS_FILE,
         shared.RVIZ,
+        shared.SHOW_PAGE,
     )

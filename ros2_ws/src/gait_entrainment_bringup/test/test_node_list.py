@@ -10,9 +10,11 @@ import rclpy
 import yaml
 
 from gait_entrainment.protocol import DEFAULT_PROTOCOL
+from gait_entrainment.settings import settings_of
 from gait_entrainment_bringup.node_list import (
     DISPLAY,
     NODES,
+    PAGE,
     STOP_ORDER,
     WALKERS,
     nodes_for,
@@ -30,6 +32,7 @@ from gait_entrainment_nodes.nodes.perturbator import Perturbator
 from gait_entrainment_nodes.nodes.sensor_sim import SensorSim
 from gait_entrainment_nodes.nodes.walker_display import WalkerDisplay
 from gait_entrainment_nodes.nodes.walker_sim import WalkerSim
+from gait_entrainment_page import operator_page
 
 BAG = Path(__file__).parents[4] / "bags" / "paper_example"
 CLASSES = (
@@ -84,6 +87,7 @@ def full_names(tree, prefix=""):
 
 def test_file_lists_what_a_user_may_set_at_its_default(tmp_path):
     file = yaml.safe_load(settings_file().read_text())
+    del file[f"/**/{PAGE}"]  # below
     listed = set(
         full_names({n.removeprefix("/**/"): p["ros__parameters"] for n, p in file.items()})
     )
@@ -104,10 +108,19 @@ def test_file_lists_what_a_user_may_set_at_its_default(tmp_path):
     assert listed == (set(found[0]) - elsewhere)
 
 
+def test_file_lists_what_a_user_may_set_of_the_page_at_its_default():
+    # Not by the node itself: it would serve.
+    file = yaml.safe_load(settings_file().read_text())
+    listed = file[f"/**/{PAGE}"]["ros__parameters"]
+    of_a_run = ("command", "record")
+    names = [name for name in settings_of(operator_page.Settings) if name not in of_a_run]
+    assert listed == {name: getattr(operator_page.Settings, name) for name in names}
+
+
 @pytest.mark.parametrize("real_time", [False, True])
 def test_parameters_are_given_to_every_node(real_time):
     given = parameters(DEFAULT_PROTOCOL, Path("/bag"), real_time=real_time)
-    assert set(given) == {*NODES, DISPLAY}
+    assert set(given) == {*NODES, DISPLAY, PAGE}
     walker = given["walker_sim"]
     assert walker["ankle_stiffness"] == 87.3
     assert walker["real_time"] is real_time
@@ -124,7 +137,7 @@ def test_parameters_are_given_to_every_node(real_time):
 def test_whoever_walks_plays_the_role_to_the_experiment(walker):
     given = parameters(DEFAULT_PROTOCOL, Path("/bag"), real_time=True, walker=walker)
     role, lead = given["experiment"]["walker"], given["experiment"]["longest_lookahead"]
-    assert set(given) == {*nodes_for(walker), DISPLAY}
+    assert set(given) == {*nodes_for(walker), DISPLAY, PAGE}
     assert role in given["experiment"]["participants"]
     # What is known of a sensed walker is older by the detector's latency.
     assert (lead == 0.3) is (walker == "simulated")
@@ -132,6 +145,6 @@ def test_whoever_walks_plays_the_role_to_the_experiment(walker):
 
 
 def test_torque_is_stopped_first_and_the_record_last():
-    assert set(STOP_ORDER) == {*NODES, *nodes_for("sensed"), DISPLAY}
+    assert set(STOP_ORDER) == {*NODES, *nodes_for("sensed"), DISPLAY, PAGE}
     assert STOP_ORDER[0] == "perturbator"
     assert STOP_ORDER[-1] == "bag_recorder"

@@ -109,3 +109,9 @@ def test_end_of_a_process_is_noticed_with_its_last_lines(programs):
 def test_waiting_has_an_end(programs):
     started(programs, "one")
     assert programs.wait("one", 0.01) is None
+
+
+def test_the_end_of_an_onlooker_is_nobodys_failure(programs):
+    programs.start("broken", [], "stand_in.nodes")
+    assert programs.wait("broken", 10) == 3
+    assert programs.check(may_end=()) == {"broken": 3}

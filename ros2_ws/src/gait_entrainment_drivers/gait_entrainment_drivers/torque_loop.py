@@ -33,11 +33,11 @@ from gait_entrainment.robot.faults import (
     Fault,
 )
 from gait_entrainment.robot.pulse_train import PulseTrain
-from gait_entrainment.stop_channel import StopAnswer, StopListener
 from gait_entrainment_drivers.device import Reading, TorqueDevice
 from gait_entrainment_drivers.device_lock import DeviceLock
 from gait_entrainment_drivers.link import Link, Sample
 from gait_entrainment_drivers.monitor import NEAR_ZERO_SHARE, NOT_FALLING, Monitor
+from gait_entrainment_drivers.stop_channel import StopAnswer, StopListener
 
 HOST_SILENT = Fault(
     "host_silent",
@@ -196,7 +196,8 @@ class TorqueLoop:
     def _obey(self, kind: str, *content: Any) -> None:
         if kind == "train":
             (train,) = content
-            self._train = None if self._halted else train
+            if not self._halted:
+                self._train = self._train.followed_by(train) if self._train else train
         elif kind == "cancel":
             self._train = None
         elif kind == "stop":

@@ -7,14 +7,21 @@ import math
 import time
 from dataclasses import dataclass, replace
 
-from gait_entrainment.robot import Fault
-from gait_entrainment.robot.emulated import EmulatedAnkleRobot
+from gait_entrainment.robot import Fault, PulseTrain, Shape
 from gait_entrainment.robot.ideal import IdealAnkleRobot
+from gait_entrainment_drivers.emulated import EmulatedAnkleRobot
 
 
 @dataclass(frozen=True)
 class OptionsWithoutMeaning:
-    speed: float = 1.0
+    rate: float = 1000.0
+
+
+def changed(train, changes):
+    """The train with other pulses: ``changes`` gives what becomes of each."""
+    return PulseTrain(
+        train.side, tuple(replace(pulse, **changes(pulse)) for pulse in train.pulses)
+    )
 
 
 class NoPeakTorque(IdealAnkleRobot):
@@ -58,12 +65,23 @@ class FaultWhileAllIsWell(IdealAnkleRobot):
 
 class SwallowsAPulse(IdealAnkleRobot):
     def schedule(self, train):
-        super().schedule(replace(train, count=max(train.count - 1, 1)))
+        super().schedule(PulseTrain(train.side, train.pulses[:-1] or train.pulses))
+
+
+class ForgetsTheTrainBefore(IdealAnkleRobot):
+    def schedule(self, train):
+        self._train = None
+        super().schedule(train)
+
+
+class KnowsOnlySquares(IdealAnkleRobot):
+    def schedule(self, train):
+        super().schedule(changed(train, lambda _: {"shape": Shape.SQUARE}))
 
 
 class WrongSign(IdealAnkleRobot):
     def schedule(self, train):
-        super().schedule(replace(train, torque=-train.torque))
+        super().schedule(changed(train, lambda pulse: {"torque": -pulse.torque}))
 
 
 class OnsetsNotTold(IdealAnkleRobot):
@@ -73,7 +91,7 @@ class OnsetsNotTold(IdealAnkleRobot):
 
 class HalfTheImpulse(IdealAnkleRobot):
     def schedule(self, train):
-        super().schedule(replace(train, duration=train.duration / 2))
+        super().schedule(changed(train, lambda pulse: {"duration": pulse.duration / 2}))
 
 
 class DependsOnTheCuts(EmulatedAnkleRobot):
@@ -87,12 +105,13 @@ class DependsOnTheCuts(EmulatedAnkleRobot):
 
 class Overshoots(IdealAnkleRobot):
     def schedule(self, train):
-        super().schedule(replace(train, torque=1.3 * train.torque))
+        super().schedule(changed(train, lambda pulse: {"torque": 1.3 * pulse.torque}))
 
 
 class Saturates(IdealAnkleRobot):
     def schedule(self, train):
-        super().schedule(replace(train, torque=min(max(train.torque, -10.0), 10.0)))
+        limited = changed(train, lambda p: {"torque": min(max(p.torque, -10.0), 10.0)})
+        super().schedule(limited)
 
 
 class CannotRefuse(IdealAnkleRobot):
@@ -209,12 +228,12 @@ class CommandsNotTold(EmulatedAnkleRobot):
 
 class ComesLate(IdealAnkleRobot):
     def schedule(self, train):
-        super().schedule(replace(train, first_onset=train.first_onset + 80_000_000))
+        super().schedule(train.shifted(80_000_000))
 
 
 class ComesEarly(IdealAnkleRobot):
     def schedule(self, train):
-        super().schedule(replace(train, first_onset=train.first_onset - 5_000_000))
+        super().schedule(train.shifted(-5_000_000))
 
 
 class Dawdles(IdealAnkleRobot):
@@ -236,7 +255,7 @@ class Hangs(IdealAnkleRobot):
 # Each with the checks that must catch it, and a word of the sentence.
 BROKEN = [
     (NoPeakTorque, "construction", "peak_torque is 0"),
-    (UnexplainedOptions, "construction", "speed does not tell its meaning"),
+    (UnexplainedOptions, "construction", "rate does not tell its meaning"),
     (CannotReconnect, "lifecycle", "port is still open"),
     (CannotReconnect, "reconnecting", "port is still open"),
     (FailsToDeactivate, "lifecycle", "Deactivating failed: driver_failed"),
@@ -245,7 +264,9 @@ BROKEN = [
     (FaultWhileAllIsWell, "idle", "fault: odd"),
     (FaultWhileAllIsWell, "states", "reports odd|latched"),
     (SwallowsAPulse, "pulses", "Onsets"),
-    (SwallowsAPulse, "one_at_a_time", "1 of 2 pulses"),
+    (SwallowsAPulse, "in_turn", "were scheduled"),
+    (ForgetsTheTrainBefore, "in_turn", "were scheduled"),
+    (KnowsOnlySquares, "shapes", "A pulse of 1.02 N m s had 1.6 N m s"),
     (WrongSign, "pulses", "had -"),
     (OnsetsNotTold, "pulses", "Onsets"),
     (HalfTheImpulse, "pulses", "had 0.6 N m s"),

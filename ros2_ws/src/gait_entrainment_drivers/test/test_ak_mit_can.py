@@ -40,7 +40,7 @@ def enabled(robot):
 
 def pulses(robot, count=2, torque=8.0, duration=0.15, after=0.1):
     first = time.time_ns() + round(after * 1e9)
-    robot.schedule(PulseTrain(Side.RIGHT, first, 0.7, count, torque, duration))
+    robot.schedule(PulseTrain.periodic(Side.RIGHT, first, 0.7, count, torque, duration))
     return first
 
 
@@ -192,7 +192,7 @@ from gait_entrainment.robot import PulseTrain, find_driver
 robot = find_driver(sys.argv[1]).make(Side.RIGHT)
 robot.configure(); robot.activate(); robot.arm()
 robot.begin(time.time_ns())
-robot.schedule(PulseTrain(Side.RIGHT, time.time_ns() + 100_000_000, 9.0, 1, 8.0, 0.5))
+robot.schedule(PulseTrain.periodic(Side.RIGHT, time.time_ns() + 100_000_000, 9.0, 1, 8.0, 0.5))
 {end}
 time.sleep(30)
 """

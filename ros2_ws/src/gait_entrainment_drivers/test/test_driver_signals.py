@@ -18,9 +18,9 @@ from .emulator_process import emulator, read_trace, until
 def test_the_kit_that_is_stopped_leaves_no_torque(tmp_path, number):
     trace = tmp_path / "trace"
     with emulator(trace=trace) as driver:
-        words = [sys.executable, "-m", "gait_entrainment", "driver", "prove", driver, "--arm"]
+        words = "-m", "gait_entrainment_commands", "driver", "prove", driver, "--arm"
         kit = subprocess.Popen(
-            words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            [sys.executable, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
             # As a shell starts a job in the background.
             preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN),
         )  # fmt: skip

@@ -57,7 +57,7 @@ def test_its_own_test_is_the_kit(outside):
         " -p gait_entrainment_drivers.pytest_plugin -p no:cacheprovider"
     )
     assert done.returncode == 0, done.stdout
-    assert "40 passed" in done.stdout
+    assert "42 passed" in done.stdout
 
 
 def test_the_worked_example_passes_its_own_tests(outside):

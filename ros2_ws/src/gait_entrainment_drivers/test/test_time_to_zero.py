@@ -33,7 +33,7 @@ def pushed_into(driver, limits=None):
     robot.arm()
     robot.begin(time.time_ns())
     onset = time.time_ns() + 50_000_000
-    robot.schedule(PulseTrain(Side.RIGHT, onset, 2.0, 1, HEIGHT, 0.5))
+    robot.schedule(PulseTrain.periodic(Side.RIGHT, onset, 2.0, 1, HEIGHT, 0.5))
     return robot
 
 

@@ -14,7 +14,7 @@ from misbehaving_device import PEAK, MisbehavingOptions, MisbehavingRobot
 from gait_entrainment.conventions import Side
 from gait_entrainment.robot import DeviceError, PulseTrain
 from gait_entrainment.robot.guard import GuardedRobot
-from gait_entrainment.stop_channel import listening, stop_all
+from gait_entrainment_drivers.stop_channel import listening, stop_all
 
 from .emulator_process import until
 
@@ -40,7 +40,7 @@ class Bench:
 
     def push(self, seconds=0.4, count=1):
         onset = time.time_ns() + SECOND // 20
-        self.robot.schedule(PulseTrain(Side.LEFT, onset, 0.6, count, HEIGHT, seconds))
+        self.robot.schedule(PulseTrain.periodic(Side.LEFT, onset, 0.6, count, HEIGHT, seconds))
 
     def commands(self):
         rows = [

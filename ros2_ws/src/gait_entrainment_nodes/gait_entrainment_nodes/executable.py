@@ -10,12 +10,12 @@ from gait_entrainment.errors import EntrainmentError
 from gait_entrainment_nodes.messaging.environment import PACKAGE, require_usable_environment
 
 
-def main() -> int:
-    """Run the node to its end and return its exit code."""
+def main(package: str = f"{PACKAGE}.nodes") -> int:
+    """Run the node, a module of the package, to its end and return its exit code."""
     name = sys.argv[0].rpartition("/")[2]
     try:
         require_usable_environment()
-        return int(importlib.import_module(f"{PACKAGE}.nodes.{name}").main())
+        return int(importlib.import_module(f"{package}.{name}").main())
     except (EntrainmentError, OSError) as error:
         print(f"{name}: {error}", file=sys.stderr)
         return 1

@@ -34,6 +34,7 @@ from gait_entrainment_drivers.conformance.checks import COMMON
 from gait_entrainment_msgs.action import DeliverPulseTrain
 from gait_entrainment_msgs.msg import Horizon
 from gait_entrainment_nodes.messaging.client import Client
+from gait_entrainment_nodes.messaging.goals import goal_of
 from gait_entrainment_nodes.messaging.stamps import header, to_time
 from gait_entrainment_nodes.messaging.topics import HORIZON, PULSES, ROBOT_STATE, TORQUE_PROFILE
 
@@ -98,15 +99,7 @@ class _NodeRobot:
             account.clear()
 
     def schedule(self, train: PulseTrain) -> None:
-        goal = DeliverPulseTrain.Goal(
-            run=self.run,
-            side=int(train.side),
-            first_onset=to_time(train.first_onset),
-            period=train.period,
-            count=train.count,
-            torque=train.torque,
-            duration=train.duration,
-        )
+        goal = goal_of(self.run, train)
         handle = self.client.send_goal(DeliverPulseTrain, self._train, goal, patience=PATIENCE)
         if not handle.accepted:
             unarmed = not (self.capabilities.simulated or self._arm)
@@ -252,7 +245,7 @@ class NodeBench(Bench):
         require(ended, "A delivered train did not end.")
         outcome, delivered = ended.result.outcome, ended.result.delivered
         require(
-            (outcome, delivered) == (ended.result.DELIVERED, train.count),
+            (outcome, delivered) == (ended.result.DELIVERED, len(train.pulses)),
             f"A delivered train ended with: {ended.result.message}",
         )
 

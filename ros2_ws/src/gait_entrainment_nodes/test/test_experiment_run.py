@@ -115,7 +115,7 @@ def test_each_progress_is_answered_once_all_that_it_covers_is_here(bench):
 def test_nothing_is_promised_while_pulses_are_requested(bench):
     instant = bench.walk_to_planning()
     (train,) = bench.trains
-    assert train.count == 1
+    assert len(train.pulses) == 1
     count = len(bench.horizons)
     bench.promise()
     bench.report(instant)
@@ -123,8 +123,9 @@ def test_nothing_is_promised_while_pulses_are_requested(bench):
     bench.run.take_answer(True)
     assert len(bench.horizons) == count + 1
     state = bench.run.state(Part.PULSES)
-    assert state.pulse_period == train.period
-    assert nanoseconds_of(state.first_onset) == train.first_onset
+    assert state.pulse_period == bench.run.conductor.block.pulse_period
+    assert nanoseconds_of(state.first_onset) == train.onsets[0]
+    assert (state.block, state.blocks, state.block_name) == (1, 1, "paper_example")
 
 
 def test_perturbator_that_does_not_answer_is_named(bench):

@@ -6,15 +6,24 @@
 import pytest
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.robot import DeviceError, DeviceLimits, LimitError, PulseTrain, find_driver
+from gait_entrainment.robot import (
+    DeviceError,
+    DeviceLimits,
+    LimitError,
+    Pulse,
+    PulseTrain,
+    Shape,
+    find_driver,
+)
 from gait_entrainment.robot.faults import TORQUE_EXCEEDED
-from gait_entrainment_bags.messages import nanoseconds_of
+from gait_entrainment_bags.messages import MessageError, nanoseconds_of, train_of
 from gait_entrainment_msgs.msg import AnkleRobotState
+from gait_entrainment_nodes.messaging.goals import goal_of
 from gait_entrainment_nodes.messaging.topics import PULSES, TORQUE_PROFILE
 from gait_entrainment_nodes.nodes.perturbator_run import Result, Run
 
 SECOND = 10**9
-TRAIN = PulseTrain(
+TRAIN = PulseTrain.periodic(
     side=Side.RIGHT, first_onset=3 * SECOND, period=1.0, count=2, torque=5.0, duration=0.1
 )
 
@@ -71,7 +80,7 @@ def test_train_is_delivered_once_its_last_pulse_is_promised(bench):
 
 
 def test_train_beyond_the_limits_is_refused_and_changes_nothing(bench):
-    too_much = PulseTrain(
+    too_much = PulseTrain.periodic(
         side=Side.RIGHT, first_onset=3 * SECOND, period=1.0, count=1, torque=1e3, duration=0.1
     )
     with pytest.raises(LimitError, match="torque"):
@@ -170,3 +179,33 @@ def test_real_robots_torque_is_promised_piece_by_piece(bench, monkeypatch):
     bench.run.look_after()  # the next horizon is late: nothing is left to promise
     assert len(bench.profiles) == 2
     assert len(bench.states) >= states
+
+
+def test_trains_end_in_their_order_each_once_its_last_pulse_is_promised(bench):
+    bench.run.take_horizon(SECOND, 2 * SECOND, last=False)
+    bench.run.schedule(TRAIN)
+    bench.run.schedule(TRAIN.shifted(5 * SECOND))
+    assert bench.run.requested == 4
+    bench.run.take_horizon(2 * SECOND, 7 * SECOND, last=False)
+    assert bench.outcomes() == [(Result.DELIVERED, 2, "every pulse was delivered")]
+    bench.run.take_horizon(7 * SECOND, 9 * SECOND, last=False)
+    bench.run.end_torque(Result.CANCELLED, "enough")
+    assert bench.outcomes()[1:] == [(Result.CANCELLED, 1, "enough")]
+    assert [pulse.number for pulse in bench.pulses] == [1, 2, 3]
+    assert bench.run.requested == 3
+
+
+def test_pulses_of_every_shape_survive_the_goal():
+    pulses = (
+        Pulse(3 * SECOND, 5.0, 0.1),
+        Pulse(4 * SECOND, -4.0, 0.2, Shape.TRAPEZOID, 0.05, 0.1),
+        Pulse(5 * SECOND, 0.0, 0.1, Shape.HALF_SINE),
+        Pulse(6 * SECOND, 2.0, 0.3, Shape.SAMPLES, samples=(0.0, 1.0, -0.5, 0.0)),
+    )
+    train = PulseTrain(Side.LEFT, pulses)
+    goal = goal_of(3, train)
+    assert goal.run == 3
+    assert train_of(goal) == train
+    goal.pulses[2].shape = 9
+    with pytest.raises(MessageError, match=r"shape: 9; allowed: 0 \(square\), 1"):
+        train_of(goal)

@@ -16,6 +16,7 @@ from hypothesis.extra import numpy as arrays
 from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Empty
 
 from gait_entrainment_bags import find_definition
 from gait_entrainment_msgs.msg import AnkleRobotState, TorqueProfile
@@ -149,3 +150,9 @@ def test_nested_numbers_are_filled_where_they_adjoin():
 def test_stamp_lies_where_the_recorder_looks_for_it():
     data = serialize(JointState(header=header(12_000_000_034)))
     assert struct.unpack_from("<iI", data, 4) == (12, 34)
+
+
+def test_a_message_without_fields_has_the_octet_that_stands_for_them():
+    data = serialize(Empty())
+    assert data == b"\x00\x01\x00\x00\x00"
+    assert deserialize_message(data, Empty) == Empty()

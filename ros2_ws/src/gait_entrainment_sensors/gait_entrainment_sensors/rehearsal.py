@@ -113,7 +113,7 @@ def rehearse(protocol: Protocol, sensors: Sensors) -> Rehearsal:
         truth=tuple(truth),
         events=tuple(detected),
         onsets=tuple(onsets),
-        train=conductor.train,
+        train=conductor.block.train,
         analysis=analyze(detected, onsets, protocol.side),
         true_analysis=analyze(truth, onsets, protocol.side),
         ending=walker.ending,

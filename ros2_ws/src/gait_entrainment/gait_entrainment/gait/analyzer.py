@@ -7,9 +7,9 @@ import math
 from bisect import bisect_left
 from collections import deque
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from gait_entrainment.conventions import EventKind, Side, nanoseconds
+from gait_entrainment.conventions import Side
 from gait_entrainment.gait.plausibility import GaitLimits
 from gait_entrainment.gait.pulse_phase import (
     LagFollower,
@@ -25,12 +25,12 @@ from gait_entrainment.gait.strides import (
     UnperturbedPeriod,
 )
 from gait_entrainment.gait.verdict import Entrainment, EntrainmentTest, VerdictSettings
-from gait_entrainment.settings import Setting
 
 Result = Stride | PulsePhase | Entrainment
-TOE_OFF_BIAS = Setting("by how much toe-offs are detected late", unit="s", least=-0.2, most=0.2)
 # Whose strides they are is not known here: ten times smaller or larger than a person's.
 _ANYBODY = GaitLimits(stride_least=0.03, stride_most=50.0)
+# So many strides in a row that are known to be without a pulse are the pause before another train.
+_PAUSE_STRIDES = 5
 
 
 @dataclass(slots=True)
@@ -63,17 +63,17 @@ class GaitAnalyzer:
     to its own, once the next stride is closed too. So results depend on the events and the onsets,
     never on how events and promises interleave, except for a stop, which happens when it happens.
     Lags are followed, and verdicts formed, since the latest of ``holes`` or of the trains began.
-    ``toe_off_bias`` [s] is by how much the source is known to see toe-offs late.
     """
 
     def __init__(
-        self, side: Side, settings: VerdictSettings | None = None, toe_off_bias: float = 0.0
+        self, side: Side, settings: VerdictSettings | None = None, strides_before: int = 0
     ) -> None:
-        self._bias = nanoseconds(toe_off_bias)
         self._tracker = StrideTracker(side, _ANYBODY)
+        self._strides_before = strides_before  # of the leg in the run, which are of no interest
         self._test = EntrainmentTest(settings or VerdictSettings())
         self._lags = LagFollower()
         self._unperturbed = UnperturbedPeriod()
+        self._pause = self._unperturbed  # strides since the latest pulse
         self._strides: deque[Stride] = deque()  # closed, pulses not placed yet
         self._before: Stride | None = None  # the latest stride whose pulses are placed
         self._onsets: list[int] = []  # announced, not placed yet; ascending
@@ -91,8 +91,6 @@ class GaitAnalyzer:
 
     def add_event(self, event: GaitEvent) -> list[Result]:
         """Take one gait event; return the results that it completes, in order."""
-        if self._bias and event.kind is EventKind.TOE_OFF:
-            event = replace(event, stamp=event.stamp - self._bias)
         stride = self._tracker.add(event)
         if stride is None:
             return []
@@ -158,7 +156,7 @@ class GaitAnalyzer:
     ) -> list[Result]:
         """Place the pulses that began before the end of a stride; then ask for the verdict."""
         before = self._before
-        number = 0 if before is None else before.number
+        number = self._strides_before if before is None else before.number
         if stride.number != number + 1:
             start = stride.start if before is None else before.end
             lost = f"{stride.number - number - 1} stride(s)"
@@ -166,14 +164,17 @@ class GaitAnalyzer:
             before = None
         if after is not None and after.number != stride.number + 1:
             after = None
+        paused = self._numbers.number > 0 and self._pause.count >= _PAUSE_STRIDES
+        if onsets and (paused or self._numbers.number == 0):
+            self._unperturbed = self._pause
+            self._unperturbed.settle(_ANYBODY)
         unperturbed = self._unperturbed
-        if onsets and self._numbers.number == 0:
-            unperturbed.settle(_ANYBODY)
         pulses: list[PulsePhase] = []
         judged = 0  # the first of them that neither a hole nor another train comes after
         for onset in onsets:
             latest = self._numbers.latest
-            missing = self._numbers.place(onset, unperturbed.mean)
+            missing = self._numbers.place(onset, unperturbed.mean, anew=paused)
+            paused = False
             if missing != 0:
                 hole = Hole(latest, onset, f"{missing} pulse(s)") if missing else None
                 self._begin_anew(hole, another_train=missing is None)
@@ -186,10 +187,13 @@ class GaitAnalyzer:
             self.pulse_counts.placed += 1
             self.pulse_counts.without_lag += pulse.toe_off is None
             pulses.append(pulse)
+        unseen = any(s < stride.end and stride.start < e for s, e in self._unknown)
+        if onsets or (unseen and self._numbers.number):
+            self._pause = UnperturbedPeriod()
         # Once it is not known whether pulses have begun, no stride is an unperturbed one.
-        if self._numbers.number == 0 and not any(s < stride.end for s, _ in self._unknown):
-            unperturbed.add(stride)
-        if any(s < stride.end and stride.start < e for s, e in self._unknown):
+        elif self._numbers.number or not any(s < stride.end for s, _ in self._unknown):
+            self._pause.add(stride)
+        if unseen:
             self._begin_anew(None)
             return list(pulses)
         entrainment = self._test.add(stride, pulses[judged:], unperturbed)
@@ -220,15 +224,16 @@ def analyze(
     side: Side,
     settings: VerdictSettings | None = None,
     unknown: Iterable[tuple[int, int]] = (),
-    toe_off_bias: float = 0.0,
+    strides_before: int = 0,
 ) -> Analysis:
     """
     Analyze a whole run of one perturbed leg offline, with the very class that runs online.
 
     Events come in the order in which they were received; onsets [ns] in any. It is ``unknown``
-    which pulses began from one instant to another [ns].
+    which pulses began from one instant to another [ns]. Of a part of a run so many strides of the
+    leg came before.
     """
-    analyzer = GaitAnalyzer(side, settings, toe_off_bias)
+    analyzer = GaitAnalyzer(side, settings, strides_before)
     for start, end in unknown:
         analyzer.add_hole(start, end)
     results = [result for event in events for result in analyzer.add_event(event)]

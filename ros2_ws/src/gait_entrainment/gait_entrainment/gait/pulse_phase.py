@@ -74,14 +74,15 @@ class PulseNumbers:
         self._periods = 0  # between the two
         self._steady = False  # whether the period is known
 
-    def place(self, onset: int, stride: float) -> int | None:
+    def place(self, onset: int, stride: float, *, anew: bool = False) -> int | None:
         """Take an onset [ns]; return how many lack before it, None if another train begins."""
         steps = 1.0 if self.number else 0.0
         if self._periods:
             steps = (onset - self.latest) * self._periods / (self.latest - self._first)
         whole, interval = round(steps), (onset - self.latest) / NANOSECONDS_PER_SECOND
         self.latest = onset
-        if not 1 <= whole <= (whole if self._steady else 1) or abs(steps - whole) > 0.25:
+        follows = 1 <= whole <= (whole if self._steady else 1) and abs(steps - whole) <= 0.25
+        if anew or not follows:
             self._first, self._periods, self._steady = onset, 0, False
             self.number += 1
             return None if self.number > 1 else 0

@@ -192,6 +192,11 @@ class UnperturbedPeriod:
         self.deviation = math.nan  # standard deviation of the strides [s]; NaN with one
         self.standard_error = math.nan  # of the mean [s]; NaN with one stride
 
+    @property
+    def count(self) -> int:
+        """Strides taken."""
+        return len(self._periods)
+
     def add(self, stride: Stride) -> None:
         """Take one stride."""
         self._periods.append(stride.end - stride.start)

@@ -3,10 +3,11 @@
 
 """What an experiment shall do: the protocol file, validated."""
 
-from gait_entrainment.protocol.protocol import FIELDS, Protocol, ProtocolError, PulsePlan
+from gait_entrainment.protocol.block import Block, ProtocolError, PulsePlan
+from gait_entrainment.protocol.protocol import FIELDS, Protocol, content_of
 from gait_entrainment.protocol.reader import (
     DEFAULT_PROTOCOL,
     read_protocol,
-    said_of,
+    said_limits,
     write_protocol,
 )

@@ -9,23 +9,31 @@ PyYAML's node graph keeps the line of every key, which its loaded dictionaries d
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import yaml
 
 from gait_entrainment.parameters import ParameterError
-from gait_entrainment.protocol.protocol import FIELDS, SECTIONS, Protocol, ProtocolError
-from gait_entrainment.settings import SettingError
+from gait_entrainment.protocol.block import HEIGHTS, TIMINGS, Block, ProtocolError
+from gait_entrainment.protocol.protocol import (
+    BLOCK_FIELDS,
+    FIELDS,
+    SECTIONS,
+    Protocol,
+    content_of,
+)
+from gait_entrainment.settings import Setting, SettingError
 
 DEFAULT_PROTOCOL = Protocol()
 
-# Of two ways to say the same, the one that is given replaces the other.
-_ALTERNATIVES = (
-    ("pulses.torque", "pulses.torque_fraction"),
-    ("pulses.period", "pulses.period_offset"),
-)
+# Of several ways to say the same, the one that is given replaces the others.
+_ALTERNATIVES = tuple([f"pulses.{name}" for name in group] for group in (HEIGHTS, TIMINGS))
+
+
+_SUSPECTS = ("pulses.period", "pulses.phase", "pulses.shape", "pulses.count")
+_B = TypeVar("_B", bound=Block)
 
 
 class _Entry(NamedTuple):
@@ -55,35 +63,35 @@ def read_protocol(
     """
     entries = dict(_entries(source)) if source is not None else {}
     replacing = {key: _Entry(*given) for key, given in (overrides or {}).items()}
-    for pair in _ALTERNATIVES:
-        if any(key in replacing for key in pair):
-            for key in pair:
-                entries.pop(key, None)
-    entries |= replacing
-    for first, second in _ALTERNATIVES:
-        if first in entries and second in entries:
-            raise ProtocolError(
-                f"{entries[second].where}: {second}: give either {first} or {second}, not both"
-            )
-    return _build(entries)
+    blocks = entries.pop("blocks", None)
+    if blocks is None:
+        return _build(Protocol, _merged(entries, replacing))
+    # What is said beside the blocks holds for each that does not say otherwise.
+    common = {key: entries.pop(key) for key in BLOCK_FIELDS if key in entries and key != "name"}
+    in_blocks = {k: e for k, e in replacing.items() if k in BLOCK_FIELDS and k != "name"}
+    made = [
+        _build(Block, _merged(_merged(common, said), in_blocks))
+        for said in blocks.value  # type: ignore[attr-defined]
+    ]
+    whole = {k: e for k, e in replacing.items() if k not in in_blocks}
+    return replace(_build(Protocol, entries | whole), blocks=tuple(made))
 
 
 def write_protocol(protocol: Protocol) -> str:
     """Return the text of a protocol file (YAML) that reads back as the same protocol."""
-    content: dict[str, Any] = asdict(protocol)
-    content["side"] = protocol.side.name.lower()
-    content["pulses"] = {k: v for k, v in content["pulses"].items() if v is not None}
-    content["limits"] = said_of(protocol, "limits")
-    content["variation"] = said_of(protocol, "variation")
+    content = content_of(protocol)
+    for block in content.get("blocks", [content]):
+        block["pulses"] = {k: v for k, v in block["pulses"].items() if v is not None}
+    content["limits"] = said_limits(protocol)
     said = {k: v for k, v in content.items() if v != {}}
     text: str = yaml.safe_dump(said, sort_keys=False)
     return text
 
 
-def said_of(protocol: Protocol, section: str) -> dict[str, Any]:
-    """Return what a protocol says of a section: all that is not as it is by itself."""
-    unsaid = asdict(getattr(DEFAULT_PROTOCOL, section))
-    return {k: v for k, v in asdict(getattr(protocol, section)).items() if v != unsaid[k]}
+def said_limits(protocol: Protocol) -> dict[str, Any]:
+    """Return what a protocol says of the limits: all that is not as it is by itself."""
+    unsaid = asdict(DEFAULT_PROTOCOL.limits)
+    return {k: v for k, v in asdict(protocol.limits).items() if v != unsaid[k]}
 
 
 def _entries(source: Path | str) -> Iterator[tuple[str, _Entry]]:
@@ -107,10 +115,12 @@ def _entries(source: Path | str) -> Iterator[tuple[str, _Entry]]:
     except RecursionError:
         raise ProtocolError(f"{name}: nested too deeply for a protocol") from None
     if root is not None:
-        yield from _walk(root, name, "")
+        yield from _walk(root, name, "", FIELDS)
 
 
-def _walk(node: yaml.Node, name: str, prefix: str) -> Iterator[tuple[str, _Entry]]:
+def _walk(
+    node: yaml.Node, name: str, prefix: str, allowed: Mapping[str, Setting]
+) -> Iterator[tuple[str, _Entry]]:
     if not isinstance(node, yaml.MappingNode):
         section = prefix.rstrip(".") or "a protocol"
         raise ProtocolError(
@@ -123,12 +133,19 @@ def _walk(node: yaml.Node, name: str, prefix: str) -> Iterator[tuple[str, _Entry
         if key in seen:
             raise ProtocolError(f"{where}: {key}: appears twice; keep one")
         seen.add(key)
-        if key in SECTIONS:
-            yield from _walk(value_node, name, key + ".")
-        elif key not in FIELDS or "." in str(key_node.value):  # a section's field has one place
-            inside = [field.removeprefix(prefix) for field in FIELDS if field.startswith(prefix)]
+        if key == "blocks" and allowed is FIELDS:
+            if not isinstance(value_node, yaml.SequenceNode) or not value_node.value:
+                raise ProtocolError(f"{where}: blocks: must be a list of at least one block")
+            blocks = [dict(_walk(block, name, "", BLOCK_FIELDS)) for block in value_node.value]
+            yield key, _Entry(blocks, where)
+        elif any(field.startswith(f"{key}.") for field in allowed):
+            yield from _walk(value_node, name, key + ".", allowed)
+        elif key not in allowed or "." in str(key_node.value):  # a section's field has one place
+            inside = [field.removeprefix(prefix) for field in allowed if field.startswith(prefix)]
             known = ", ".join(sorted({field.partition(".")[0] for field in inside}))
             raise ProtocolError(f"{where}: {key}: unknown field; allowed: {known}")
+        elif isinstance(value_node, yaml.SequenceNode) and FIELDS[key].kind is str:
+            yield key, _Entry(", ".join(str(item.value) for item in value_node.value), where)
         elif not isinstance(value_node, yaml.ScalarNode):
             raise ProtocolError(f"{where}: {key}: must be a single value")
         else:
@@ -154,25 +171,41 @@ def _require_plain_number(where: str, key: str, node: yaml.ScalarNode, value: ob
         )
 
 
-def _build(entries: Mapping[str, _Entry]) -> Protocol:
-    sections: dict[str, dict[str, Any]] = {"": {}, **{section: {} for section in SECTIONS}}
+def _merged(entries: Mapping[str, _Entry], replacing: Mapping[str, _Entry]) -> dict[str, _Entry]:
+    """Return entries of which some are replaced, with what says the same in another way."""
+    replaced = {
+        k for group in _ALTERNATIVES if not replacing.keys().isdisjoint(group) for k in group
+    }
+    merged = {k: e for k, e in entries.items() if k not in replaced} | dict(replacing)
+    for group in _ALTERNATIVES:
+        if len(given := [key for key in group if key in merged]) > 1:
+            raise ProtocolError(
+                f"{merged[given[1]].where}: {given[1]}: give either {' or '.join(given)}, not both"
+            )
+    return merged
+
+
+def _build(kind: type[_B], entries: Mapping[str, _Entry]) -> _B:
+    """Return a block or a whole protocol from what is said of it."""
+    sections: dict[str, dict[str, Any]] = {"": {}}
+    rules = BLOCK_FIELDS if kind is Block else FIELDS
     for key, (value, where) in entries.items():
-        rule, (section, _, name) = FIELDS[key], key.rpartition(".")
+        rule, (section, _, name) = rules[key], key.rpartition(".")
         try:
             # YAML 1.1 reads 1e-3, which has no dot, as a text.
             read = rule.parse(key, value) if isinstance(value, str) else rule.check(key, value)
-            sections[section][name] = read
+            sections.setdefault(section, {})[name] = read
         except SettingError as error:
             raise ProtocolError(f"{where}: {error}") from None
-    # A torque or a period that is given leaves no place for the default of its alternative.
-    for pair in _ALTERNATIVES:
-        for given, default in (pair, pair[::-1]):
-            if given in entries:
-                sections["pulses"][default.partition(".")[2]] = None
+    # What is given leaves no place for the default of its alternative.
+    for group in _ALTERNATIVES:
+        if any(key in entries for key in group):
+            unsaid = {key.partition(".")[2]: None for key in group}
+            sections["pulses"] = unsaid | sections["pulses"]
     values = sections.pop("")
     try:
         values |= {name: SECTIONS[name](**content) for name, content in sections.items()}
-        return Protocol(**values)
+        return kind(**values)
     except ParameterError as error:
         # The message begins with the field; if that is a default, the others are at fault.
         named = f"walker.{str(error).partition(':')[0]}"
@@ -181,6 +214,6 @@ def _build(entries: Mapping[str, _Entry]) -> Protocol:
         raise ProtocolError(f"{', '.join(dict.fromkeys(places))}: walker: {error}") from None
     except ProtocolError as error:
         # What is wrong may be a default; then the field that does not go with it is at fault.
-        suspects = (str(error).partition(":")[0], "pulses.period")
+        suspects = (str(error).partition(":")[0], *_SUSPECTS, *entries)
         place = next((entries[key].where + ": " for key in suspects if key in entries), "")
         raise ProtocolError(f"{place}{error}") from None

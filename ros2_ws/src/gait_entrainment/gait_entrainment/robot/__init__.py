@@ -9,5 +9,5 @@ from gait_entrainment.robot.faults import DeviceError, Fault, LimitError
 from gait_entrainment.robot.guard import GuardedRobot
 from gait_entrainment.robot.limits import DeviceLimits, Dose, PlannedPulses
 from gait_entrainment.robot.profile import ProfileError, TorqueProfile
-from gait_entrainment.robot.pulse_train import PulseTrain
+from gait_entrainment.robot.pulse_train import Pulse, PulseTrain, Shape
 from gait_entrainment.robot.timing import MeasuredOnsets, PulseTiming, measured_onset

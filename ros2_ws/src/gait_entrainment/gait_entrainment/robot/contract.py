@@ -68,8 +68,8 @@ class AnkleRobot(ABC):
     activate       activate      enable the device at zero torque                     DeviceError
     begin          first horizon start the account of a run: profiles adjoin from     DeviceError
                                  its first instant on
-    schedule       goal          take over a train; refuse one that it cannot         DeviceError,
-                                 deliver, and then change nothing                     LimitError
+    schedule       goal          take over a train, to follow those before; refuse    DeviceError,
+                                 one that it cannot deliver, and change nothing       LimitError
     cancel         goal's cancel zero torque from now on, ready for another train     DeviceError
     promise        horizon       report the delivered torque                          DeviceError
     read           each promise  hand over the states since the last call             DeviceError
@@ -131,11 +131,11 @@ class AnkleRobot(ABC):
 
     @abstractmethod
     def schedule(self, train: PulseTrain) -> None:
-        """Take over a train that the guard has checked; it replaces one that is over."""
+        """Take over a train that the guard has checked; it comes after those taken before."""
 
     @abstractmethod
     def cancel(self) -> None:
-        """Drop the train: torque is zero from now on."""
+        """Drop every train: torque is zero from now on."""
 
     @abstractmethod
     def promise(self, until: int) -> TorqueProfile:

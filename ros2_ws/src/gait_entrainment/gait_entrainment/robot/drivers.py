@@ -24,10 +24,10 @@ from gait_entrainment.robot.limits import DeviceLimits, Dose
 from gait_entrainment.settings import SettingError, settings_of
 
 ENTRY_POINTS = "gait_entrainment.drivers"
-# Those of this package are named here, so that a simulation need not search all packages first.
+# The simulated ones are named here, so that a simulation need not search all packages first.
 OWN_DRIVERS = {
     "ideal": "gait_entrainment.robot.ideal:IdealAnkleRobot",
-    "emulated": "gait_entrainment.robot.emulated:EmulatedAnkleRobot",
+    "emulated": "gait_entrainment_drivers.emulated:EmulatedAnkleRobot",
 }
 
 

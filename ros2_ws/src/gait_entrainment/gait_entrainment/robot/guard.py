@@ -41,6 +41,8 @@ from gait_entrainment.robot.pulse_train import PulseTrain
 
 # How often the watchdog looks whether the experiment has fallen silent [s].
 _WATCH_PERIOD = 0.01
+# After so long without a pulse [ns] the next ones are another train, whose first ones rise anew.
+_PAUSE = 5 * NANOSECONDS_PER_SECOND
 
 _T = TypeVar("_T")
 
@@ -59,11 +61,12 @@ class GuardedRobot:
         self.side = side
         self.limits = limits or DeviceLimits()
         self.dose = dose or Dose()  # goes on from robot to robot, as the session does
-        self.train: PulseTrain | None = None  # scheduled last
-        self.delivered = 0  # pulses of it that have begun in what was promised
+        self.train: PulseTrain | None = None  # what was scheduled in the run, as the driver has it
+        self.delivered = 0  # pulses of the run that have begun in what was promised
         self.promised_until = 0  # everything before this instant is promised [ns]
         self.faults: tuple[Fault, ...] = ()  # what latched the torque at zero, in order
-        self._configured = self._active = self._begun = False
+        self._configured = self._active = self._in_run = False
+        self._begun = 0  # pulses scheduled since the latest pause
         self._armed_until = -math.inf  # steady time [s]
         self._delivered_torque = _DeliveredTorque(self.limits)
         self._last_heard = math.inf  # steady time [s]
@@ -93,12 +96,6 @@ class GuardedRobot:
     def armed(self) -> bool:
         """Whether torque is allowed; a device in simulated time needs no arming."""
         return time.monotonic() < self._armed_until
-
-    @property
-    def busy(self) -> bool:
-        """Whether some pulse of the train has not been promised to its end."""
-        train = self.train
-        return train is not None and train.end(train.count - 1) > self.promised_until
 
     # Lifecycle. Each step raises DeviceError if it is not its turn or the driver fails.
 
@@ -148,7 +145,7 @@ class GuardedRobot:
         self._call(lambda: self._robot.begin(start))
         self.train, self.delivered, self.promised_until = None, 0, start
         self._delivered_torque = _DeliveredTorque(self.limits)
-        self._begun = True
+        self._in_run = True
         self.heard()
 
     def deactivate(self) -> None:
@@ -166,7 +163,7 @@ class GuardedRobot:
     def close(self) -> None:
         """Bring the torque to zero, disable and release, from any state; never raises."""
         self.deactivate()
-        self._configured = self._begun = False
+        self._configured = self._in_run = False
         self._quietly(self._robot.close)
         atexit.unregister(self.close)
 
@@ -186,10 +183,10 @@ class GuardedRobot:
 
     def schedule(self, train: PulseTrain) -> None:
         """
-        Accept a train of pulses.
+        Accept a train of pulses; they follow those that were accepted before.
 
-        Raises LimitError, and nothing changes, if the train is outside the limits, is for the
-        other ankle, begins before what was already promised, or comes before another one is over;
+        Raises LimitError, and nothing changes, if the train is outside the limits, also together
+        with those before it, is for the other ankle, or begins before what was already promised;
         DeviceError if the device is not active, not armed, latched, or cannot take the train.
         """
         self._refuse_latched()
@@ -199,24 +196,28 @@ class GuardedRobot:
             lapsed = math.isfinite(self._armed_until)
             why = f"was armed more than {self.limits.arming:g} s ago" if lapsed else "is not armed"
             raise DeviceError(f"the device {why}; see that all is well, then arm it")
-        self.limits.check(train)
+        before = self.train
+        self.limits.check(train, before.pulses if before else ())
         self.limits.check_dose(self.dose, train)
         peak = self.capabilities.peak_torque
-        if abs(train.torque) > peak:
+        largest = max((pulse.torque for pulse in train.pulses), key=abs)
+        if abs(largest) > peak:
             raise LimitError(
-                f"torque: {train.torque:g} N m is more than the device can deliver; "
+                f"torque: {largest:g} N m is more than the device can deliver; "
                 f"allowed: -{peak:g} to {peak:g} N m"
             )
         if train.side is not self.side:
             raise LimitError(f"side: {train.side.name.lower()}; the robot sits on the other ankle")
-        if self.busy:
-            raise LimitError("a pulse train is under way; allowed: one at a time")
-        if train.first_onset < self.promised_until:
-            late = (self.promised_until - train.first_onset) / NANOSECONDS_PER_SECOND
-            raise LimitError(f"first_onset: lies {late:g} s inside what is already promised")
-        train = self.limits.softened(train)
+        first = train.onsets[0]
+        if first < self.promised_until:
+            late = (self.promised_until - first) / NANOSECONDS_PER_SECOND
+            raise LimitError(f"onset: lies {late:g} s inside what is already promised")
+        if before is None or first - before.end > _PAUSE:
+            self._begun = 0
+        train = self.limits.softened(train, self._begun)
         self._call(lambda: self._robot.schedule(train))
-        self.train, self.delivered = train, 0
+        self._begun += len(train.pulses)
+        self.train = before.followed_by(train) if before else train
         self.heard()
         if self.faults:  # a stop from another thread came in between
             self.stop()
@@ -295,7 +296,7 @@ class GuardedRobot:
             raise DeviceError("the device is not active; configure and activate it first")
 
     def _refuse_before_begin(self) -> None:
-        if not self._begun:
+        if not self._in_run:
             raise DeviceError("no run is under way; begin one first")
 
     def _call(self, function: Callable[[], _T]) -> _T:

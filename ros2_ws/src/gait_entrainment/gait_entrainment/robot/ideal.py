@@ -4,6 +4,10 @@
 """
 The ideal ankle robot: delivers exactly the commanded pulses, without delay.
 
+Square pulses are exact to the nanosecond. Any other is a staircase: each step has the torque that
+is asked for in its middle. So the torque is wrong by at most slope / (2 rate), and the impulse of
+a step of length h by at most h^3 / 24 times the curvature, or h^2 / 8 times a kink of the slope.
+
 Not modelled: torque bandwidth, delay, jitter, noise, resolution, the robot's own inertia and
 friction, a lost command, and how the torque runs down after a stop.
 """
@@ -12,18 +16,25 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
 from gait_entrainment.robot.contract import Capabilities, RobotState
 from gait_entrainment.robot.profile import TorqueProfile
-from gait_entrainment.robot.pulse_train import PulseTrain
+from gait_entrainment.robot.pulse_train import Pulse, Shape
 from gait_entrainment.robot.simulated import SimulatedRobot
-
-# A flank is delivered in steps of this length [ns], each at the flank's mean torque in it.
-_STEP = 1_000_000
+from gait_entrainment.settings import check_settings, setting
 
 
 @dataclass(frozen=True)
 class IdealOptions:
-    """The ideal robot has nothing to choose."""
+    """The one thing to choose; it matters for pulses that are not square."""
+
+    rate: float = setting(
+        1000.0, "steps of torque per second along a flank or a curve", "Hz", (10.0, 100_000.0)
+    )
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        check_settings(self)
 
 
 class IdealAnkleRobot(SimulatedRobot):
@@ -38,6 +49,10 @@ class IdealAnkleRobot(SimulatedRobot):
         state_rate=0.0,
     )
 
+    def __init__(self, side: Side, options: IdealOptions, seed: int) -> None:
+        super().__init__(side, options, seed)
+        self._step = round(NANOSECONDS_PER_SECOND / options.rate)
+
     def promise(self, until: int) -> TorqueProfile:
         """Return the torque up to ``until`` [ns]; there is a state for each change of it."""
         profile = super().promise(until)
@@ -51,15 +66,15 @@ class IdealAnkleRobot(SimulatedRobot):
         if train is None:
             return
         # The pulse that began last may still be on at the beginning.
-        for number in range(max(train.latest(begin), 0), train.latest(until - 1) + 1):
-            if train.end(number) > begin:
-                yield from _pulse(train, number)
+        for pulse in train.pulses[max(train.latest(begin), 0) : train.latest(until - 1) + 1]:
+            if pulse.end > begin:
+                yield from self._steps(pulse)
 
-
-def _pulse(train: PulseTrain, number: int) -> Iterator[tuple[int, float]]:
-    """Yield the changes of torque of one pulse: two, or steps along its flanks."""
-    onset, end = train.onset(number), train.end(number)
-    for instant in range(onset, end, _STEP if train.ramp else max(end - onset, 1)):
-        middle = (instant + min(instant + _STEP, end)) // 2
-        yield instant, train.shape(number, middle - onset)
-    yield end, 0.0
+    def _steps(self, pulse: Pulse) -> Iterator[tuple[int, float]]:
+        """Yield the changes of torque of one pulse: two if it is square, else one a step."""
+        onset, end = pulse.onset, pulse.end
+        step = max(end - onset, 1) if pulse.shape is Shape.SQUARE else self._step
+        for instant in range(onset, end, step):
+            middle = (instant + min(instant + step, end)) // 2
+            yield instant, pulse.torque_at(middle)
+        yield end, 0.0

@@ -4,10 +4,14 @@
 """Limits that every pulse train is checked against before a robot sees it."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import islice, pairwise
+from typing import Any
 
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, nanoseconds
 from gait_entrainment.robot.faults import LimitError
-from gait_entrainment.robot.pulse_train import PulseTrain
+from gait_entrainment.robot.pulse_train import Pulse, PulseTrain, Shape
 from gait_entrainment.settings import check_settings, setting
 
 _NO_LIMIT = 1_000_000
@@ -27,20 +31,24 @@ class PlannedPulses:
 
     torque: float = setting(200.0, "magnitude of the protocol's pulses", "N m", (0.0, 200.0))
     duration: float = setting(10.0, "their duration", "s", (0.0, 10.0))
-    count: int = setting(_NO_LIMIT, "their number", "1", (1, _NO_LIMIT))
+    count: int = setting(_NO_LIMIT, "their number", "1", (0, _NO_LIMIT))
 
     def __post_init__(self) -> None:
         """Check every field."""
         check_settings(self)
 
-    def check(self, train: PulseTrain) -> None:
-        """Raise LimitError if a train goes beyond the protocol."""
-        for name in ("torque", "duration", "count"):
-            asked, planned = abs(getattr(train, name)), getattr(self, name)
-            if not asked <= planned:
+    def check(self, train: PulseTrain, before: int) -> None:
+        """Raise LimitError if a train, after so many pulses, goes beyond the protocol."""
+        asked = {
+            "torque": max((abs(pulse.torque) for pulse in train.pulses), default=0.0),
+            "duration": max((pulse.duration for pulse in train.pulses), default=0.0),
+            "count": before + len(train.pulses),
+        }
+        for name, value in asked.items():
+            if not value <= getattr(self, name):
                 raise LimitError(
-                    f"{name}: {asked:g} is not of the protocol's pulses; allowed: at most "
-                    f"{planned:g}"
+                    f"{name}: {value:g} is not of the protocol's pulses; allowed: at most "
+                    f"{getattr(self, name):g}"
                 )
 
 
@@ -58,16 +66,16 @@ class DeviceLimits:
     duration: float = setting(0.5, "longest duration of a pulse", "s", (0.001, 10.0))
     rate: float = setting(
         0.0,
-        "steepest flank of a pulse, which becomes a ramp; 0 leaves it square",
+        "steepest flank of a pulse; a square one gets such flanks; 0 leaves it square",
         "N m/s",
         (0.0, 1e6),
     )
     impulse: float = setting(15.0, "largest angular impulse within a stride", "N m s", (0.0, 1e3))
     rising: int = setting(
-        0, "first pulses of a train, which rise in equal steps to its height", "1", (0, 1000)
+        0, "first pulses after a pause, which rise in equal steps to their height", "1", (0, 1000)
     )
     pulses_per_minute: float = setting(
-        600.0, "most pulses in a minute, by the period of a train", "1/min", (1.0, 6000.0)
+        600.0, "most pulses in a minute, by the interval of two", "1/min", (1.0, 6000.0)
     )
     session_pulses: int = setting(
         _NO_LIMIT, "most pulses from when the node was started", "1", (0, _NO_LIMIT)
@@ -96,12 +104,13 @@ class DeviceLimits:
         """Check every field."""
         check_settings(self)
 
-    def check_pulse(self, torque: float, duration: float) -> None:
+    def check_pulse(self, pulse: Pulse) -> None:
         """
-        Raise LimitError if a pulse of this height [N m] and width [s] must not be delivered.
+        Raise LimitError if a pulse must not be delivered, wherever it comes.
 
         A protocol can be checked with this before anything is measured or moved.
         """
+        torque, duration = pulse.torque, pulse.duration
         if not math.isfinite(torque) or abs(torque) > self.torque:
             raise LimitError(
                 f"torque: {torque:g} N m is outside the limit of the device; "
@@ -112,53 +121,88 @@ class DeviceLimits:
                 f"width: {duration:g} s is outside the limit of the device; "
                 f"allowed: above 0 and at most {self.duration:g} s"
             )
-        self._check_impulse(abs(torque) * duration)
-        if self.rate and 2 * abs(torque) / self.rate > duration:
+        pulse.check()
+        self._check_impulse(pulse.impulse)
+        if not self.rate:
+            return
+        if pulse.shape is Shape.SQUARE and 2 * abs(torque) / self.rate > duration:
             raise LimitError(
                 f"rate: a pulse of {duration:g} s does not reach {torque:g} N m at "
                 f"{self.rate:g} N m/s; allowed: wider, lower, or a higher limits.rate"
             )
-
-    def check(self, train: PulseTrain) -> None:
-        """Raise LimitError if a train must not be delivered."""
-        self.check_pulse(train.torque, train.duration)
-        if train.count < 1:
-            raise LimitError(f"count: {train.count}; allowed: at least 1")
-        if not (math.isfinite(train.period) and train.period > train.duration):
+        if pulse.shape is not Shape.SQUARE and pulse.steepest > self.rate * (1 + 1e-9):
             raise LimitError(
-                f"period: {train.period:g} s makes pulses of {train.duration:g} s overlap; "
+                f"rate: {pulse.steepest:.4g} N m/s on a flank; allowed: at most {self.rate:g}"
+            )
+
+    def check(self, train: PulseTrain, before: Sequence[Pulse] = ()) -> None:
+        """Raise LimitError if a train must not be delivered after the pulses ``before`` it."""
+        if not train.pulses:
+            raise LimitError("count: 0; allowed: at least 1")
+        for shape in {replace(pulse, onset=0) for pulse in train.pulses}:
+            self.check_pulse(shape)
+        for pulse, later in pairwise([*before[-1:], *train.pulses]):
+            self._check_interval(pulse, later)
+        window = nanoseconds(self.stride)
+        first = train.onsets[0] - window
+        spans = [
+            (pulse.onset, pulse.end, abs(pulse.torque), pulse.impulse)
+            for pulse in [*before, *train.pulses]
+            if pulse.end > first
+        ]
+        # The largest is in a window that begins with a pulse, or in one that ends with one.
+        mirrored = [(-end, -begin, *height) for begin, end, *height in reversed(spans)]
+        self._check_impulse(max(_largest(spans, window), _largest(mirrored, window)))
+
+    def _check_interval(self, pulse: Pulse, later: Pulse) -> None:
+        """Raise LimitError if a pulse comes too soon after the one before it."""
+        interval = (later.onset - pulse.onset) / NANOSECONDS_PER_SECOND
+        if later.onset <= pulse.end:
+            raise LimitError(
+                f"period: {interval:g} s makes pulses of {pulse.duration:g} s overlap; "
                 "allowed: longer than a pulse"
             )
-        if train.count > 1 and train.duration > self.duty * train.period:
+        if pulse.duration > self.duty * interval:
             raise LimitError(
-                f"duty: {train.duration / train.period:.3g} of the time with torque; "
+                f"duty: {pulse.duration / interval:.3g} of the time with torque; "
                 f"allowed: at most {self.duty:g}"
             )
-        if train.count > 1 and train.period * self.pulses_per_minute < 60 * (1 - 1e-9):
+        # An onset is rounded to a nanosecond.
+        if (interval + 1e-9) * self.pulses_per_minute < 60 * (1 - 1e-9):
             raise LimitError(
-                f"period: {train.period:g} s; allowed: at least "
+                f"period: {interval:g} s; allowed: at least "
                 f"{60 / self.pulses_per_minute:g} s ({self.pulses_per_minute:g} pulses a minute)"
             )
-        self._check_impulse(train.impulse_within(self.stride))
 
     def check_dose(self, dose: Dose, train: PulseTrain) -> None:
         """Raise LimitError if a train is too much after what was received already."""
-        pulses = dose.pulses + train.count
+        pulses = dose.pulses + len(train.pulses)
         if pulses > self.session_pulses:
             raise LimitError(
                 f"session_pulses: {pulses} with this train; allowed: at most {self.session_pulses}"
             )
-        impulse = dose.impulse + abs(train.torque) * train.duration * train.count
+        impulse = dose.impulse + sum(pulse.impulse for pulse in train.pulses)
         if impulse > self.session_impulse:
             raise LimitError(
                 f"session_impulse: {impulse:.4g} N m s with this train; allowed: at most "
                 f"{self.session_impulse:g} N m s"
             )
 
-    def softened(self, train: PulseTrain) -> PulseTrain:
-        """Return a checked train with flanks no steeper than the limit and a gentle beginning."""
-        ramp = abs(train.torque) / self.rate if self.rate else 0.0
-        return replace(train, ramp=ramp, rising=self.rising)
+    def softened(self, train: PulseTrain, begun: int = 0) -> PulseTrain:
+        """
+        Return a checked train with flanks no steeper than the limit and a gentle beginning.
+
+        So many pulses were ``begun`` before, without a pause.
+        """
+        pulses = []
+        for number, pulse in enumerate(train.pulses, begun + 1):
+            torque = pulse.torque * min(number / (self.rising + 1), 1.0)
+            soft = replace(pulse, torque=torque)
+            if pulse.shape is Shape.SQUARE and self.rate and pulse.torque:
+                flank = abs(pulse.torque) / self.rate
+                soft = replace(soft, shape=Shape.TRAPEZOID, rise=flank, fall=flank)
+            pulses.append(soft)
+        return PulseTrain(train.side, tuple(pulses))
 
     def _check_impulse(self, impulse: float) -> None:
         if impulse > self.impulse:
@@ -166,3 +210,17 @@ class DeviceLimits:
                 f"impulse: {impulse:.4g} N m s within {self.stride:g} s is outside the limit of "
                 f"the device; allowed: at most {self.impulse:g} N m s"
             )
+
+
+def _largest(spans: Sequence[Any], window: int) -> float:
+    """Return the largest impulse [N m s] in a window [ns] that begins with one of the spans."""
+    largest = 0.0
+    for number, (begin, *_) in enumerate(spans):
+        inside = 0.0
+        for onset, _, torque, impulse in islice(spans, number, None):
+            left = (begin + window - onset) / NANOSECONDS_PER_SECOND
+            if left <= 0:
+                break
+            inside += min(impulse, torque * left)
+        largest = max(largest, inside)
+    return largest

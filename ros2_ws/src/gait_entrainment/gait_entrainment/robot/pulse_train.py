@@ -1,80 +1,155 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A train of torque pulses on one ankle: square, or with ramps for flanks."""
+"""Torque pulses on one ankle: when each begins, how high it is, and which shape it has."""
 
+import enum
 import math
-from dataclasses import dataclass
+from bisect import bisect_left, bisect_right
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side, nanoseconds
+from gait_entrainment.robot.faults import LimitError
+
+
+class Shape(enum.IntEnum):
+    """How the torque of a pulse runs from its onset to its end; numbered as in Pulse.msg."""
+
+    SQUARE = 0  # torque throughout
+    HALF_SINE = 1  # torque sin(pi t / duration)
+    TRAPEZOID = 2  # rises linearly over `rise`, falls linearly over `fall`
+    SAMPLES = 3  # torque times samples at equal distances, linear between them
+
+
+@dataclass(frozen=True)
+class Pulse:
+    """One pulse as it is asked for."""
+
+    onset: int  # stamp [ns]
+    torque: float  # peak [N m], plantarflexion positive; 0 for a sham or a catch pulse
+    duration: float  # width [s], flanks included
+    shape: Shape = Shape.SQUARE
+    rise: float = 0.0  # [s]; of a trapezoid
+    fall: float = 0.0  # [s]; of a trapezoid
+    samples: tuple[float, ...] = ()  # shares of the torque, from onset to end
+
+    @property
+    def end(self) -> int:
+        """Instant at which it is over [ns]."""
+        return self.onset + nanoseconds(self.duration)
+
+    def torque_at(self, instant: int) -> float:
+        """Return the torque [N m] asked for at an instant [ns]."""
+        elapsed, left = instant - self.onset, self.end - instant
+        if elapsed < 0 or left <= 0:
+            return 0.0
+        if self.shape is Shape.SQUARE:
+            return self.torque
+        if self.shape is Shape.TRAPEZOID:
+            flanks = (elapsed, self.rise), (left, self.fall)
+            shares = [t / NANOSECONDS_PER_SECOND / flank for t, flank in flanks if flank]
+            return self.torque * min([*shares, 1.0])
+        place = elapsed / (elapsed + left)
+        if self.shape is Shape.HALF_SINE:
+            return self.torque * math.sin(math.pi * place)
+        whole, part = divmod(place * (len(self.samples) - 1), 1)
+        before, after = self.samples[int(whole)], self.samples[int(whole) + 1]
+        return self.torque * (before + (after - before) * part)
+
+    def check(self) -> None:
+        """Raise LimitError for a shape that cannot be."""
+        flanks = min(self.rise, self.fall) >= 0 and self.rise + self.fall <= self.duration
+        if self.shape is Shape.TRAPEZOID and not flanks:
+            raise LimitError(
+                f"rise: {self.rise:g} s, and fall {self.fall:g} s; allowed: together at most the "
+                f"width of {self.duration:g} s"
+            )
+        shares = len(self.samples) > 1 and all(-1 <= share <= 1 for share in self.samples)
+        if self.shape is Shape.SAMPLES and not shares:
+            raise LimitError("samples: allowed: at least two shares of the torque, from -1 to 1")
+
+    @property
+    def impulse(self) -> float:
+        """Angular impulse [N m s], in magnitude; of samples that change their sign no less."""
+        share = {
+            Shape.SQUARE: lambda: 1.0,
+            Shape.HALF_SINE: lambda: 2 / math.pi,
+            Shape.TRAPEZOID: lambda: 1 - (self.rise + self.fall) / self.duration / 2,
+            Shape.SAMPLES: lambda: (
+                sum(abs(a) + abs(b) for a, b in pairwise(self.samples))
+                / (2 * (len(self.samples) - 1))
+            ),
+        }[self.shape]()
+        return abs(self.torque) * self.duration * share
+
+    @property
+    def steepest(self) -> float:
+        """Steepest flank [N m/s]; inf where the torque jumps."""
+        if self.torque == 0:
+            return 0.0
+        if self.shape is Shape.HALF_SINE:
+            per_second = math.pi / self.duration
+        elif self.shape is Shape.TRAPEZOID and self.rise and self.fall:
+            per_second = 1 / min(self.rise, self.fall)
+        elif self.shape is Shape.SAMPLES and self.samples[0] == self.samples[-1] == 0:
+            change = max(abs(b - a) for a, b in pairwise(self.samples))
+            per_second = change * (len(self.samples) - 1) / self.duration
+        else:
+            per_second = math.inf
+        return abs(self.torque) * per_second
 
 
 @dataclass(frozen=True)
 class PulseTrain:
-    """Pulses at a fixed period; onsets are exact integer nanoseconds."""
+    """Pulses in the order of their onsets, none before the one before it is over."""
 
     side: Side
-    first_onset: int  # stamp of the first onset [ns]
-    period: float  # from onset to onset [s]
-    count: int  # number of pulses
-    torque: float  # height [N m], plantarflexion positive
-    duration: float  # width [s], flanks included
-    ramp: float = 0.0  # duration [s] of each flank, at most half the width; 0 is a square pulse
-    rising: int = 0  # so many first pulses are lower: they rise in equal steps to the height
+    pulses: tuple[Pulse, ...]
 
-    def onset(self, number: int) -> int:
-        """
-        Return the onset [ns] of pulse ``number``, counted from 0.
+    @classmethod
+    def periodic(
+        cls,
+        side: Side,
+        first_onset: int,
+        period: float,
+        count: int,
+        torque: float,
+        duration: float,
+    ) -> "PulseTrain":
+        """Return square pulses at a period [s]; onsets [ns], rounded from the first one."""
+        onsets = (first_onset + nanoseconds(number * period) for number in range(count))
+        return cls(side, tuple(Pulse(onset, torque, duration) for onset in onsets))
 
-        Each onset is rounded from the first one, so that rounding never accumulates.
-        """
-        return self.first_onset + nanoseconds(number * self.period)
+    @cached_property
+    def onsets(self) -> tuple[int, ...]:
+        """Onsets of the pulses [ns]."""
+        return tuple(pulse.onset for pulse in self.pulses)
 
-    def end(self, number: int) -> int:
-        """Return the instant [ns] at which pulse ``number``, counted from 0, ends."""
-        return self.onset(number) + nanoseconds(self.duration)
+    @property
+    def end(self) -> int:
+        """Instant at which the last pulse is over [ns]."""
+        return self.pulses[-1].end
 
     def latest(self, instant: int) -> int:
-        """Return the number of the pulse that began last at an instant [ns]; -1 before all."""
-        if instant < self.first_onset:
-            return -1
-        number = int((instant - self.first_onset) / (self.period * NANOSECONDS_PER_SECOND)) + 1
-        number = min(number, self.count - 1)
-        while number >= 0 and self.onset(number) > instant:  # the division may round upwards
-            number -= 1
-        return number
+        """Return which pulse began last at an instant [ns], counted from 0; -1 before all."""
+        return bisect_right(self.onsets, instant) - 1
 
     def onsets_within(self, begin: int, end: int) -> tuple[int, ...]:
         """Return the onsets [ns] that lie in [begin, end)."""
-        numbers = range(max(self.latest(begin), 0), self.latest(end - 1) + 1)
-        return tuple(onset for onset in map(self.onset, numbers) if begin <= onset)
+        return self.onsets[bisect_left(self.onsets, begin) : bisect_left(self.onsets, end)]
 
     def torque_at(self, instant: int) -> float:
         """Return the torque [N m] asked for at an instant [ns]."""
         number = self.latest(instant)
-        return self.shape(number, instant - self.onset(number)) if number >= 0 else 0.0
+        return self.pulses[number].torque_at(instant) if number >= 0 else 0.0
 
-    def height(self, number: int) -> float:
-        """Return the height [N m] of pulse ``number``, counted from 0."""
-        return self.torque * min((number + 1) / (self.rising + 1), 1.0)
+    def shifted(self, by: int) -> "PulseTrain":
+        """Return the train later by a time [ns], or on another clock."""
+        moved = (replace(pulse, onset=pulse.onset + by) for pulse in self.pulses)
+        return PulseTrain(self.side, tuple(moved))
 
-    def shape(self, number: int, elapsed: int) -> float:
-        """Return the torque [N m] of pulse ``number`` at a time [ns] since its onset."""
-        width = nanoseconds(self.duration)
-        if not 0 <= elapsed < width:
-            return 0.0
-        if self.ramp == 0:
-            return self.height(number)
-        nearest_flank = min(elapsed, width - elapsed) / NANOSECONDS_PER_SECOND
-        return self.height(number) * min(nearest_flank / self.ramp, 1.0)
-
-    def impulse_within(self, window: float) -> float:
-        """
-        Return the largest angular impulse [N m s] that falls into any ``window`` [s].
-
-        No window holds more than the one that begins with a pulse. Ramps and lower first pulses
-        are left out of account, so that the value is never too small.
-        """
-        whole = min(math.floor(window / self.period), self.count)
-        rest = min(window - whole * self.period, self.duration) if whole < self.count else 0.0
-        return abs(self.torque) * (whole * self.duration + rest)
+    def followed_by(self, other: "PulseTrain") -> "PulseTrain":
+        """Return the pulses of this train and those of another that comes after it."""
+        return PulseTrain(self.side, self.pulses + other.pulses)

@@ -48,7 +48,7 @@ class SimulatedRobot(AnkleRobot):
         """Take over a train."""
         if self._halted:
             raise DeviceError("stopped: close and configure first")
-        self._train = train
+        self._train = self._train.followed_by(train) if self._train else train
 
     def cancel(self) -> None:
         """Drop the train; the torque is zero at once."""

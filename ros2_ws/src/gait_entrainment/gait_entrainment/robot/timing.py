@@ -14,7 +14,6 @@ from bisect import bisect_left, insort
 from collections.abc import Sequence
 from dataclasses import dataclass
 from operator import attrgetter
-from typing import Any
 
 from gait_entrainment.conventions import nanoseconds
 from gait_entrainment.robot.contract import RobotState
@@ -65,6 +64,7 @@ class PulseTiming:
     commanded: int
     sent: int | None
     measured: int | None
+    sham: bool = False  # announced without torque: no state can show it
 
     @property
     def onset(self) -> int:
@@ -146,9 +146,10 @@ class MeasuredOnsets:
     def _judge(self) -> PulseTiming:
         """Take the next pulse from those named, and return its timing."""
         onset = self._named.pop(0)
+        announced = onset in self._announced
         height, width = self._announced.pop(onset, (0.0, 0.0))
-        if height == 0:  # a sham, or never announced: no state can show it
-            return PulseTiming(onset, None, None)
+        if height == 0:
+            return PulseTiming(onset, None, None, sham=announced)
         end = self._end(onset, width, self._named[:1])
         self._forget_states_before(onset)
         seen = [state for state in self._states if state.stamp <= end]
@@ -177,27 +178,6 @@ class MeasuredOnsets:
 def lateness_ms(timings: Sequence[PulseTiming], kind: str) -> list[float]:
     """Return by how many ms pulses were "sent" or "measured" after their command, ascending."""
     return sorted(late for timing in timings if (late := timing.late_ms(kind)) is not None)
-
-
-def distribution(
-    timings: Sequence[PulseTiming], kind: str, stride: float
-) -> dict[str, Any] | None:
-    """
-    Return how late the "sent" or "measured" onsets came; None if no pulse shows one.
-
-    Percentages are of a stride [s], None if that is NaN: unknown.
-    """
-    late = lateness_ms(timings, kind)
-    if not late:
-        return None
-    figures = {"median": quantile(late, 0.5), "p99": quantile(late, 0.99), "worst": late[-1]}
-    unknown = math.isnan(stride)
-    return {
-        "pulses": len(late),
-        "missing": len(timings) - len(late),
-        **{f"{name}_ms": ms for name, ms in figures.items()},
-        **{f"{n}_percent": None if unknown else ms / stride / 10 for n, ms in figures.items()},
-    }
 
 
 def quantile(ascending: Sequence[float], share: float) -> float:

@@ -3,6 +3,7 @@
 
 """The conductor: its plan, and the promises that must never cover an unplanned onset."""
 
+import itertools
 import math
 import statistics
 
@@ -11,14 +12,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gait_entrainment.conventions import EventKind, Side
-from gait_entrainment.experiment import Conductor, Part
+from gait_entrainment.experiment import Conductor, GaitError, Part
 from gait_entrainment.gait import GaitEvent, GaitLimits
-from gait_entrainment.protocol import Protocol, ProtocolError, PulsePlan
+from gait_entrainment.protocol import Block, Protocol, ProtocolError, PulsePlan
 
 # These gaits are to be any that a mathematician can think of.
 ANY_GAIT = GaitLimits(
     stride_least=1e-6, stride_most=1e6, stride_change=1.0, silence=10.0, baseline_spread=1.0
 )
+
+# A person's, who does not walk evenly.
+UNSTEADY = GaitLimits(baseline_spread=1.0)
 
 
 def walk(strides, toe_off=0.36):
@@ -38,20 +42,20 @@ def walk(strides, toe_off=0.36):
 
 
 def conduct(conductor, events):
-    """Drive a conductor as a walker would, never past a promise; return horizons and the plan."""
-    reached, rest, horizons, planned_at = 0, list(events), [], None
+    """Drive a conductor as a walker would, never past a promise; return horizons and trains."""
+    reached, rest, horizons, trains = 0, list(events), [], []
     while True:
         horizon = conductor.horizon(reached)
         assert horizon.until > reached, "lock-step would stand still"
         horizons.append(horizon)
         if horizon.last or not rest:
-            return horizons, planned_at
+            return horizons, trains
         reached = horizon.until
         while rest and rest[0].stamp <= reached:
             train = conductor.add_event(rest.pop(0))
             if train is not None:
-                planned_at = reached
-                assert train.first_onset >= reached, "an onset inside what was promised"
+                trains.append(train)
+                assert train.onsets[0] >= reached, "an onset inside what was promised"
 
 
 @settings(derandomize=True, deadline=None, max_examples=150)
@@ -70,12 +74,14 @@ def test_no_promise_covers_an_onset_that_is_not_planned(baseline, periods, phase
     conduct(conductor, events)
     measured = statistics.fmean(round(p * 1e9) / 1e9 for p in periods[: baseline - 1])
     strikes = [e.stamp for e in events if e.kind is EventKind.HEEL_STRIKE and e.side is Side.RIGHT]
-    train = conductor.train
-    assert conductor.measured_period == pytest.approx(measured, abs=2e-9)
+    train = conductor.block.train
+    assert conductor.block.measured_period == pytest.approx(measured, abs=2e-9)
     # The definition, from the strike that starts the last baseline stride.
-    onset = strikes[baseline - 1] + math.floor((1 + phase) * conductor.measured_period * 1e9) + 1
-    assert train.first_onset == onset
-    assert train.period == conductor.measured_period - 0.05
+    onset = (
+        strikes[baseline - 1] + math.floor((1 + phase) * conductor.block.measured_period * 1e9) + 1
+    )
+    assert train.onsets[0] == onset
+    assert conductor.block.pulse_period == conductor.block.measured_period - 0.05
 
 
 @settings(derandomize=True, deadline=None, max_examples=50)
@@ -104,7 +110,7 @@ def test_first_pulse_of_a_constant_gait_is_never_before_the_stride_after_the_bas
     strikes = [round((start + k * period) * 1e9) for k in range(baseline + 1)]
     for k, stamp in enumerate(strikes):
         conductor.add_event(GaitEvent(stamp, EventKind.HEEL_STRIKE, Side.RIGHT, 2 * k))
-    assert 0 <= conductor.train.first_onset - strikes[baseline] <= 2
+    assert 0 <= conductor.block.train.onsets[0] - strikes[baseline] <= 2
 
 
 def test_an_absolute_period_needs_no_measurement():
@@ -115,8 +121,8 @@ def test_an_absolute_period_needs_no_measurement():
     )
     conductor = Conductor(protocol)
     conduct(conductor, walk([1.4] * 4))
-    assert conductor.train.first_onset == round(1.25 * 1.5e9)
-    assert conductor.train.period == 1.5
+    assert conductor.block.train.onsets[0] == round(1.25 * 1.5e9)
+    assert conductor.block.pulse_period == 1.5
 
 
 def test_phases_follow_the_plan():
@@ -126,13 +132,13 @@ def test_phases_follow_the_plan():
     assert conductor.part(0) is Part.BASELINE
     for event in events[:9]:
         conductor.add_event(event)
-    train = conductor.train
-    assert conductor.part(train.first_onset - 1) is Part.BASELINE
-    assert conductor.part(train.first_onset) is Part.PULSES
-    assert conductor.part(train.end(1)) is Part.WASHOUT
+    train = conductor.block.train
+    assert conductor.part(train.onsets[0] - 1) is Part.BASELINE
+    assert conductor.part(train.onsets[0]) is Part.PULSES
+    assert conductor.part(train.end) is Part.WASHOUT
     for event in events[9:]:
         conductor.add_event(event)
-    assert conductor.part(train.end(1)) is Part.FINISHED
+    assert conductor.part(train.end) is Part.FINISHED
 
 
 def test_a_baseline_without_a_complete_stride_says_so():
@@ -143,3 +149,115 @@ def test_a_baseline_without_a_complete_stride_says_so():
     third = [e for e in events if e.kind is EventKind.HEEL_STRIKE and e.step == 6]
     with pytest.raises(ProtocolError, match="no complete stride"):
         conductor.add_event(*third)
+
+
+def strikes_of(events, side=Side.RIGHT):
+    return [e.stamp for e in events if e.kind is EventKind.HEEL_STRIKE and e.side is side]
+
+
+def by_phase(phase, **more):
+    return PulsePlan(period_offset=None, phase=phase, **more)
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(
+    baseline=st.integers(3, 7),
+    periods=st.lists(st.floats(0.95, 1.45), min_size=18, max_size=18),
+    phase=st.floats(0.05, 1, exclude_max=True),
+    longest=st.sampled_from([0.1, 0.3, math.inf]),
+)
+def test_a_pulse_by_phase_lies_where_the_mean_of_five_strides_predicts(
+    baseline, periods, phase, longest
+):
+    protocol = Protocol(baseline=baseline, washout=1, pulses=by_phase(phase, count=6))
+    conductor = Conductor(protocol, longest, UNSTEADY)
+    events = walk(periods)
+    horizons, trains = conduct(conductor, events)
+    assert horizons[-1].last
+    strikes = strikes_of(events)
+    walked = [(b - a) / 1e9 for a, b in itertools.pairwise(strikes)]
+    expected = [
+        strikes[n] + round(phase * statistics.fmean(walked[max(n - 5, 0) : n]) * 1e9)
+        for n in range(baseline, baseline + 6)
+    ]
+    assert [train.onsets[0] for train in trains] == expected
+    assert conductor.block.train.onsets == tuple(expected)
+    assert conductor.block.end == strikes[baseline + 6 + 1]
+
+
+BLOCKS = (
+    Block("first", baseline=4, washout=2, pulses=PulsePlan(count=3), rest=5.0),
+    Block("none", baseline=2, washout=1, pulses=PulsePlan(count=0)),
+    Block("third", baseline=3, washout=0, pulses=by_phase(0.5, count=2)),
+)
+
+
+@settings(derandomize=True, deadline=None, max_examples=40)
+@given(
+    periods=st.lists(st.floats(0.95, 1.45), min_size=32, max_size=32),
+    longest=st.sampled_from([0.1, math.inf]),
+)
+def test_blocks_follow_each_other_each_with_its_own_baseline(periods, longest):
+    conductor = Conductor(Protocol(blocks=BLOCKS), longest, UNSTEADY)
+    events = walk(periods)
+    horizons, trains = conduct(conductor, events)
+    assert horizons[-1].last
+    assert [len(train.pulses) for train in trains] == [3, 1, 1]
+    strikes = strikes_of(events)
+    first, second, third = conductor.blocks
+    assert (first.start, second.end) == (0, third.start)
+    # The first ends with its strides, or with its pulses if these take longer.
+    assert first.end == max(strikes[9], next(s for s in strikes if s >= first.train.end))
+    assert second.start == next(s for s in strikes if s >= first.end + 5 * 10**9)
+    for block in conductor.blocks:
+        start, plan = strikes.index(block.start), block.plan
+        assert block.strides_before == start
+        baseline = strikes[start : start + plan.baseline]
+        mean = (baseline[-1] - baseline[0]) / (plan.baseline - 1) / 1e9
+        assert block.measured_period == pytest.approx(mean, abs=1e-9)
+    assert strikes.index(second.end) - strikes.index(second.start) == 3
+    assert strikes.index(third.end) - strikes.index(third.start) == 5
+
+
+def test_a_rest_may_be_stood_through():
+    conductor = Conductor(Protocol(blocks=BLOCKS))
+    for event in walk([1.2] * 10):
+        conductor.add_event(event)
+    assert conductor.part(12 * 10**9) is Part.REST
+    assert not conductor.horizon(60 * 10**9).last, "silence for longer than any stride"
+
+
+def test_a_baseline_goes_on_until_its_time_and_until_the_gait_is_steady():
+    strides = [1.2, 1.3] * 8 + [1.25] * 14
+    strikes = strikes_of(walk(strides))
+    for more, first in (
+        ({"baseline_time": 10.0}, strikes.index(next(s for s in strikes if s > 10 * 10**9 - 1))),
+        ({"baseline_steady": 0.01}, 26),  # the last ten strides are equal
+    ):
+        protocol = Protocol(baseline=4, pulses=PulsePlan(count=2), **more)
+        conductor = Conductor(protocol)
+        conduct(conductor, walk(strides))
+        assert conductor.block.baseline == pytest.approx(first, abs=1)
+        assert conductor.block.measured_period == pytest.approx(
+            statistics.fmean(strides[conductor.block.baseline - 4 : conductor.block.baseline - 1])
+        )
+    conductor = Conductor(Protocol(baseline_steady=0.01))
+    with pytest.raises(GaitError, match="not steady after 201 strides; allowed: a higher"):
+        conduct(conductor, walk([1.2, 1.3] * 110))
+
+
+def test_sweep_jitter_ramp_and_catch_pulses():
+    plan = PulsePlan(count=9, sweep=-0.08, rising=2, catch_pulses="4, 6", torque=6.0,
+                     torque_fraction=None)  # fmt: skip
+    onsets = plan.onsets(0, 1.0, (0, 1))
+    steps = [b - a for a, b in itertools.pairwise(onsets)]
+    assert steps == pytest.approx([1e9 - 8e7 * n / 7 for n in range(8)], abs=1)
+    assert plan.heights(6.0, (0, 1)) == [2.0, 4.0, 6.0, 0.0, 6.0, 0.0, 6.0, 6.0, 6.0]
+    jittered = PulsePlan(count=200, jitter=0.05)
+    off = [o / 1e9 - n for n, o in enumerate(jittered.onsets(0, 1.0, (3, 1)))]
+    assert off[0] == 0
+    assert 0.04 < max(off) - min(off) <= 0.1
+    assert jittered.onsets(0, 1.0, (3, 1)) == jittered.onsets(0, 1.0, (3, 1))
+    assert jittered.onsets(0, 1.0, (3, 1)) != jittered.onsets(0, 1.0, (3, 2))
+    left_out = PulsePlan(count=40, catch_share=0.25).heights(1.0, (3, 1))
+    assert left_out.count(0.0) == 10

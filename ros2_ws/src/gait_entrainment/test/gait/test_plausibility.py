@@ -107,7 +107,7 @@ def test_a_gait_that_stops_under_pulses_ends_the_run_and_one_that_goes_on_does_n
 def test_stray_strikes_do_not_enter_the_measured_period():
     conductor = Conductor(Protocol())
     gait(conductor, 17, stray=(5, 9))
-    assert conductor.measured_period == pytest.approx(STRIDE / SECOND)
+    assert conductor.block.measured_period == pytest.approx(STRIDE / SECOND)
 
 
 def test_a_baseline_of_strays_ends_the_run_before_the_first_pulse_with_the_figures():

@@ -104,6 +104,31 @@ def test_what_is_written_reads_back_the_same(
         ("pulses: {initial_phase: 1}", ("pulses.initial_phase", "below 1")),
         ("pulses: {torque: 5, torque_fraction: 0.1}", ("torque_fraction", "not both")),
         ("pulses: {period: 2, period_offset: 0.1}", ("period_offset", "not both")),
+        ("pulses: {phase: 0.02}", ("pulses.phase: 0.02", "at least 0.05 and below 1")),
+        ("pulses: {phase: 0.5, period: 2}", ("give either pulses.period or", "not both")),
+        ("pulses: {phase: 0.5, sweep: 0.1}", ("pulses.sweep: does not go with phase",)),
+        ("pulses: {phase: 0.5, initial_phase: 0.1}", ("pulses.initial_phase", "phase")),
+        ("pulses: {phase: 0.5, count: 3}\nbaseline: 2", ("baseline: 2", "at least 3")),
+        ("pulses: {period: 2, sweep: -1.95}", ("pulses.width", "overlap", "0.05 s")),
+        ("pulses: {period: 2, jitter: 0.96}", ("pulses.width", "overlap", "0.08 s")),
+        ("pulses: {shape: triangle}", ("pulses.shape", "square, half_sine, trapezoid, samples")),
+        ("pulses: {rise: 0.01}", ("pulses.rise: does not go with shape square",)),
+        ("pulses: {samples: [0, 1]}", ("pulses.samples: does not go with shape square",)),
+        ("pulses: {shape: trapezoid, rise: 0.2}", ("pulses.rise", "at most the width of 0.1 s")),
+        ("pulses: {shape: samples, samples: [0, x]}", ("pulses.samples: '0, x'", "numbers")),
+        ("pulses: {shape: samples, samples: [0, 2]}", ("pulses.samples", "from -1 to 1")),
+        ("pulses: {shape: samples}", ("pulses.samples", "at least two")),
+        ("pulses: {catch_pulses: [5, 51]}", ("pulses.catch_pulses: 51; allowed: from 1 to 50",)),
+        ("pulses: {catch_share: 0.1, catch_pulses: [1]}", ("pulses.catch_pulses", "catch_share")),
+        ("blocks: 3", ("blocks", "list of at least one")),
+        ("blocks: []", ("blocks", "list of at least one")),
+        ("blocks: [3]", ("must be a mapping",)),
+        ("blocks: [{side: left}]", ("side: unknown field; allowed: baseline, baseline_steady",)),
+        ("blocks: [{blocks: []}]", ("blocks: unknown field",)),
+        ("blocks: [{pulses: {wdth: 1}}]", ("pulses.wdth: unknown field",)),
+        ('blocks: [{name: "a\\nb"}]', ("name", "plain name")),
+        ("blocks: [{rest: -1}]", ("rest: -1", "0 to 86400 s")),
+        ("blocks: [{pulses: {count: 3}}, {pulses: {period: 0.05}}]", ("pulses.width", "overlap")),
         ("walker: {ankle_stiffness: 60}", ("ankle_stiffness", "67.4792 to 111.878")),
         ("walker: {leg_length: 1e-200, foot_length: 2e-201}", ("walker", "too large")),
         ("walker: {mass: .nan}", ("mass",)),
@@ -116,7 +141,7 @@ def test_a_mistake_is_named_with_its_line(line, words):
     with pytest.raises(ProtocolError) as refused:
         read_protocol(text + line + "\n")
     message = str(refused.value)
-    place = 4 if line.startswith("seed") else 3
+    place = 4 if line.startswith("seed") or "\nbaseline" in line else 3
     assert message.startswith(f"protocol:{place}: "), message
     assert "\n" not in message
     for word in words:
@@ -177,3 +202,55 @@ def test_pulses_that_would_overlap_at_the_measured_period_are_refused():
     with pytest.raises(ProtocolError, match="overlap"):
         PulsePlan(width=2.6e-9, period_offset=0.0).period_for(2.7e-9)
     assert math.isnan(PulsePlan(period_offset=0.0).period_for(1.0)) is False
+
+
+BLOCKS = """
+name: two
+pulses: {width: 0.05, torque: 8, count: 5}
+washout: 3
+blocks:
+  - name: fast
+    pulses: {period_ratio: 0.97, shape: samples, samples: [0, 0.5, 1, 0]}
+    rest: 20
+  - baseline_time: 30
+    pulses: {phase: 0.4, torque_fraction: 0.2, count: 0}
+"""
+
+
+def test_what_is_said_beside_the_blocks_holds_for_each_that_does_not_say_otherwise():
+    protocol = read_protocol(BLOCKS)
+    fast, other = protocol.blocks
+    assert (fast.name, fast.baseline, fast.washout, fast.rest) == ("fast", 15, 3, 20.0)
+    assert (fast.pulses.width, fast.pulses.torque, fast.pulses.count) == (0.05, 8.0, 5)
+    assert (fast.pulses.period_ratio, fast.pulses.period_offset) == (0.97, None)
+    assert fast.pulses.pulse(0, 8.0).samples == (0.0, 0.5, 1.0, 0.0)
+    assert (other.name, other.baseline_time, other.pulses.width) == ("block", 30.0, 0.05)
+    assert (other.pulses.torque, other.pulses.torque_fraction) == (None, 0.2)
+    assert (other.pulses.phase, other.pulses.count) == (0.4, 0)
+    assert protocol.strides == (15 + 5 + 3) + (15 + 0 + 3)
+    assert (protocol.planned.torque, protocol.planned.count) == (abs(protocol.pulse_torque), 5)
+    assert read_protocol(write_protocol(protocol)) == protocol
+
+
+def test_an_option_replaces_what_each_block_says():
+    overrides = {"pulses.count": (7, "--pulses"), "name": ("mine", "--name")}
+    protocol = read_protocol(BLOCKS, overrides)
+    assert protocol.name == "mine"
+    assert [block.pulses.count for block in protocol.blocks] == [7, 7]
+
+
+def test_a_block_at_fault_is_named_with_its_line():
+    text = BLOCKS + "  - baseline: 1\n"
+    with pytest.raises(ProtocolError, match=r"^protocol:11: baseline: 1 leaves no complete"):
+        read_protocol(text)
+
+
+def test_the_text_of_a_protocol_without_what_came_later_is_as_it_always_was():
+    text = write_protocol(DEFAULT_PROTOCOL)
+    fields = [line.partition(":")[0].strip() for line in text.splitlines()]
+    assert fields == [
+        *("name", "side", "baseline", "pulses", "count", "width", "torque_fraction"),
+        *("period_offset", "initial_phase", "washout", "walker", "mass", "leg_length"),
+        *("foot_length", "gravity", "leg_angle", "max_plantarflexion", "ankle_stiffness"),
+        *("driver", "seed"),
+    ]

@@ -23,7 +23,7 @@ def test_naming_drivers_loads_none():
     code = (
         "import sys; from gait_entrainment.robot import driver_names, find_driver;"
         "driver_names(); find_driver('ideal');"
-        "print(sorted({'can', 'gait_entrainment.robot.emulated', 'rclpy'} & set(sys.modules)))"
+        "print(sorted({'can', 'gait_entrainment_drivers.emulated', 'rclpy'} & set(sys.modules)))"
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.strip() == "[]"
@@ -55,7 +55,7 @@ def test_only_a_comma_and_a_backslash_before_one_need_a_backslash():
     [
         ("", "driver: '' is unknown; allowed: .*emulated.*ideal"),
         ("emulatd", "'emulatd' is unknown"),
-        ("ideal:delay=1", "ideal: option 'delay=1'; allowed: none"),
+        ("ideal:delay=1", "ideal: option 'delay=1'; allowed: rate"),
         ("emulated:delay", "option 'delay'; allowed: bandwidth, .*NAME=VALUE"),
         ("emulated:delay=0.1,delay=0.2", "delay: appears twice"),
         ("emulated:delay=soon", "delay: 'soon'; allowed: 0 to 0.5 s"),

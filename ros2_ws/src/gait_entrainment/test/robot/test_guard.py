@@ -19,7 +19,9 @@ from gait_entrainment.robot import (
     GuardedRobot,
     LimitError,
     PlannedPulses,
+    Pulse,
     PulseTrain,
+    Shape,
     TorqueProfile,
     find_driver,
 )
@@ -40,7 +42,7 @@ def train(**changes):
         "torque": 13.0,
         "duration": 0.1,
     }
-    return PulseTrain(**{**values, **changes})
+    return PulseTrain.periodic(**{**values, **changes})
 
 
 def ready(limits=None, simulated=True):
@@ -69,7 +71,7 @@ def ready(limits=None, simulated=True):
         ({"impulse": 1.5}, {"period": 0.5, "torque": -13.0}, "impulse: 2.6 N m s"),
         ({"duty": 0.05}, {}, "duty: 0.0526.*at most 0.05"),
         ({"pulses_per_minute": 30.0}, {}, r"period: 1.9 s; allowed: at least 2 s \(30 pulses"),
-        ({}, {"period": 2e-9, "duration": 1e-9, "count": 2**32}, "duty: 0.5|period|impulse"),
+        ({}, {"period": 2e-9, "duration": 1e-9}, "period: 2e-09 s"),
         ({"session_pulses": 3}, {}, "session_pulses: 4 with this train; allowed: at most 3"),
         ({"session_impulse": 5.0}, {}, "session_impulse: 5.2 N m s.*at most 5"),
         ({}, {"first_onset": -1}, "already promised"),
@@ -110,15 +112,44 @@ def test_the_devices_peak_and_the_end_of_what_is_promised_are_allowed():
     assert guard.train is not None
 
 
-def test_one_train_at_a_time_until_it_is_cancelled_or_the_run_begins_anew():
+def test_a_train_comes_after_the_one_before_until_it_is_cancelled_or_the_run_begins_anew():
     guard, driver = ready()
     for over in (guard.cancel, lambda: guard.begin(0)):
         guard.schedule(train())
-        with pytest.raises(LimitError, match="under way"):
+        with pytest.raises(LimitError, match="overlap"):
             guard.schedule(train())
         over()
         assert guard.train is None
     assert driver.calls.count("schedule") == 2
+
+
+def test_limits_hold_over_the_border_of_two_trains():
+    guard, _ = ready(DeviceLimits(impulse=1.5, duty=1.0))
+    guard.schedule(train(count=1))
+    with pytest.raises(LimitError, match=r"impulse: 2\.6 N m s within 1 s"):
+        guard.schedule(train(first_onset=3 * SECOND + 700_000_000))
+    guard.schedule(train(first_onset=4 * SECOND + 1, count=1))
+    assert guard.train.onsets == (3 * SECOND, 4 * SECOND + 1)
+
+
+def test_pulses_asked_for_one_by_one_rise_as_those_of_one_train():
+    guard, _ = ready(DeviceLimits(rising=2))
+    onsets = [n * SECOND for n in (3, 5, 7, 9, 20)]  # the last one after a pause
+    for onset in onsets:
+        guard.schedule(train(first_onset=onset, count=1, torque=12.0))
+    assert [pulse.torque for pulse in guard.train.pulses] == [4.0, 8.0, 12.0, 12.0, 4.0]
+
+
+def test_a_flank_is_held_against_the_rate_whatever_the_shape():
+    limits = DeviceLimits(rate=300.0)
+    limits.check_pulse(Pulse(0, 9.5, 0.1, Shape.HALF_SINE))
+    for pulse in (
+        Pulse(0, 9.6, 0.1, Shape.HALF_SINE),
+        Pulse(0, 9.0, 0.1, Shape.TRAPEZOID, rise=0.02, fall=0.05),
+        Pulse(0, 9.0, 0.1, Shape.SAMPLES, samples=(0.1, 1.0, 0.0)),
+    ):
+        with pytest.raises(LimitError, match=r"rate: .*allowed: at most 300"):
+            limits.check_pulse(pulse)
 
 
 def test_each_activation_and_each_run_begins_anew():
@@ -135,16 +166,17 @@ def test_each_activation_and_each_run_begins_anew():
 
 def test_a_single_pulse_is_held_against_the_impulse_before_anything_moves():
     limits = DeviceLimits(impulse=1.2)
-    limits.check_pulse(-11.9, 0.1)
+    limits.check_pulse(Pulse(0, -11.9, 0.1))
     with pytest.raises(LimitError, match=r"impulse: 1\.3 N m s"):
-        limits.check_pulse(-13.0, 0.1)
+        limits.check_pulse(Pulse(0, -13.0, 0.1))
 
 
 @pytest.mark.parametrize("torque", [-13.0, 13.0])
 def test_a_rate_makes_ramps(torque):
     guard, driver = ready(DeviceLimits(rate=520.0))
     guard.schedule(train(torque=torque))
-    assert driver.train.ramp == pytest.approx(0.025)
+    flanks = {(pulse.shape, pulse.rise, pulse.fall) for pulse in driver.train.pulses}
+    assert flanks == {(Shape.TRAPEZOID, 0.025, 0.025)}
 
 
 @pytest.mark.parametrize("call", ["activate", "arm", "begin", "schedule", "promise"])
@@ -211,11 +243,11 @@ def test_the_dose_goes_on_from_run_to_run_and_from_robot_to_robot():
 
 def test_only_the_pulses_of_the_protocol_are_asked_for():
     planned = PlannedPulses(torque=13.0, duration=0.1, count=4)
-    planned.check(train())
-    planned.check(train(torque=-13.0, count=1))
+    planned.check(train(), 0)
+    planned.check(train(torque=-13.0, count=1), 3)
     for changes in ({"torque": -13.1}, {"duration": 0.11}, {"count": 5}, {"torque": math.nan}):
         with pytest.raises(LimitError, match="not of the protocol's pulses; allowed: at most"):
-            planned.check(train(**changes))
+            planned.check(train(**changes), 0)
 
 
 def test_a_stop_latches_until_closed_and_configured():

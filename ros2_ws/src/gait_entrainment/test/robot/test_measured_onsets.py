@@ -19,7 +19,7 @@ def record(driver, period):
     robot.configure()
     robot.activate()
     robot.begin(0)
-    robot.schedule(PulseTrain(Side.LEFT, 400 * MS, period, 8, HEIGHT, WIDTH))
+    robot.schedule(PulseTrain.periodic(Side.LEFT, 400 * MS, period, 8, HEIGHT, WIDTH))
     promises, states = [], []
     for until in range(90 * MS, 4500 * MS, 290 * MS):
         profile = robot.promise(until)

@@ -18,7 +18,7 @@ from gait_entrainment.robot import (
     find_driver,
     measured_onset,
 )
-from gait_entrainment.robot.timing import distribution, quantile
+from gait_entrainment.robot.timing import quantile
 
 MS = 1_000_000
 
@@ -62,7 +62,7 @@ def test_the_audit_of_an_emulated_robot_finds_its_delay_and_lag():
     robot.configure()
     robot.activate()
     robot.begin(0)
-    robot.schedule(PulseTrain(Side.LEFT, 500 * MS, 1.0, 3, 10.0, 0.2))
+    robot.schedule(PulseTrain.periodic(Side.LEFT, 500 * MS, 1.0, 3, 10.0, 0.2))
     onsets = MeasuredOnsets()
     for until in range(100 * MS, 4000 * MS, 130 * MS):
         promised = robot.promise(until).onsets
@@ -88,18 +88,6 @@ def test_a_pulse_that_never_came_is_told_as_missing():
     for t in range(0, 1000, 5):
         onsets.add_state(RobotState(t * MS, 0.0, 0.0, math.nan))
     assert onsets.timings == [PulseTiming(100 * MS, None, None)]
-
-
-def test_the_distribution_is_that_of_the_pulses_seen():
-    timings = [PulseTiming(0, n * MS, None) for n in range(1, 201)] + [PulseTiming(0, None, None)]
-    figures = distribution(timings, "sent", 2.0)
-    assert figures["pulses"] == 200
-    assert figures["missing"] == 1
-    assert figures["median_ms"] == pytest.approx(100)
-    assert figures["p99_ms"] == pytest.approx(198)
-    assert figures["worst_ms"] == pytest.approx(200)
-    assert figures["worst_percent"] == pytest.approx(10)
-    assert distribution(timings, "measured", 2.0) is None
 
 
 @pytest.mark.parametrize(("share", "value"), [(0.5, 2), (0.51, 3), (1.0, 4), (0.0, 1)])

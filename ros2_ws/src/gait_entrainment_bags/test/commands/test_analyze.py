@@ -14,9 +14,9 @@ from pathlib import Path
 import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 
-from gait_entrainment.commands import main
 from gait_entrainment_bags import BagReader, BagWriter, check, recover
 from gait_entrainment_bags.recorded_run import read_run
+from gait_entrainment_commands import main
 
 BAG = Path(__file__).parents[5] / "bags" / "paper_example"
 NEEDED = ("/gait_events", "/perturbation/torque_profile")
@@ -124,7 +124,7 @@ def test_the_bag_follows_every_rule_and_opens_without_ros_and_message_packages()
         "        if name.split('.')[0] in ('rclpy', 'gait_entrainment_msgs', 'std_msgs'):\n"
         "            raise ImportError(name)\n"
         "sys.meta_path.insert(0, Block())\n"
-        "from gait_entrainment.commands import main\n"
+        "from gait_entrainment_commands import main\n"
         f"sys.exit(main(['analyze', {str(BAG)!r}]))\n"
     )
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)

@@ -8,8 +8,8 @@ import struct
 
 import pytest
 
-from gait_entrainment.commands import main
 from gait_entrainment_bags import BagWriter, TopicInfo
+from gait_entrainment_commands import main
 
 TEXT = "# C\nT clock\n" + "=" * 80 + "\nMSG: p/T\nint32 sec\nuint32 nanosec\n"
 CLOCK = TopicInfo("/a", "p/msg/C", TEXT, "RIHS01_" + "0" * 64)

@@ -7,7 +7,7 @@ import json
 
 import pytest
 
-from gait_entrainment.commands import main
+from gait_entrainment_commands import main
 from gait_entrainment.protocol import Protocol
 from gait_entrainment.simulation import simulate
 from gait_entrainment_bags import BagWriter

@@ -5,6 +5,7 @@
 
 COMMANDS = {
     "node": "one node of an experiment, where others run on other hosts or in other containers",
+    "page": "what a run does, in a browser, with a stop that works",
     "preflight": "the checklist before a session with a real ankle robot",
     "replay": "a bag played to the gait analyzer over ROS 2",
     "run": "the experiment over real ROS 2 nodes, recorded",

@@ -16,11 +16,13 @@ from gait_entrainment.protocol import Protocol, write_protocol
 from gait_entrainment.robot import find_driver
 from gait_entrainment_bags import BagError, BagReader, UnreadableBagError, recover
 from gait_entrainment_bringup.node_list import (
+    PAGE,
     PERSON_SILENCE,
     STOP_ORDER,
     nodes_for,
     parameter_arguments,
 )
+from gait_entrainment_bringup.page_options import add_page_options, check_heartbeat, checked_page
 from gait_entrainment_bringup.run_options import (
     add_run_options,
     checked_run,
@@ -30,6 +32,7 @@ from gait_entrainment_bringup.run_options import (
 from gait_entrainment_bringup.supervisor import supervised
 from gait_entrainment_drivers.signals import stop_on_signals
 from gait_entrainment_nodes.messaging.domain import claimed_domain
+from gait_entrainment_page.access import Access
 
 DESCRIPTION = "Start the nodes, conduct a protocol, record a bag, print the outcome."
 EXAMPLES = """examples:
@@ -38,6 +41,7 @@ EXAMPLES = """examples:
   entrain run my_protocol.yaml --out bags/mine
   entrain run --walker sensed --detector foot_switch      rehearse an experiment on a person
   ROS_DOMAIN_ID=42 entrain run         in a domain of your choice, to listen with other tools
+  entrain run --real-time --page       with the operator's page (docs/page.md)
   ROS_DOMAIN_ID=42 entrain run --elsewhere walker_sim     it runs on another host: docs/hosts.md
 """
 # Nodes that may run on another host. Not those that hold the torque and the record: Ctrl-C must
@@ -60,6 +64,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--no-figures", action="store_true", help="draw no figures")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--page", action="store_true", help="show the run in a browser")
+    add_page_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -69,6 +75,8 @@ def run(options: argparse.Namespace) -> int:
     protocol, bag = checked_run(options)
     if options.elsewhere and "ROS_DOMAIN_ID" not in os.environ:
         raise UsageError("--elsewhere: set ROS_DOMAIN_ID, to the same number on every host")
+    check_heartbeat(options, protocol)  # of a page that may have been started before
+    options.page_parameters = checked_page(options, protocol) if options.page else {}
     exactly = options.out is not None
     with claimed_domain() as domain, claimed_folder(bag, exactly=exactly) as folder:
         run_experiment(protocol, folder, domain, options)
@@ -84,11 +92,16 @@ def run_experiment(
         domain, STOP_ORDER, partial(kept, bag), real_time=options.real_time
     ) as supervisor:
         given = chosen_parameters(protocol, bag, options)
+        given[PAGE] |= options.page_parameters
         arguments = parameter_arguments(given, supervisor.folder)
         nodes = nodes_for(options.walker)
         for node in nodes:
             if node not in options.elsewhere:
                 supervisor.start(node, arguments)
+        if options.page:
+            supervisor.start(PAGE, arguments, "gait_entrainment_page")
+            access = Access.of_environment(options.host)
+            access.tell(given[PAGE]["port"])  # its own words go to its log
         # Not at the top: it loads ROS, and a mistake in the options is answered without.
         from gait_entrainment_bringup.run_client import SILENCE_TIMEOUT, conduct
 
@@ -102,6 +115,7 @@ def run_experiment(
             quiet=options.json,
             real_time=options.real_time,
             silence=silence,
+            heartbeat=not options.heartbeat,
         )
         supervisor.wait_for_record()
         # No torque is left and the record is closed: in which order the rest ends does not matter.

@@ -5,4 +5,5 @@
 
 COMMANDS = {
     "driver": "ankle robot drivers: list them, check one",
+    "stop": "torque to zero, latched, for every ankle robot that this machine drives",
 }

@@ -3,6 +3,7 @@
 
 """The bench on which an ankle robot is checked: what a check can do with it and see of it."""
 
+import math
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -25,6 +26,8 @@ from gait_entrainment.robot import (
 
 # How often a robot in real time is looked after [s].
 POLL = 0.005
+# Period of the pulses of a harmless train [s].
+PERIOD = 0.4
 # Where the clock of a simulated run begins [ns].
 START = 1000 * NANOSECONDS_PER_SECOND
 
@@ -179,12 +182,12 @@ class Bench(ABC):
         values: dict[str, Any] = {
             "side": self.side,
             "first_onset": self.now + nanoseconds(self.lead),
-            "period": 0.4,
+            "period": PERIOD,
             "count": 1,
             "torque": self.height,
             "duration": 0.15,
         }
-        return PulseTrain(**{**values, **changes})
+        return PulseTrain.periodic(**{**values, **changes})
 
     def request(self, train: PulseTrain) -> str:
         """Ask for a train; return why it is refused, or an empty text."""
@@ -197,9 +200,13 @@ class Bench(ABC):
     def schedule(self, **changes: Any) -> PulseTrain:
         """Ask for a harmless train, which must be accepted, and return it."""
         train = self.train(**changes)
+        self.require_accepted(train)
+        return train
+
+    def require_accepted(self, train: PulseTrain) -> None:
+        """See that a train is accepted."""
         refusal = self.request(train)
         require(not refusal, f"A harmless train was refused: {refusal}.")
-        return train
 
     def require_refused(self, train: PulseTrain, what: str) -> None:
         """See that a train is refused."""
@@ -231,9 +238,20 @@ class Bench(ABC):
 
     def require_delivered(self, train: PulseTrain) -> None:
         """See that every pulse of a train is reported once, at its onset."""
-        expected = [train.onset(number) for number in range(train.count)]
-        got = self.onsets
+        got, expected = self.onsets, list(train.onsets)
         require(got == expected, f"Onsets {got} were reported for pulses at {expected} ns.")
+
+    def require_impulses(self, train: PulseTrain) -> None:
+        """See that every pulse had the impulse that was asked for; at most PERIOD apart."""
+        share = self.tolerances.impulse
+        for pulse in train.pulses:
+            asked = math.copysign(pulse.impulse, pulse.torque)
+            got = self.impulse(pulse.onset - 1, pulse.onset + nanoseconds(PERIOD) - 1)
+            require(
+                abs(got - asked) <= share * abs(asked),
+                f"A pulse of {asked:.3g} N m s had {got:.3g} N m s; allowed: "
+                f"{100 * share:.0f} % off.",
+            )
 
     def require_torque(self, after: str) -> None:
         """See that a harmless train is delivered now."""

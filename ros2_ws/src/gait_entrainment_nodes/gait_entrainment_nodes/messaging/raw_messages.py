@@ -61,9 +61,10 @@ def serialize(message: Any) -> bytes:
 
 def _clear_message(data: bytearray, place: int, message: Any) -> int:
     kind: type = type(message)
-    for name, clear in _clear_fields(kind):
+    fields = _clear_fields(kind)
+    for name, clear in fields:
         place = clear(data, place, getattr(message, name))
-    return place
+    return place if fields else place + 1  # IDL knows no empty structure: ROS puts an octet there
 
 
 @cache

@@ -93,6 +93,7 @@ TROUBLE = Topic(topic_names.TROUBLE, msg.Trouble)
 EMERGENCY_STOP = Topic(topic_names.EMERGENCY_STOP, Bool, SAID_ONCE)
 
 OPERATOR_HEARTBEAT = Topic(topic_names.OPERATOR_HEARTBEAT, Empty, HEARTBEAT)
+OPERATOR_NOTES = Topic(topic_names.OPERATOR_NOTES, msg.Note, LATEST_STATE)
 
 HORIZON = Topic(topic_names.HORIZON, msg.Horizon)
 EXPERIMENT_STATE = Topic(topic_names.EXPERIMENT_STATE, msg.ExperimentState, LATEST_STATE)

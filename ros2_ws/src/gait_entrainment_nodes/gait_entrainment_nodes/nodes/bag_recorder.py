@@ -370,6 +370,8 @@ class BagRecorder(Participant):
         try:
             self._subscribe_to_new_topics()
             self._bag.flush()
+            told = {"output": self.settings.output, "messages": sum(self._bag.counts.values())}
+            self.note_state(DiagnosticStatus.OK, "records", **told)
         except BagError as error:
             self._break_off(error)
 

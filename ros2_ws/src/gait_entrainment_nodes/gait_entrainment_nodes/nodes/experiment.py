@@ -29,8 +29,8 @@ from gait_entrainment_msgs import msg
 from gait_entrainment_msgs.action import DeliverPulseTrain, RunProtocol
 from gait_entrainment_msgs.srv import StartRun
 from gait_entrainment_nodes.messaging import topics
+from gait_entrainment_nodes.messaging.goals import goal_of
 from gait_entrainment_nodes.messaging.readers import who_hangs
-from gait_entrainment_nodes.messaging.stamps import to_time
 from gait_entrainment_nodes.nodes.experiment_run import (
     PERTURBATOR,
     REASON_TIMEOUT,
@@ -39,8 +39,8 @@ from gait_entrainment_nodes.nodes.experiment_run import (
     ExperimentError,
     Run,
 )
+from gait_entrainment_nodes.nodes.goal_server import GoalServer
 from gait_entrainment_nodes.nodes.loop import run_node
-from gait_entrainment_nodes.nodes.one_goal import OneGoalServer
 from gait_entrainment_nodes.nodes.parameters import texts
 from gait_entrainment_nodes.nodes.participant import Participant
 from gait_entrainment_nodes.nodes.participants import ClockError, Participants
@@ -121,7 +121,7 @@ class Experiment(Participant):
         self._get_state = self.client(GetState, f"{PERTURBATOR}/get_state")
         self._deliver = ActionClient(self, DeliverPulseTrain, f"{PERTURBATOR}/deliver_pulse_train")
         self._participants = Participants(self, self.settings.participants, self._waiting)
-        self._server = OneGoalServer(
+        self._server = GoalServer(
             self,
             RunProtocol,
             "~/run_protocol",
@@ -303,15 +303,6 @@ class Experiment(Participant):
         """Ask the perturbator for the pulses of the run."""
         run = self.run
         assert run is not None
-        goal = DeliverPulseTrain.Goal(
-            run=run.number,
-            side=train.side,
-            first_onset=to_time(train.first_onset),
-            period=train.period,
-            count=train.count,
-            torque=train.torque,
-            duration=train.duration,
-        )
 
         def on_answered(future: Future) -> None:
             handle = future.result()
@@ -325,6 +316,7 @@ class Experiment(Participant):
             if result.outcome in (result.STOPPED, result.CANCELLED):
                 run.fail(ExperimentError(f"the pulses were ended: {result.message}"))
 
+        goal = goal_of(run.number, train)
         self._deliver.send_goal_async(goal).add_done_callback(self.guarded(on_answered))
 
     # Waiting, on steady time

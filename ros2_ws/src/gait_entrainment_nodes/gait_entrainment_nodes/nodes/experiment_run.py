@@ -75,7 +75,7 @@ class Run:
         self._progress: msg.Progress | None = None  # received, not answered yet
         self._grant = self._recorded_grant = -1
         self._covered_until = 0  # by profiles [ns since 1970]
-        self._planning = False  # pulses were requested and not accepted yet
+        self._planning = 0  # requests of pulses that were not answered yet
         self._shown: tuple[Part, int] | None = None
         self.forgive()
 
@@ -123,13 +123,16 @@ class Run:
             pulse_period=math.nan,
         )
         if (conductor := self.conductor) is not None:
+            block = conductor.block
             state.strides = conductor.protocol.strides
             state.stride = min(conductor.strides, state.strides)
-            state.measured_period = conductor.measured_period
-            state.measured_period_error = conductor.measured_period_error
-            if conductor.train is not None:
-                state.pulse_period = conductor.train.period
-                state.first_onset = to_time(conductor.train.first_onset)
+            state.block, state.blocks = block.number, len(conductor.protocol.sequence)
+            state.block_name = block.plan.name
+            state.measured_period = block.measured_period
+            state.measured_period_error = block.measured_period_error
+            state.pulse_period = block.pulse_period
+            if block.train is not None:
+                state.first_onset = to_time(block.train.onsets[0])
         return state
 
     # What comes in
@@ -147,7 +150,7 @@ class Run:
             return
         self._events += 1
         if train is not None:
-            self._planning, self._planning_at = True, self._clock()
+            self._planning, self._planning_at = self._planning + 1, self._clock()
             self._request(train)
         self._answer()
 
@@ -191,7 +194,7 @@ class Run:
             self._note_stop()
             return
         self.trouble = ""  # about somebody else's pulses
-        self._planning = False
+        self._planning -= 1
         self._answer()
 
     def _note_stop(self) -> None:

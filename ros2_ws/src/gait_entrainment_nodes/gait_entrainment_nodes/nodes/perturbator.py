@@ -27,21 +27,20 @@ from gait_entrainment.robot import (
     GuardedRobot,
     LimitError,
     PlannedPulses,
-    PulseTrain,
     find_driver,
 )
 from gait_entrainment.robot.faults import DEADMAN_SILENT, NOT_STOPPED, OPERATOR_SILENT
 from gait_entrainment.settings import setting
-from gait_entrainment.stop_channel import StopAnswer
-from gait_entrainment_bags.messages import nanoseconds_of
+from gait_entrainment_bags.messages import MessageError, nanoseconds_of, train_of
 from gait_entrainment_drivers.proof import preflight_of, proof_of, require_proof
+from gait_entrainment_drivers.stop_channel import StopAnswer
 from gait_entrainment_msgs.action import DeliverPulseTrain
 from gait_entrainment_msgs.msg import AnkleRobotSetup, Horizon, Trouble
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.environment import user_and_host
 from gait_entrainment_nodes.messaging.stamps import header
+from gait_entrainment_nodes.nodes.goal_server import GoalServer
 from gait_entrainment_nodes.nodes.loop import run_node
-from gait_entrainment_nodes.nodes.one_goal import OneGoalServer
 from gait_entrainment_nodes.nodes.participant import Participant
 from gait_entrainment_nodes.nodes.perturbator_run import Result, Run
 from gait_entrainment_nodes.nodes.rclpy_internals import TolerantLifecycleNode
@@ -126,7 +125,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
         self.create_service(Trigger, "~/stop", self.on_stop_service)
         self.create_service(Trigger, "~/arm", self._on_arm_service)
         name = "~/deliver_pulse_train"
-        self._server = OneGoalServer(
+        self._server = GoalServer(
             self, DeliverPulseTrain, name, accept=self._on_goal, cancel=self.on_cancel
         )
 
@@ -347,7 +346,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
         """Schedule a train, if the robot can deliver it, and say whether it can."""
         try:
             self._schedule(goal)
-        except (LimitError, DeviceError) as error:
+        except (LimitError, DeviceError, MessageError) as error:
             self._report(DiagnosticStatus.WARN, f"pulse train rejected: {error}")
             return False
         return True
@@ -355,21 +354,10 @@ class Perturbator(Participant, TolerantLifecycleNode):
     def _schedule(self, goal: DeliverPulseTrain.Goal) -> None:
         if self._robot is None:
             raise DeviceError("the perturbator is not active")
-        if self._server.busy:
-            raise LimitError("a pulse train is under way; allowed: one at a time")
         if self.run is None or goal.run != self.run.number:
             raise LimitError(f"run: {goal.run} is not under way")
-        if goal.side not in tuple(Side):
-            raise LimitError(f"side: {goal.side}; allowed: 0 (left), 1 (right)")
-        train = PulseTrain(
-            side=Side(goal.side),
-            first_onset=nanoseconds_of(goal.first_onset),
-            period=goal.period,
-            count=goal.count,
-            torque=goal.torque,
-            duration=goal.duration,
-        )
-        self.planned.check(train)
+        train = train_of(goal)
+        self.planned.check(train, self.run.requested)
         self.run.schedule(train)
 
     def on_cancel(self) -> None:

@@ -9,10 +9,11 @@ without length, after which there is no torque that could be stopped.
 """
 
 import math
+from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from gait_entrainment.robot import GuardedRobot, PulseTrain, RobotState, TorqueProfile
+from gait_entrainment.robot import GuardedRobot, Pulse, PulseTrain, RobotState, TorqueProfile
 from gait_entrainment.robot.faults import STOPPED
 from gait_entrainment_msgs import msg
 from gait_entrainment_msgs.action import DeliverPulseTrain
@@ -46,12 +47,20 @@ class Run:
         self._last = False  # the run ends at the horizon
         self._revision = 0
         self._committed = False  # torque may still come, of a train that was scheduled
-        self._under_way = False  # a train, whose result is still to be told
+        # Of each train whose result is still to be told: how many pulses, and its end [ns].
+        self._under_way: deque[tuple[int, int]] = deque()
+        self._told = 0  # pulses delivered of those whose result has been told
+
+    @property
+    def requested(self) -> int:
+        """Pulses of the run that were delivered or are still to come."""
+        return self._told + sum(count for count, _ in self._under_way)
 
     def schedule(self, train: PulseTrain) -> None:
         """Schedule pulses; raises LimitError or DeviceError if the robot refuses them."""
         self._robot.schedule(train)
-        self._committed = self._under_way = True
+        self._committed = True
+        self._under_way.append((len(train.pulses), train.end))
 
     def take_horizon(self, now: int, until: int, *, last: bool) -> None:
         """
@@ -65,7 +74,7 @@ class Run:
         if now < until:
             self._deliver()
             return
-        self._end_train(Result.ENDED, "the run ended before the last pulse")
+        self._end_trains(Result.ENDED, "the run ended before the last pulse")
         self._publish_profile(TorqueProfile(self._robot.side, (until,), (0.0,), (), until), last)
         self._publish_zero(until)
         self._robot.cancel()
@@ -87,7 +96,7 @@ class Run:
         A ``fault`` is told the walker even if no torque was due.
         """
         self._robot.cancel()  # the robot first, whatever becomes of the messages
-        self._end_train(outcome, reason)
+        self._end_trains(outcome, reason)
         if self._committed or fault:
             self._committed = False
             until = to_time(self._robot.promised_until)
@@ -96,7 +105,7 @@ class Run:
 
     def _deliver(self) -> None:
         robot = self._robot
-        first, train = robot.delivered + 1, robot.train
+        first, train = robot.delivered, robot.train
         profile = robot.promise(self._horizon)
         states = robot.read()
         if profile.valid_until > profile.times[0]:
@@ -104,16 +113,18 @@ class Run:
             self._publish_profile(profile, last)
         for number, onset in enumerate(profile.onsets, first):
             assert train is not None
-            self._publish_pulse(number, onset, train)
+            self._publish_pulse(number + 1, train.pulses[train.latest(onset)])
         for state in states:
             self._publish_state(state)
-        if not (robot.busy or robot.faults):
-            self._end_train(Result.DELIVERED, "every pulse was delivered")
+        if not robot.faults:
+            self._end_trains(Result.DELIVERED, "every pulse was delivered", robot.promised_until)
 
-    def _end_train(self, outcome: int, message: str) -> None:
-        if self._under_way:
-            self._under_way = False
-            delivered = self._robot.delivered
+    def _end_trains(self, outcome: int, message: str, until: float = math.inf) -> None:
+        """Tell the result of each train that is over at an instant [ns]; without one, of all."""
+        while self._under_way and self._under_way[0][1] <= until:
+            count, _ = self._under_way.popleft()
+            delivered = min(self._robot.delivered - self._told, count)
+            self._told += delivered
             self._train_ended(Result(outcome=outcome, message=message, delivered=delivered))
 
     def _publish_profile(self, profile: TorqueProfile, last: bool) -> None:
@@ -132,16 +143,16 @@ class Run:
         self._publish(topics.TORQUE_PROFILE, profile)
         self._revision += 1
 
-    def _publish_pulse(self, number: int, onset: int, train: PulseTrain) -> None:
-        pulse = msg.TorquePulse(
-            header=header(onset),
+    def _publish_pulse(self, number: int, pulse: Pulse) -> None:
+        message = msg.TorquePulse(
+            header=header(pulse.onset),
             run=self.number,
             side=self._robot.side,
             number=number,
-            torque=train.height(number - 1),
-            duration=train.duration,
+            torque=pulse.torque,
+            duration=pulse.duration,
         )
-        self._publish(topics.PULSES, pulse)
+        self._publish(topics.PULSES, message)
 
     def _publish_zero(self, instant: int) -> None:
         self._publish_state(RobotState(instant, 0.0, 0.0, math.nan))

@@ -7,7 +7,7 @@ import select
 import threading
 from collections.abc import Callable
 
-from gait_entrainment.stop_channel import StopAnswer, StopListener
+from gait_entrainment_drivers.stop_channel import StopAnswer, StopListener
 
 # How often the thread looks whether it is to end [s].
 _PERIOD = 0.2

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from gait_entrainment import drawing
-from gait_entrainment.drawing import BLUE, GREEN, GREY, ORANGE, PINK, SKY, YELLOW
+from gait_entrainment_commands import drawing
+from gait_entrainment_commands.drawing import BLUE, GREEN, GREY, ORANGE, PINK, SKY, YELLOW
 from gait_entrainment_studies.cohort.study import Study, verdicts
 
 _COLOURS = {

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from gait_entrainment.drawing import add_dpi_option, chosen_dpi
 from gait_entrainment.errors import UsageError
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.settings import Setting, setting, settings_of
+from gait_entrainment_commands.drawing import add_dpi_option, chosen_dpi
 from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
 from gait_entrainment_studies.locking.walked import CREEP
 

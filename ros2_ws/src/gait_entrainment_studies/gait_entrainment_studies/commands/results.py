@@ -17,8 +17,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from gait_entrainment.commands import main
 from gait_entrainment.errors import EntrainmentError
+from gait_entrainment_commands import main
 
 DESCRIPTION = "Run the commands that the page names and write results.md with its figures."
 EXAMPLES = "examples:\n  entrain results --out docs"

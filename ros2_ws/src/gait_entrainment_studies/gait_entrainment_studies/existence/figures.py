@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from gait_entrainment import drawing
-from gait_entrainment.drawing import BELOW, BLUE, GREY, ORANGE, SKY
 from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment_commands import drawing
+from gait_entrainment_commands.drawing import BELOW, BLUE, GREY, ORANGE, SKY
 from gait_entrainment_studies.existence.stiffness_range import StiffnessRange, switches
 
 

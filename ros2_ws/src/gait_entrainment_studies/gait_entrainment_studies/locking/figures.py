@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from gait_entrainment import drawing
-from gait_entrainment.drawing import BESIDE, BLACK, BLUE, GREEN, GREY, ORANGE
+from gait_entrainment_commands import drawing
+from gait_entrainment_commands.drawing import BESIDE, BLACK, BLUE, GREEN, GREY, ORANGE
 from gait_entrainment_studies.locking.branches import Border, LockedGait, Piece
 from gait_entrainment_studies.locking.pulsed_gait import Place, PulsedGait
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from gait_entrainment import drawing
 from gait_entrainment.conventions import Side
-from gait_entrainment.drawing import BESIDE, BLACK, COLOURS, DASHES, GREY, ORANGE
 from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment_commands import drawing
+from gait_entrainment_commands.drawing import BESIDE, BLACK, COLOURS, DASHES, GREY, ORANGE
 from gait_entrainment_studies.locking.branches import branches_of
 from gait_entrainment_studies.locking.figures import PLACE_COLOURS
 from gait_entrainment_studies.paper.experiments import (

@@ -6,8 +6,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from gait_entrainment import drawing
-from gait_entrainment.drawing import BLACK, BLUE, GREY, ORANGE
+from gait_entrainment_commands import drawing
+from gait_entrainment_commands.drawing import BLACK, BLUE, GREY, ORANGE
 from gait_entrainment_studies.phase_response.response import PhaseResponse, Prediction
 
 

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from gait_entrainment import drawing
-from gait_entrainment.drawing import BELOW, BLACK, GREY, ORANGE
+from gait_entrainment_commands import drawing
+from gait_entrainment_commands.drawing import BELOW, BLACK, GREY, ORANGE
 from gait_entrainment_studies.locking.figures import PLACE_COLOURS
 from gait_entrainment_studies.sweep.plan import SweepPlan
 from gait_entrainment_studies.sweep.row import StableInterval

@@ -7,10 +7,10 @@ import json
 import numpy as np
 import pytest
 
-from gait_entrainment.commands import main
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.protocol import Protocol, PulsePlan
 from gait_entrainment.simulation import simulate
+from gait_entrainment_commands import main
 from gait_entrainment_studies.cohort.study import StudyPlan, run_study, verdicts
 from gait_entrainment_studies.cohort.subjects import SubjectDistributions, Subjects, draw_subjects
 from gait_entrainment_studies.locking.branches import locked_gaits

@@ -8,7 +8,7 @@ import json
 
 import pytest
 
-from gait_entrainment.commands import main
+from gait_entrainment_commands import main
 
 
 def printed(capsys, *arguments):

@@ -3,7 +3,7 @@
 
 import pytest
 
-from gait_entrainment.commands import main, make_parser
+from gait_entrainment_commands import main, make_parser
 from gait_entrainment_studies.commands import results
 
 COMMANDS = results.COMMAND.findall(results.TEMPLATE.read_text())

@@ -15,9 +15,9 @@ from threading import Thread
 import numpy as np
 import pytest
 
-from gait_entrainment.commands import main
 from gait_entrainment.errors import UsageError
 from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment_commands import main
 from gait_entrainment_studies.locking.walked import Outcome, walk_under_pulses
 from gait_entrainment_studies.sweep import engine
 from gait_entrainment_studies.sweep.engine import rows_by_dask, rows_by_processes
@@ -197,7 +197,7 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path, capsys):
     command = [
         sys.executable,
         "-c",
-        "import sys; from gait_entrainment.commands import main; sys.exit(main())",
+        "import sys; from gait_entrainment_commands import main; sys.exit(main())",
         *("sweep", "--out", str(out), "--strides", "400", "--jobs", "1", *OPTIONS),
     ]
     process = subprocess.Popen(

@@ -1,0 +1,244 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+One block of a protocol: baseline strides, pulses, washout strides, and a rest.
+
+The default values are the example of Ahn and Hogan (2012): pulses of 0.1 s and a tenth of the
+peak ankle torque, at a period 50 ms below the walker's own stride period.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, nanoseconds
+from gait_entrainment.errors import UsageError
+from gait_entrainment.parameters import WalkerParameters
+from gait_entrainment.robot import LimitError, Pulse, Shape
+from gait_entrainment.settings import check_settings, setting
+
+# A million strides are three weeks of walking: no run is longer.
+_MOST = 1_000_000
+# A pulse at a smaller phase leaves the robot too little time: it is asked for at the heel strike.
+_LEAST_PHASE = 0.05
+# Of two or more ways to say the same one is given.
+HEIGHTS = ("torque", "torque_fraction")
+TIMINGS = ("period", "period_offset", "period_ratio", "phase")
+
+
+class ProtocolError(UsageError):
+    """A protocol that cannot be conducted; the message says place, field and what is allowed."""
+
+
+def _either(unit: str, meaning: str, within: tuple[float, float], default: Any = None) -> Any:
+    return setting(default, meaning, unit, within, kind=float, optional=True)
+
+
+@dataclass(frozen=True)
+class PulsePlan:
+    """
+    The pulses of a block.
+
+    Exactly one of ``torque`` and ``torque_fraction``, and one of ``period``, ``period_offset``,
+    ``period_ratio`` and ``phase``, is given; the others are None.
+    """
+
+    count: int = setting(50, "number of pulses; 0 for none", within=(0, _MOST))
+    # A pulse shorter than a nanosecond has no stamps.
+    width: float = setting(0.1, "duration of a pulse", "s", (1e-9, 10.0))
+    torque: float | None = setting(
+        None, "height of the pulses, plantarflexion positive", "N m", kind=float, optional=True
+    )
+    torque_fraction: float | None = _either(
+        "1", "the same as a fraction of the peak ankle torque", (-1.0, 1.0), 0.1
+    )
+    # Until the stride period is measured, the experiment proceeds by at most a pulse period.
+    period: float | None = _either(
+        "s", "pulse period, from onset to onset, instead of an offset", (1e-3, 100.0)
+    )
+    period_offset: float | None = _either(
+        "s", "pulse period minus the stride period of the baseline", (-100.0, 100.0), -0.05
+    )
+    initial_phase: float = setting(
+        0.0,
+        "place of the first pulse in the stride after the baseline",
+        "1",
+        (0.0, 1.0),
+        most_excluded=True,
+    )
+    period_ratio: float | None = _either(
+        "1", "pulse period by the stride period of the baseline", (0.01, 100.0)
+    )
+    phase: float | None = setting(
+        None,
+        "place of each pulse in its own stride, of which the length is predicted",
+        "1",
+        (_LEAST_PHASE, 1.0),
+        kind=float,
+        optional=True,
+        most_excluded=True,
+    )
+    sweep: float = setting(0.0, "change of the period, linear, to the last pulse", "s", (-10, 10))
+    jitter: float = setting(0.0, "by which each onset is off its period at most", "s", (0.0, 10.0))
+    shape: Shape = setting(Shape.SQUARE, "square, half_sine, trapezoid or samples")
+    rise: float = setting(0.0, "duration of a trapezoid's first flank", "s", (0.0, 10.0))
+    fall: float = setting(0.0, "duration of a trapezoid's second flank", "s", (0.0, 10.0))
+    samples: str = setting("", "shares of the torque from onset to end, such as [0, 0.4, 1, 0]")
+    rising: int = setting(0, "first pulses, which rise in equal steps", "1", (0, _MOST))
+    catch_share: float = setting(0.0, "share of the pulses that are left out", "1", (0.0, 1.0))
+    catch_pulses: str = setting("", "numbers of the pulses that are left out, such as [5, 12]")
+
+    def __post_init__(self) -> None:
+        """Check every field by itself; Block checks what concerns several."""
+        check_settings(self)
+
+    def period_for(self, measured_period: float) -> float:
+        """
+        Return the first period of the pulses [s] for a measured stride period [s].
+
+        Raises
+        ------
+        ProtocolError
+            if successive pulses would overlap.
+
+        """
+        if self.period is not None:
+            period = self.period
+        elif self.period_ratio is not None:
+            period = measured_period * self.period_ratio
+        else:
+            assert self.period_offset is not None
+            period = measured_period + self.period_offset
+        # In stamps: successive onsets are at least the whole nanoseconds of a period apart.
+        least = min(period, period + self.sweep) - 2 * self.jitter
+        if not least * NANOSECONDS_PER_SECOND >= nanoseconds(self.width) + 1:
+            raise ProtocolError(
+                f"pulses.width: {self.width:g} s makes the pulses overlap at a pulse period of "
+                f"{least:.6g} s; allowed: below the period"
+            )
+        return period
+
+    def onsets(self, first: int, period: float, seed: tuple[int, int]) -> list[int]:
+        """
+        Return the onsets [ns], of which the first is given, at a first period [s].
+
+        The period changes by the same amount from pulse to pulse, by ``sweep`` from the first to
+        the last. Jitter is uniform and does not add up.
+        """
+        change = self.sweep / max(self.count - 2, 1) / 2
+        late = np.zeros(self.count)
+        if self.jitter:
+            late = np.random.default_rng((*seed, 0)).uniform(-self.jitter, self.jitter, self.count)
+            late -= late[0]
+        places = (n * period + n * (n - 1) * change + by for n, by in enumerate(late.tolist()))
+        return [first + nanoseconds(place) for place in places]
+
+    def pulse(self, onset: int, torque: float) -> Pulse:
+        """Return a pulse of this shape at an onset [ns]; its torque [N m] is given."""
+        shares = tuple(_numbers("samples", self.samples, float))
+        return Pulse(onset, torque, self.width, self.shape, self.rise, self.fall, shares)
+
+    def heights(self, torque: float, seed: tuple[int, int]) -> list[float]:
+        """Return the torque of each pulse [N m]: the first ones rise, a catch pulse has none."""
+        left_out = set(_numbers("catch_pulses", self.catch_pulses, int))
+        if self.catch_share:
+            random, chosen = np.random.default_rng((*seed, 1)), self.catch_share * self.count
+            left_out |= set(random.choice(self.count, round(chosen), replace=False) + 1)
+        steps = (
+            0.0 if number in left_out else min(number / (self.rising + 1), 1.0)
+            for number in range(1, self.count + 1)
+        )
+        return [torque * step for step in steps]
+
+    def check(self) -> None:
+        """Raise ProtocolError for what does not go together."""
+        for group in (HEIGHTS, TIMINGS):
+            if sum(getattr(self, name) is not None for name in group) != 1:
+                raise ProtocolError(f"pulses: give either {' or '.join(group)}")
+        shape = self.shape
+        for other, names, reason in (
+            (self.phase is not None, ("sweep", "jitter", "initial_phase"), "phase"),
+            (shape is not Shape.TRAPEZOID, ("rise", "fall"), f"shape {shape.name.lower()}"),
+            (shape is not Shape.SAMPLES, ("samples",), f"shape {shape.name.lower()}"),
+            (self.catch_share > 0, ("catch_pulses",), "catch_share"),
+        ):
+            if wrong := [name for name in names if other and getattr(self, name)]:
+                raise ProtocolError(f"pulses.{wrong[0]}: does not go with {reason}")
+        for number in _numbers("catch_pulses", self.catch_pulses, int):
+            if not 1 <= number <= self.count:
+                raise ProtocolError(
+                    f"pulses.catch_pulses: {number}; allowed: from 1 to {self.count}"
+                )
+        try:
+            self.pulse(0, 0.0).check()
+        except LimitError as error:
+            raise ProtocolError(f"pulses.{error}") from None
+        if self.period is not None:
+            self.period_for(0.0)
+
+
+def _numbers(name: str, text: str, kind: Any) -> list[Any]:
+    """Return the numbers of a text such as "0, 0.4, 1, 0"."""
+    try:
+        return [kind(word) for word in text.replace(",", " ").split()]
+    except ValueError:
+        raise ProtocolError(
+            f"pulses.{name}: {text!r}; allowed: numbers with commas between them"
+        ) from None
+
+
+@dataclass(frozen=True)
+class Block:
+    """
+    Baseline, pulses and washout, conducted one after the other.
+
+    Baseline and washout last for so many strides at least, and on, if that is asked for, until a
+    time has passed and until the strides are steady.
+    """
+
+    name: str = setting("block", "name of the block", plain=True)
+    baseline: int = setting(15, "unperturbed strides before the pulses", within=(1, _MOST))
+    pulses: PulsePlan = field(default_factory=PulsePlan)
+    washout: int = setting(15, "strides after the strides of the pulses", within=(0, _MOST))
+    baseline_time: float = setting(0.0, "shortest duration of the baseline", "s", (0.0, 86_400.0))
+    washout_time: float = setting(0.0, "shortest duration of the washout", "s", (0.0, 86_400.0))
+    baseline_steady: float = setting(
+        0.0,
+        "coefficient of variation of the last strides below which the baseline ends; 0: any",
+        "1",
+        (0.0, 1.0),
+    )
+    washout_steady: float = setting(0.0, "the same for the washout", "1", (0.0, 1.0))
+    rest: float = setting(0.0, "pause before the next block, walked or not", "s", (0.0, 86_400.0))
+
+    def __post_init__(self) -> None:
+        """Check every field, and what concerns more than one."""
+        check_settings(self)
+        plan = self.pulses
+        plan.check()
+        measured = plan.period is None and plan.count > 0
+        least = 3 if plan.phase is not None else 2
+        if measured and self.baseline < least:
+            raise ProtocolError(
+                f"baseline: {self.baseline} leaves no complete stride to measure period_offset "
+                f"from; allowed: at least {least}, or at least 1 with an absolute period"
+            )
+
+    @property
+    def open_baseline(self) -> bool:
+        """Whether more than a number of strides is waited for."""
+        return self.baseline_time > 0 or self.baseline_steady > 0
+
+    @property
+    def open_ended(self) -> bool:
+        """Whether nobody knows before how many strides it will have."""
+        return self.open_baseline or self.washout_time > 0 or self.washout_steady > 0
+
+    def torque(self, walker: WalkerParameters) -> float:
+        """Return the height of the pulses [N m], plantarflexion positive."""
+        if self.pulses.torque is not None:
+            return self.pulses.torque
+        assert self.pulses.torque_fraction is not None
+        return self.pulses.torque_fraction * walker.peak_torque

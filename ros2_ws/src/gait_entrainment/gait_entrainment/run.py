@@ -1,0 +1,111 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a simulated and a recorded run have in common: events, pulses, analysis, block by block."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain
+
+from gait_entrainment.conventions import Side
+from gait_entrainment.experiment import BlockRun
+from gait_entrainment.gait import Analysis, GaitEvent, Stride, VerdictSettings, analyze
+from gait_entrainment.protocol import Block, Protocol
+from gait_entrainment.robot import PulseTiming
+
+
+def settings_for(
+    plans: Iterable[Block], settings: VerdictSettings | None = None
+) -> VerdictSettings | None:
+    """
+    Return the settings of a verdict about pulses that some blocks plan.
+
+    Pulses by phase follow the gait: that their lag stays put shows nothing, whatever their period.
+    """
+    if not any(plan.pulses.phase is not None for plan in plans):
+        return settings
+    return replace(settings or VerdictSettings(), smallest_difference=1.0)
+
+
+@dataclass(frozen=True)
+class JudgedBlock:
+    """One block of a run, analyzed by itself, against its own baseline."""
+
+    name: str
+    first_stride: int
+    last_stride: int | None  # None if it did not end
+    measured_period: float  # mean stride period over its baseline [s]; NaN if unknown
+    pulse_period: float  # as planned [s]; NaN if unknown, or by phase
+    analysis: Analysis
+
+
+def analyze_blocks(
+    blocks: Sequence[BlockRun],
+    events: Sequence[GaitEvent],
+    onsets: Sequence[int],
+    side: Side,
+    settings: VerdictSettings | None = None,
+    unknown: Sequence[tuple[int, int]] = (),
+) -> tuple[Analysis, tuple[JudgedBlock, ...]]:
+    """
+    Analyze a run, and each of its blocks, unless its protocol is one of fixed length.
+
+    As ``analyze``; ``blocks`` are those of a conductor that has seen the events. With
+    blocks, pulses, verdicts and holes of the run are those of its blocks.
+    """
+    plans = [block.plan for block in blocks]
+    whole = analyze(events, onsets, side, settings_for(plans, settings), unknown)
+    if len(blocks) <= 1 and not any(block.plan.open_ended for block in blocks):
+        return whole, ()
+    judged = []
+    for block in blocks:
+        start = block.start or 0
+        end = math.inf if block.end is None else block.end
+        analysis = analyze(
+            [event for event in events if start <= event.stamp <= end],
+            [onset for onset in onsets if start <= onset < end],
+            side,
+            settings_for([block.plan], settings),
+            [hole for hole in unknown if start < hole[1] and hole[0] < end],
+            block.strides_before,
+        )
+        strides = [stride.number for stride in analysis.strides if stride.end == end]
+        judged.append(
+            JudgedBlock(
+                name=block.plan.name,
+                first_stride=block.strides_before + 1,
+                last_stride=strides[0] if strides else None,
+                measured_period=block.measured_period,
+                pulse_period=block.pulse_period,
+                analysis=analysis,
+            )
+        )
+    parts = [block.analysis for block in judged]
+    pulses, entrainments, holes = (
+        tuple(chain.from_iterable(getattr(part, name) for part in parts))
+        for name in ("pulses", "entrainments", "holes")
+    )
+    return replace(whole, pulses=pulses, entrainments=entrainments, holes=holes), tuple(judged)
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a simulated and a recorded run have in common; stamps are integer nanoseconds."""
+
+    protocol: Protocol | None  # None if nobody told it
+    events: tuple[GaitEvent, ...]  # in the order in which they came
+    onsets: tuple[int, ...]  # of the pulses
+    timings: tuple[PulseTiming, ...]  # commanded, sent and measured onset of each pulse
+    measured_period: float  # mean stride period before the pulses [s]; NaN if unknown
+    pulse_period: float  # as planned, without a protocol as seen [s]; NaN if unknown
+    analysis: Analysis
+    blocks: tuple[JudgedBlock, ...]  # none if the protocol is one of a fixed number of strides
+
+    @property
+    def strides(self) -> list[Stride]:
+        """The strides of the protocol, which more may follow; without a protocol, all."""
+        last = math.inf if self.protocol is None else self.protocol.strides
+        if self.blocks:
+            last = self.blocks[-1].last_stride or math.inf
+        return [stride for stride in self.analysis.strides if stride.number <= last]

@@ -1,0 +1,109 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""entrain page: what a run does, in a browser, with a stop that works."""
+
+import argparse
+import importlib
+import os
+import signal
+import sys
+import tempfile
+import threading
+import webbrowser
+from pathlib import Path
+
+from gait_entrainment.errors import UsageError
+from gait_entrainment_bringup.node_list import PAGE, parameter_arguments
+from gait_entrainment_bringup.page_options import add_page_options, checked_page
+from gait_entrainment_bringup.run_options import add_run_options, checked_run
+from gait_entrainment_nodes.messaging.domain import claimed_domain, wanted_domain
+from gait_entrainment_nodes.messaging.environment import set_environment
+
+DESCRIPTION = (
+    "Show a live run, a replay or a recorded bag in a browser, and let the operator act: "
+    "preflight, start, arm, note, stop. The other options are those of the run that it may start."
+    " No substitute for a switch in the hand: see docs/safety.md."
+)
+EXAMPLES = """examples:
+  entrain page protocol.yaml --real-time        then start the run from the page
+  entrain page --bag bags/paper_example         a recorded bag, at any instant of it
+  ROS_DOMAIN_ID=42 entrain page                 beside a run or a replay in that domain
+  entrain run --real-time --page                a run with its page
+  entrain page --host 0.0.0.0                   for a tablet: with tokens, to act and to look on
+"""
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    add_run_options(parser)
+    add_page_options(parser)
+    parser.add_argument("--bag", type=Path, help="show a bag instead of a live run")
+    parser.add_argument("--open", action="store_true", help="open the page in a browser here")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Serve the page until it is stopped."""
+    if options.bag is not None:
+        return show_bag(options)
+    protocol, _ = checked_run(options, records=False)
+    words = run_words()
+    # The run that the page starts claims the domain itself.
+    domain = wanted_domain()
+    if domain is None:
+        with claimed_domain() as domain:
+            pass
+    set_environment(domain, real_time=options.real_time)
+    given = checked_page(options, protocol)
+    given |= {"command": words or [""], "record": str(Path.cwd()), "use_sim_time": False}
+    if options.open:
+        open_browser(given["port"])
+    with tempfile.TemporaryDirectory(prefix="entrain_") as folder:
+        sys.argv = [PAGE, *parameter_arguments({PAGE: given}, Path(folder))]
+        return int(importlib.import_module(f"gait_entrainment_page.{PAGE}").main())
+
+
+def show_bag(options: argparse.Namespace) -> int:
+    """Serve the page of a bag, without ROS, until it is stopped."""
+    # Not at the top: they load the web server.
+    from gait_entrainment_page.access import Access, Seat, listen
+    from gait_entrainment_page.bag_source import BagSource
+
+    if not options.bag.exists():
+        raise UsageError(f"{options.bag}: no such file or folder")
+    bag = BagSource(options.bag)
+    given = checked_page(options, None)
+    from gait_entrainment_page.layout import Page
+
+    access = Access.of_environment(options.host)
+    listener = listen(options.host, given["port"])
+    page = Page(lambda: bag.view, Seat(1.0), access, listener, blinded=options.blinded, bag=bag)
+    if options.open:
+        open_browser(given["port"])
+    ended = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: ended.set())
+    ended.wait()
+    page.close()
+    bag.close()
+    return 0
+
+
+def run_words() -> list[str]:
+    """Return the words of the command line that the run is started with."""
+    known = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    add_page_options(known)
+    known.add_argument("--bag")
+    known.add_argument("--open", action="store_true")
+    place = sys.argv.index("page") + 1
+    _, words = known.parse_known_args(sys.argv[place:])
+    return words
+
+
+def open_browser(port: int) -> None:
+    """Open the page in a browser once it is served; say so if there is none."""
+    address = f"http://127.0.0.1:{port}/"
+    if token := os.environ.get("ENTRAIN_PAGE_TOKENS", "").partition(" ")[0]:
+        address += f"?token={token}"
+    if not webbrowser.open(address):
+        print(f"entrain page: no browser is found: open {address} in one", file=sys.stderr)

@@ -1,0 +1,127 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+The command line ``entrain``: a table of commands, each loaded only when it is asked for.
+
+A package adds commands by the entry point ``gait_entrainment.commands``. It names a module with
+``COMMANDS``, a mapping from name to what the command is for. The command itself is the module of
+that name in the same package:
+
+    DESCRIPTION, EXAMPLES     what ``entrain NAME --help`` says
+    add_options(parser)       adds the options
+    run(options) -> int       does it and returns the exit code; a command of several actions has
+                              none, but sets it as a default of each action's parser
+
+Whatever a command raises as an EntrainmentError is printed here, in one line.
+"""
+
+import argparse
+import importlib
+import os
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+from gait_entrainment.errors import EntrainmentError
+
+ENTRY_POINTS = "gait_entrainment.commands"
+COMMANDS = {
+    "simulate": "the experiment in one process, without ROS",
+}
+# Where to look first: to search all packages takes longer than these commands, and stop hurries.
+_FOUND_AT_ONCE = {"simulate": __name__, "stop": "gait_entrainment_drivers.commands"}
+_DESCRIPTION = "Rehearse, run and analyze entrainment experiments."
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; return 0 if it is done, 1 if it failed, 2 for wrong usage."""
+    words = sys.argv[1:] if arguments is None else list(arguments)
+    name = words[0] if words else ""
+    prog = f"entrain {name}"
+    try:
+        options = make_parser(name).parse_args(words)
+        prog = options.prog
+        code = int(options.run(options))
+        print(end="", flush=True)  # what was printed and cannot be written is an error, too
+        return code
+    except EntrainmentError as error:
+        print(f"{prog}: {error}", file=sys.stderr)
+        return error.exit_code
+    except ModuleNotFoundError as error:
+        package = (error.name or "").partition(".")[0]
+        print(
+            f"entrain: the Python package {package} is missing: run rosdep install, or "
+            f"pip install {package} (docs/installation.md)",
+            file=sys.stderr,
+        )
+    except KeyboardInterrupt:
+        print(f"{prog}: interrupted", file=sys.stderr)
+    except BrokenPipeError:
+        pass
+    except OSError as error:  # such as a folder that cannot be written
+        print(f"{prog}: {error}", file=sys.stderr)
+    finally:
+        _forget_unwritable_output()
+    return 1
+
+
+def _forget_unwritable_output() -> None:
+    """Keep Python from writing again at its end what was refused, and from ending with 120."""
+    try:
+        print(end="", flush=True)
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+class _Parser(argparse.ArgumentParser):
+    """
+    A parser whose actions refuse by themselves what they do not know, with their own usage.
+
+    argparse hands it up to the first parser, whose usage helps nobody. ``prog`` of the options is
+    the innermost parser's.
+    """
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        options, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        if "prog" not in options:
+            options.prog = self.prog
+        return options, unknown
+
+
+def make_parser(name: str = "") -> argparse.ArgumentParser:
+    """Return the parser of the command line; only the command of this name is loaded."""
+    parser = _Parser(prog="entrain", description=_DESCRIPTION)
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    package = _FOUND_AT_ONCE.get(name)
+    packages = (
+        {package: importlib.import_module(package).COMMANDS} if package else _find_packages()
+    )
+    for package, found in packages.items():
+        for command, purpose in found.items():
+            options = commands.add_parser(command, help=purpose)
+            if command == name:
+                add_command(options, f"{package}.{command.replace('-', '_')}")
+    return parser
+
+
+def add_command(parser: argparse.ArgumentParser, module_name: str) -> None:
+    """Load the module of a command and let it fill its parser."""
+    module = importlib.import_module(module_name)
+    parser.description = module.DESCRIPTION
+    parser.epilog = getattr(module, "EXAMPLES", None)
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    module.add_options(parser)
+    if hasattr(module, "run"):
+        parser.set_defaults(run=module.run)
+
+
+def _find_packages() -> dict[str, dict[str, str]]:
+    """Return the commands with their purposes, by the package that they are in."""
+    # Loaded here: what is found at once does without.
+    from importlib.metadata import entry_points
+
+    points = sorted(entry_points(group=ENTRY_POINTS), key=lambda point: point.name)
+    return {__name__: COMMANDS} | {point.value: point.load().COMMANDS for point in points}

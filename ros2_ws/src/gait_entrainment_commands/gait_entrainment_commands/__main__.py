@@ -1,0 +1,25 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The command ``entrain``, also ``python -m gait_entrainment_commands``."""
+
+import gc
+import sys
+from collections.abc import Sequence
+
+import gait_entrainment_commands
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; return its exit code."""
+    # What a command loads lives as long as it does. To search all of it for garbage, over and over
+    # while it is loaded and once more at the end, takes a sixth of a short command.
+    gc.set_threshold(100_000)
+    try:
+        return gait_entrainment_commands.main(arguments)
+    finally:
+        gc.freeze()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

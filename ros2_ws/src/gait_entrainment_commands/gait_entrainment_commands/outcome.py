@@ -1,0 +1,278 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The outcome of an experiment, as one mapping for machines and a few lines for people."""
+
+import math
+import statistics
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind
+from gait_entrainment.gait import Analysis, GaitEvent, Hole, Reason, Verdict
+from gait_entrainment.protocol import Protocol, content_of
+from gait_entrainment.robot import PulseTiming
+from gait_entrainment.robot.timing import lateness_ms, quantile
+from gait_entrainment.run import Run
+
+# Pulses whose lags make up the final one: the paper's locked gait repeats itself exactly.
+FINAL_PULSES = 5
+# What a verdict other than entrained, or the reason for claiming nothing, says to a person.
+MEANINGS = {
+    "drifting": "the pulses run through the stride",
+    "lost": "the gait followed the pulses, then drifted",
+    "few_pulses": "neither locked nor drifting for certain: too few pulses yet",
+    "hole": "the record has a hole, and too few pulses follow it",
+    "unclear": "neither locked nor drifting for certain; more pulses may tell",
+    "creeping": "the lag creeps: a slow passage or an unfinished approach; more pulses tell",
+    "too_close": "pulse period and stride period are too close to tell them apart",
+    "baseline_unknown": "fewer than two complete strides before the first pulse to compare with",
+    "not_one_to_one": "only pulses at about one a stride are analyzed",
+}
+
+
+def outcome_of(run: Run) -> dict[str, Any]:
+    """Return what ``--json`` prints; times in seconds, None for what is not known."""
+    analysis, strides = run.analysis, run.strides
+    start = strides[0].start if strides else 0
+
+    def seconds(stamp: int) -> float:
+        return max(stamp - start, 0) / NANOSECONDS_PER_SECOND
+
+    outcome: dict[str, Any] = {
+        "unperturbed_stride_period": run.measured_period,
+        "perturbation_period": run.pulse_period,
+        "stride_period": [stride.period for stride in strides],
+        "pulses": [
+            {
+                "onset": (pulse.onset - start) / NANOSECONDS_PER_SECOND,
+                "phase": pulse.phase,
+                "phase_lag": pulse.phase_lag,
+            }
+            for pulse in analysis.pulses
+            if strides and pulse.stride <= strides[-1].number
+        ],
+        **_judgement(analysis, run.events),
+        "stretches": [
+            {"last_stride": e.stride, "verdict": e.verdict.name.lower()}
+            for e in {e.stretch: e for e in analysis.entrainments}.values()
+        ],
+        "holes": [
+            {"start": seconds(h.start), "end": seconds(h.end), "missing": h.missing}
+            for h in holes_of(run)
+        ],
+        "gait_events": asdict(analysis.event_counts),
+        "parameters": run.protocol and _parameters(run.protocol),
+    }
+    if run.blocks:
+        outcome["blocks"] = [
+            {
+                "name": block.name,
+                "first_stride": block.first_stride,
+                "last_stride": block.last_stride,
+                "unperturbed_stride_period": block.measured_period,
+                "perturbation_period": block.pulse_period,
+                "pulses": len(block.analysis.pulses),
+                **_judgement(block.analysis, run.events),
+            }
+            for block in run.blocks
+        ]
+    told: dict[str, Any] = _without_nan(outcome)
+    return told
+
+
+def _judgement(analysis: Analysis, events: Sequence[GaitEvent]) -> dict[str, Any]:
+    """Return the last verdict, since when it has held, and where the pulses came to lie."""
+    last = analysis.entrainments[-1] if analysis.entrainments else None
+    verdict = last.verdict if last else Verdict.UNDECIDED
+    reason = last.reason if last else Reason.FEW_PULSES
+    entrained = verdict is Verdict.ENTRAINED
+    placed = [p for p in analysis.pulses if p.toe_off is not None]  # the others have no lag
+    uncertainty = max((p.phase_lag_uncertainty for p in placed[-FINAL_PULSES:]), default=0.0)
+    return {
+        "verdict": verdict.name.lower(),
+        "reason": reason.name.lower() if reason else None,
+        "entrained": entrained,
+        "entrained_since_stride": last.entrained_since_stride if last and entrained else None,
+        "final_phase_lag": final_phase_lag(analysis),
+        **({"final_phase_lag_uncertainty": uncertainty} if uncertainty else {}),
+        "double_stance": _double_stance(events, placed[-1].toe_off if placed else None),
+    }
+
+
+def final_phase_lag(analysis: Analysis) -> float:
+    """Return the median lag of the last pulses [s]; NaN if none has one."""
+    lags = [p.phase_lag for p in analysis.pulses if p.toe_off is not None][-FINAL_PULSES:]
+    return statistics.median(lags) if lags else math.nan
+
+
+def _parameters(protocol: Protocol) -> dict[str, Any]:
+    """Return a protocol with its torque in N m, however it was given."""
+    parameters = content_of(protocol)
+    for said, block in zip(parameters.get("blocks", [parameters]), protocol.sequence, strict=True):
+        said["pulses"]["torque"] = block.torque(protocol.walker)
+    return parameters
+
+
+def holes_of(run: Run) -> list[Hole]:
+    """Return what the record of a run lacks; its last strides too, whether walked or not."""
+    holes, strides = list(run.analysis.holes), run.analysis.strides
+    if strides and run.protocol is not None:
+        end, missing = strides[-1].end, run.protocol.strides - strides[-1].number
+        if run.blocks:  # how many strides there would be is not known before
+            ended = [block.last_stride for block in run.blocks]
+            complete = len(ended) == len(run.protocol.sequence) and ended[-1] is not None
+            missing = 0 if complete else max(missing, 1)
+        if missing > 0:
+            holes.append(Hole(end, end, f"the last {missing} strides"))
+    return holes
+
+
+def summary(outcome: dict[str, Any]) -> str:
+    """Return the outcome in a few lines."""
+    parameters = outcome["parameters"] or {}
+    plan = parameters.get("pulses")
+    strides, pulses = outcome["stride_period"], outcome["pulses"]
+    unperturbed = outcome["unperturbed_stride_period"]
+    lines = [f"strides          {len(strides)}, pulses placed in them: {len(pulses)}"]
+    if plan and len(pulses) != plan["count"]:
+        lines[0] += f" of {plan['count']}"
+        if not outcome["holes"]:
+            lines[0] += "; the train is longer than the run: add washout strides"
+    if "blocks" in outcome:
+        plans = parameters.get("blocks", [parameters])
+        for number, (block, said) in enumerate(zip(outcome["blocks"], plans, strict=False), 1):
+            lines += _block_lines(number, block, said["pulses"])
+        return "\n".join([*lines, *_doubt_lines(outcome)])
+    if strides:
+        measured = "not measured" if unperturbed is None else f"{unperturbed:.4f} s"
+        lines.append(f"stride period    {measured} unperturbed, {strides[-1]:.4f} s last")
+    if timing := _timing(outcome, plan or {}):
+        shape = f"{plan['torque']:.2f} N m for {plan['width']:g} s" if plan else ""
+        lines.append(f"pulses           {shape}{timing if plan else timing.lstrip()}")
+    lines.append(f"verdict          {_verdict(outcome)}")
+    for stretch in outcome["stretches"][:-1]:
+        lines.append(f"  until stride {stretch['last_stride']:<3} {stretch['verdict']}")
+    lines += _doubt_lines(outcome)
+    lag, double_stance = outcome["final_phase_lag"], outcome["double_stance"]
+    if lag is not None and outcome["entrained"]:
+        lines.append(f"final phase lag  {lag * 1e3:+.1f} ms: {_place(lag, double_stance)}")
+    return "\n".join(lines)
+
+
+def _verdict(judged: dict[str, Any]) -> str:
+    """Return the verdict with since when it has held, or why nothing is claimed."""
+    if judged["entrained"]:
+        return f"{judged['verdict']} since stride {judged['entrained_since_stride']}"
+    return f"{judged['verdict']}: {MEANINGS[judged['reason'] or judged['verdict']]}"
+
+
+def _block_lines(number: int, block: dict[str, Any], plan: dict[str, Any]) -> list[str]:
+    """Return what was done in a block, and what came of it."""
+    last = block["last_stride"] or "the end"
+    told = f"block {number:<11}{block['name']}: strides {block['first_stride']} to {last}"
+    if not plan["count"]:
+        return [f"{told}, no pulses"]
+    pulses = f"{block['pulses']} pulses of {plan['torque']:.2f} N m{_timing(block, plan)}"
+    return [f"{told}, {pulses}", f"{'':17}{_verdict(block)}"]
+
+
+def _timing(judged: dict[str, Any], plan: dict[str, Any]) -> str:
+    """Return when the pulses of a run or a block came, after a blank; empty if that is unknown."""
+    unperturbed, period = judged["unperturbed_stride_period"], judged["perturbation_period"]
+    if plan.get("phase") is not None:
+        return f" at phase {plan['phase']:g}"
+    if period is None:
+        return ""
+    offset = "" if unperturbed is None else f" ({(period - unperturbed) * 1e3:+.1f} ms)"
+    sweep = f", changing by {plan['sweep'] * 1e3:+g} ms" if plan.get("sweep") else ""
+    return f" every {period:.4f} s{offset}{sweep}"
+
+
+def _doubt_lines(outcome: dict[str, Any]) -> list[str]:
+    """Return what the record lacks, and what of it was not believed."""
+    lines = []
+    if holes := [f"{hole['missing']} at {hole['start']:.1f} s" for hole in outcome["holes"]]:
+        more = f", {len(holes) - 3} more" if len(holes) > 3 else ""
+        lines.append(f"holes            {', '.join(holes[:3])}{more}: not in the record")
+    doubts = [f"{n} {fate}" for fate, n in [*outcome["gait_events"].items()][1:] if n]
+    if doubts:
+        lines.append(f"gait events      {', '.join(doubts).replace('_', ' ')}")
+    return lines
+
+
+def _place(lag: float, double_stance: float | None) -> str:
+    """Say where in the gait cycle a phase lag [s] lies."""
+    if lag >= 0:
+        return "after toe-off"
+    if double_stance is None or -lag > double_stance:
+        return "before double stance"
+    percent = 100 * (1 + lag / double_stance)
+    return f"the pulse begins {percent:.0f} % into double stance ({double_stance:.3f} s)"
+
+
+def _double_stance(events: Sequence[GaitEvent], toe_off: int | None) -> float:
+    """Return the duration [s] of the double stance that a toe-off ends; NaN if unknown."""
+    if toe_off is None:
+        return math.nan
+    strikes = [e.stamp for e in events if e.kind is EventKind.HEEL_STRIKE and e.stamp < toe_off]
+    return (toe_off - max(strikes)) / NANOSECONDS_PER_SECOND if strikes else math.nan
+
+
+def _without_nan(value: Any) -> Any:
+    """Replace NaN, which JSON does not have, by None."""
+    if isinstance(value, dict):
+        return {key: _without_nan(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_without_nan(item) for item in value]
+    return None if isinstance(value, float) and math.isnan(value) else value
+
+
+def timing_outcome(timings: Sequence[PulseTiming], stride: float) -> dict[str, Any]:
+    """Return what ``--json`` prints about the timing of the pulses; ``stride`` is a period [s]."""
+    return {
+        "sent": distribution(timings, "sent", stride),
+        "measured": distribution(timings, "measured", stride),
+        "each_ms": [
+            {kind: timing.late_ms(kind) for kind in ("sent", "measured")} for timing in timings
+        ],
+    }
+
+
+def distribution(
+    timings: Sequence[PulseTiming], kind: str, stride: float
+) -> dict[str, Any] | None:
+    """
+    Return how late the "sent" or "measured" onsets came; None if no pulse shows one.
+
+    Percentages are of a stride [s], None if that is NaN: unknown.
+    """
+    late = lateness_ms(timings, kind)
+    if not late:
+        return None
+    figures = {"median": quantile(late, 0.5), "p99": quantile(late, 0.99), "worst": late[-1]}
+    unknown = math.isnan(stride)
+    return {
+        "pulses": len(late),
+        "missing": sum(not timing.sham for timing in timings) - len(late),
+        **{f"{name}_ms": ms for name, ms in figures.items()},
+        **{f"{n}_percent": None if unknown else ms / stride / 10 for n, ms in figures.items()},
+    }
+
+
+def timing_summary(outcome: dict[str, Any]) -> list[str]:
+    """Return lines for people; none if every pulse came at its instant."""
+    lines = []
+    for kind in ("sent", "measured"):
+        figures = outcome[kind]
+        if figures is None or not (figures["worst_ms"] or figures["missing"]):
+            continue
+        missing = f", {figures['missing']} never seen" if figures["missing"] else ""
+        percent = figures["worst_percent"]
+        share = "" if percent is None else f": {percent:.2f} % of a stride"
+        lines.append(
+            f"pulses {kind:<10}{figures['median_ms']:.1f} ms after their command (median), "
+            f"{figures['p99_ms']:.1f} (99 %), {figures['worst_ms']:.1f} (worst{share}){missing}"
+        )
+    return lines

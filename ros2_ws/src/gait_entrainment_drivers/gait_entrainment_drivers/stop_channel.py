@@ -1,0 +1,132 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+Stopping without ROS: whoever drives an ankle robot listens on a socket of this machine.
+
+The socket has a name in Linux's abstract namespace. That needs no file, no home folder and no
+writable disk, vanishes with its process, and is found in /proc/net/unix. A request is one
+datagram; the answer says what the device measured. No discovery, no executor and no other reader
+is in the way. Everyone who can reach the machine's network namespace may stop a robot: stopping
+is safe.
+"""
+
+import errno
+import itertools
+import json
+import os
+import select
+import socket
+import time
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+PREFIX = "gait_entrainment/stop/"
+_SOCKETS = Path("/proc/net/unix")
+_LARGEST_ANSWER = 4096
+# What the script `entrain` has done: the descriptor of its socket, and whom it has asked.
+_ASKED = "GAIT_ENTRAINMENT_STOP_ASKED"
+
+
+@dataclass(frozen=True)
+class StopAnswer:
+    """What a robot answers to a stop."""
+
+    done: bool  # what the answerer vouches for is done: see the message
+    message: str  # for people, in one line; says "zero" only of a torque that was measured
+
+
+class StopListener:
+    """
+    The end of the channel at the robot: requests are polled, or waited for by ``select``.
+
+    Parameters
+    ----------
+    name
+        What the robot is called in answers, such as the driver's name.
+
+    """
+
+    def __init__(self, name: str) -> None:
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        # A process may hold several robots of one name.
+        for number in itertools.count(1):
+            more = f"-{number}" if number > 1 else ""
+            try:
+                self._socket.bind(f"\0{PREFIX}{name}/{os.getpid()}{more}")
+                break
+            except OSError as error:
+                if error.errno != errno.EADDRINUSE:
+                    raise
+
+    def fileno(self) -> int:
+        """Return the descriptor that becomes readable with a request."""
+        return self._socket.fileno()
+
+    def requests(self) -> list[str | bytes]:
+        """Return the addresses of those who asked for a stop since the last call."""
+        found: list[str | bytes] = []
+        while True:
+            try:
+                found.append(self._socket.recvfrom(16)[1])
+            except BlockingIOError:
+                return found
+
+    def answer(self, addresses: Iterable[str | bytes], answer: StopAnswer) -> None:
+        """Answer requests; whoever asked and is gone misses nothing."""
+        data = json.dumps(asdict(answer)).encode()
+        for address in addresses:
+            try:
+                self._socket.sendto(data, address)
+            except OSError:
+                continue
+
+    def close(self) -> None:
+        """Listen no more."""
+        self._socket.close()
+
+
+def listening() -> list[str]:
+    """Return the names of all robots of this machine that can be stopped: NAME/PROCESS."""
+    names = (line.split()[-1] for line in _SOCKETS.read_text().splitlines()[1:])
+    marker = f"@{PREFIX}"
+    return sorted(name.removeprefix(marker) for name in names if name.startswith(marker))
+
+
+def stop_all(patience: float = 0.5) -> dict[str, StopAnswer | None]:
+    """
+    Ask every robot of this machine to bring its torque to zero.
+
+    The script ``entrain`` has asked already; then its socket is taken over, and the answers read.
+    Returns the answers by name; None for a robot that did not answer within ``patience`` [s].
+    """
+    if asked := os.environ.pop(_ASKED, ""):
+        descriptor, *names = asked.split()
+        asker = socket.socket(fileno=int(descriptor))
+    else:
+        asker = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        asker.setblocking(False)
+        asker.bind("")  # the kernel chooses an abstract name
+        names = [name for name in listening() if _ask(asker, name)]
+    with asker:
+        answers: dict[str, StopAnswer | None] = dict.fromkeys(names)
+        give_up = time.monotonic() + patience
+        while None in answers.values() and (left := give_up - time.monotonic()) > 0:
+            if select.select([asker], [], [], left)[0]:
+                data, address = asker.recvfrom(_LARGEST_ANSWER)
+                sender = (address if isinstance(address, bytes) else address.encode())[1:].decode()
+                answers[sender.removeprefix(PREFIX)] = StopAnswer(**json.loads(data))
+        return answers
+
+
+def _ask(asker: socket.socket, name: str) -> bool:
+    """Ask one robot; False if it has ended in between, and its torque with it."""
+    try:
+        asker.sendto(b"stop", f"\0{PREFIX}{name}")
+    except ConnectionRefusedError:
+        return False
+    except BlockingIOError:  # its queue is full: it has not listened for long
+        pass
+    return True

@@ -1,0 +1,26 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Pulses as the goal of an action; gait_entrainment_bags.messages goes the other way."""
+
+from gait_entrainment.robot import PulseTrain
+from gait_entrainment_msgs.action import DeliverPulseTrain
+from gait_entrainment_msgs.msg import Pulse
+from gait_entrainment_nodes.messaging.stamps import to_time
+
+
+def goal_of(run: int, train: PulseTrain) -> DeliverPulseTrain.Goal:
+    """Return the goal that asks for the pulses of a train in a run."""
+    pulses = [
+        Pulse(
+            onset=to_time(pulse.onset),
+            torque=pulse.torque,
+            duration=pulse.duration,
+            shape=pulse.shape,
+            rise=pulse.rise,
+            fall=pulse.fall,
+            samples=pulse.samples,
+        )
+        for pulse in train.pulses
+    ]
+    return DeliverPulseTrain.Goal(run=run, side=train.side, pulses=pulses)

@@ -1,0 +1,11 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What the executable of the node runs."""
+
+from gait_entrainment_nodes import executable
+
+
+def main() -> int:
+    """Run the node to its end and return its exit code."""
+    return executable.main("gait_entrainment_page")

@@ -1,0 +1,419 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The page itself: what a browser is sent, how it is kept up to date, what a click does."""
+
+import asyncio
+import json
+import shutil
+import socket
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.staticfiles import StaticFiles
+from nicegui import ui
+
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
+from gait_entrainment_page.access import ACT, Access, Seat, one_line
+from gait_entrainment_page.actions import Command, Robot, attempted, stop
+from gait_entrainment_page.bag_source import BagSource
+from gait_entrainment_page.charts import lag_chart, period_chart, torque_chart
+from gait_entrainment_page.server import Server, state_of
+from gait_entrainment_page.view import View
+
+# Legs are drawn at every tick [s], words at every fifth, charts if there is something new.
+TICK = 0.1
+_WORDS = 5
+_CHARTS = 10
+# Less room than this on the disk of the record is told as a warning [bytes].
+_LITTLE = 2 * 10**9
+_HEAD = (
+    """<link rel="stylesheet" href="/static/page.css"><script src="/static/page.js"></script>"""
+)
+_HEARTBEAT = (
+    "This page is the operator's heartbeat: closing, hiding or leaving it ends the robot's torque."
+)
+
+
+class Page:
+    """
+    The page, served from when it is made until it is closed; it tells people where.
+
+    Parameters
+    ----------
+    view
+        Gives the view that is shown.
+    seat, access
+        Who acts, and who may.
+    listener
+        The socket to serve at.
+    robot, command
+        What can be asked of the nodes, and what can be started; None for a bag.
+    heartbeat, blinded
+        Whether the page is the operator's sign of life; whether the condition stays hidden.
+    record
+        Folder of the record, whose disk is looked after.
+    bag
+        The bag that is shown, if it is none of a live run.
+
+    """
+
+    def __init__(
+        self,
+        view: Callable[[], View],
+        seat: Seat,
+        access: Access,
+        listener: socket.socket,
+        *,
+        robot: Robot | None = None,
+        command: Command | None = None,
+        heartbeat: bool = False,
+        blinded: bool = False,
+        record: str = "",
+        bag: BagSource | None = None,
+    ) -> None:
+        self.view, self.seat, self.robot, self.command = view, seat, robot, command
+        self.heartbeat, self.blinded, self.record, self.bag = heartbeat, blinded, record, bag
+        self._charts: tuple[Any, list[dict[str, Any]]] = (None, [])
+        app = FastAPI(openapi_url=None)
+        app.add_api_route("/stop", self._stop, methods=["POST"])
+        app.add_api_route("/alive", self._alive, methods=["POST"])
+        app.mount("/static", StaticFiles(directory=Path(__file__).with_name("static")))
+        ui.page("/", title="gait_entrainment")(self._show)
+        ui.run_with(app, show_welcome_message=False, binding_refresh_interval=None, tailwind=False)
+        self._server = Server(app, listener, access)
+        access.tell(self._server.port)
+
+    def close(self) -> None:
+        """Serve no more."""
+        self._server.close()
+
+    # Without NiceGUI, so that nothing of it is in the way
+
+    async def _stop(self) -> dict[str, Any]:
+        """Stop every robot of this machine; whoever may look may stop."""
+        stopped = await asyncio.to_thread(stop, self.robot)
+        return {"done": stopped.done, "lines": stopped.lines}
+
+    async def _alive(self, request: Request) -> dict[str, float]:
+        role, browser = state_of(request)
+        watching = (await request.body()) == b'{"watching":true}'
+        if watching and role == ACT:
+            self.seat.offer(browser)
+        self.seat.heard(browser, watching=watching)
+        return {"now": 1e3 * time.time()}
+
+    # The page
+
+    def _show(self, request: Request) -> None:
+        role, browser = state_of(request)
+        ui.add_head_html(_HEAD)
+        shown = Shown(self, browser, may_act=role == ACT)
+        shown.build()
+        ui.timer(TICK, shown.tick)
+
+    def chart_options(self) -> tuple[Any, list[dict[str, Any]]]:
+        """Return what the charts show and its version; made once for all browsers."""
+        view = self.view()
+        with view.lock:
+            version = (id(view), view.version)
+            if version != self._charts[0]:
+                charts = (period_chart, lag_chart, torque_chart)
+                made = [chart(view, blinded=self.blinded) for chart in charts]
+                self._charts = (version, made)
+        return self._charts
+
+
+@dataclass
+class Shown:
+    """One browser's page: its elements, and what they showed last."""
+
+    page: Page
+    browser: str
+    may_act: bool
+    charts: list[Any] = field(default_factory=list)
+    rows: dict[str, tuple[Any, Any]] = field(default_factory=dict)
+    labels: dict[str, Any] = field(default_factory=dict)
+    buttons: dict[str, Any] = field(default_factory=dict)
+    ticks: int = 0
+    version: Any = None
+    legs: Any = None
+    answer: str = ""
+    paused: bool = False
+
+    @property
+    def acts(self) -> bool:
+        """Whether this browser is the operator's."""
+        return self.may_act and self.page.seat.holder == self.browser
+
+    # What it is made of
+
+    def build(self) -> None:
+        """Make the elements."""
+        with ui.element("div").classes("top"):
+            self._fact("part", "part of the protocol")
+            self._fact("stride", "stride")
+            self._fact("left", "time left")
+            ui.element("div").classes("grow")
+            self._fact("measured", "torque measured")
+            ui.html('<button id="stop" type="button">STOP</button>', sanitize=False)
+        for banner in ("told", "lost"):
+            ui.element("div").classes("banner alarm").props(f'id="{banner}" role="alert"')
+        ui.element("div").classes("banner warn").props('id="clock"')
+        if self.page.heartbeat:
+            self._label("heartbeat", "banner warn", _HEARTBEAT)
+        self._label("alarm", "banner alarm")
+        if self.page.bag is not None:
+            self._seek(self.page.bag)
+        with ui.element("div").classes("panels"):
+            self._chart("Stride period against pulse period", "w5")
+            self._chart("Phase lag", "w4")
+            with self._panel("Is the gait entrained?", "w3"):
+                self._label("verdict", "verdict")
+                self._label("figures", "said")
+                self._label("lag", "lag")
+            self._chart("Ankle torque of the last stride", "w5")
+            with self._panel("Legs", "w4"):
+                ui.html('<canvas class="legs"></canvas>', sanitize=False).style(
+                    "flex:1; display:flex"
+                )
+            self._table("robot", "Ankle robot", "w3")
+            self._table("sensors", "Gait events", "w3")
+            self._table("record", "Record", "w4")
+            with self._panel("Operator", "w5"):
+                self._operator()
+        self.tick()
+
+    def _label(self, name: str, classes: str, text: str = "") -> None:
+        self.labels[name] = ui.label(text).classes(classes)
+
+    def _fact(self, name: str, what: str) -> None:
+        with ui.element("div").classes("fact"):
+            ui.label(what).classes("what")
+            self._label(name, "big")
+
+    def _panel(self, title: str, width: str) -> Any:
+        panel = ui.element("section").classes(f"panel {width}")
+        with panel:
+            ui.label(title).classes("title")
+        return panel
+
+    def _chart(self, title: str, width: str) -> None:
+        _, options = self.page.chart_options()
+        with self._panel(title, width):
+            self.charts.append(ui.echart(options[len(self.charts)]).classes("chart"))
+
+    def _table(self, name: str, title: str, width: str) -> None:
+        with self._panel(title, width):
+            self.rows[name] = (ui.element("div").classes("rows"), None)
+
+    def _operator(self) -> None:
+        self._label("seat", "said")
+        with ui.element("div").classes("acts"):
+            acts: dict[str, tuple[str, Callable[[], str]]] = {}
+            if (command := self.page.command) is not None and command.words:
+                acts["preflight"] = ("Preflight", partial(command.start, "preflight"))
+                acts["start"] = ("Start", partial(command.start, "run"))
+            if (robot := self.page.robot) is not None:
+                acts["arm"] = ("Arm", robot.arm)
+                acts["pause"] = ("Pause before the next block", self._pause)
+                acts["repeat"] = ("Repeat the block", robot.repeat)
+            for name, (text, action) in acts.items():
+                button = ui.button(text, on_click=partial(self._act, action))
+                self.buttons[name] = button.props("unelevated no-caps color=blue-10")
+            take = ui.button("Take over", on_click=self._take_over)
+            self.buttons["take"] = take.props("unelevated no-caps color=brown-9")
+        if self.page.robot is not None:
+            with ui.element("div").classes("acts"):
+                self.note = ui.input("Note").props("outlined dense maxlength=500")
+                self.note.on("keydown.enter", self._note)
+                button = ui.button("Note it", on_click=self._note)
+                self.buttons["note"] = button.props("unelevated no-caps color=blue-10")
+        self._label("answer", "said")
+        self.rows["notes"] = (ui.element("div").classes("rows"), None)
+
+    def _seek(self, bag: BagSource) -> None:
+        seconds = (bag.end - bag.start) / NANOSECONDS_PER_SECOND
+
+        async def seek(event: Any) -> None:
+            instant = bag.start + round(event.args * NANOSECONDS_PER_SECOND)
+            await asyncio.to_thread(bag.show, min(instant, bag.end))
+
+        with ui.element("div").classes("seek"):
+            slider = ui.slider(min=0, max=round(seconds, 2), step=0.05, value=round(seconds, 2))
+            slider.props("color=blue-10").on("update:model-value", seek, throttle=0.2)
+            self._label("instant", "big")
+        if bag.lacking:
+            self._label("lacking", "banner warn", f"Not in this bag: {', '.join(bag.lacking)}.")
+
+    # What a click does
+
+    async def _act(self, action: Callable[[], str]) -> None:
+        """Do what the operator asks for, and tell how it went."""
+        if not self.acts:
+            self.answer = "Another browser is the operator: take over first."
+            return
+        done, answer = await asyncio.to_thread(attempted, action)
+        self.answer = answer if done else f"Refused: {answer}"
+
+    def _take_over(self) -> None:
+        if self.may_act:
+            self.page.seat.take(self.browser)
+            self.answer = ""
+
+    def _pause(self) -> str:
+        assert self.page.robot is not None
+        answer = self.page.robot.pause(paused=not self.paused)
+        self.paused = not self.paused
+        return answer
+
+    async def _note(self) -> None:
+        assert self.page.robot is not None
+        if text := one_line(self.note.value or ""):
+            await self._act(partial(self.page.robot.note, text))
+            if self.acts:
+                self.note.value = ""
+
+    # How it is kept up to date
+
+    def tick(self) -> None:
+        """Bring the browser up to date."""
+        view = self.page.view()
+        with view.lock:
+            legs = (view.legs, view.side, (view.robot and view.robot.commanded_torque) or 0.0)
+            if self.ticks % _WORDS == 0:
+                self._words(view)
+        if view.legs and legs != self.legs:
+            self.legs = legs
+            angles, side, torque = legs
+            ui.run_javascript(f"entrain.legs({json.dumps(angles)},{json.dumps(side)},{torque})")
+        if self.ticks % _CHARTS == 0:
+            version, options = self.page.chart_options()
+            if version != self.version:
+                self.version = version
+                for chart, option in zip(self.charts, options, strict=True):
+                    chart.options.clear()
+                    chart.options.update(option)
+                    chart.update()
+        self.ticks += 1
+
+    def _words(self, view: View) -> None:
+        state, bag = view.state, self.page.bag
+        self._set("part", view.part_words())
+        self._set("stride", f"{state.stride} of {state.strides}" if state else "–")
+        self._set("left", _clock(view.time_left()))
+        self._set("measured", view.measured())
+        verdict, figures = view.verdict_words()
+        if self.page.blinded:
+            verdict, figures = "hidden", "This session is blinded."
+        self._set("verdict", verdict)
+        word = verdict.partition(" ")[0]
+        self.labels["verdict"].classes(replace=f"verdict {word}")
+        self._set("figures", figures)
+        self._set("lag", "" if self.page.blinded else f"lag {view.lag()}")
+        alarm = state.message if view.part == "failed" else ""
+        if view.robot is not None and view.robot.faults:
+            alarm = f"Robot: {', '.join(view.robot.faults)}. {view.measured()} measured. {alarm}"
+        self._set("alarm", alarm)
+        if bag is not None:
+            self._set("instant", _clock((view.now - bag.start) / NANOSECONDS_PER_SECOND))
+        hidden = {"commanded", "limits"} if self.page.blinded else set()
+        robot = [row for row in view.robot_words() if row[0] not in hidden]
+        self._rows("robot", robot + [("told", line) for line in view.troubles][-2:])
+        self._rows("sensors", view.sensor_words())
+        self._rows("record", self._record_words(view))
+        self._rows("notes", [(_of_day(at), text) for at, _, text in view.notes][-3:])
+        self._acting(view)
+
+    def _acting(self, view: View) -> None:
+        """Say who acts, and offer what can be done now."""
+        if self.acts:
+            seat = "You are the operator."
+        elif not self.may_act:
+            seat = "You look on. STOP works here too."
+        else:
+            away = "" if self.page.seat.watched else " and is away"
+            seat = f"Another browser is the operator{away}. STOP works here too."
+        self._set("seat", seat)
+        command, robot = self.page.command, self.page.robot
+        offered = robot.offered() if robot is not None else set()
+        going_on = view.going_on or (command is not None and command.runs)
+        usable = {"preflight": not going_on, "start": not going_on, "note": True}
+        for name, button in self.buttons.items():
+            if name == "take":
+                button.set_visibility(self.may_act and not self.acts)
+            elif name in ("pause", "repeat"):  # of a session
+                button.set_visibility(name in offered)
+                button.set_enabled(self.acts)
+            else:
+                button.set_enabled(self.acts and usable.get(name, name in offered))
+        if "pause" in self.buttons:
+            self.buttons["pause"].set_text(
+                "Go on" if self.paused else "Pause before the next block"
+            )
+        told = command.told() if command is not None else []
+        self._set("answer", "\n".join([self.answer, *told[-4:]]).strip())
+        self._tell_script()
+
+    def _tell_script(self) -> None:
+        acting = self.page.heartbeat and self.acts
+        if acting != getattr(self, "_told_script", None):
+            self._told_script = acting
+            told = json.dumps({"heartbeat": self.page.heartbeat, "acting": acting})
+            ui.run_javascript(f"Object.assign(entrain, {told})")
+
+    def _record_words(self, view: View) -> list[tuple[str, str]]:
+        if self.page.bag is not None:
+            return [("bag", self.page.bag.path.name), ("holds", self.page.bag.record)]
+        recorder = next((s for n, s in view.nodes.items() if n.endswith("bag_recorder")), None)
+        rows = [("record", recorder.message if recorder else "no recorder is heard")]
+        if recorder and "messages" in recorder.values:
+            rows.append(("messages", recorder.values["messages"]))
+        if self.page.record:
+            free = shutil.disk_usage(self.page.record).free
+            little = ": little" if free < _LITTLE else ""
+            rows.append(("disk", f"{free / 1e9:.1f} GB free{little}"))
+        rows += [
+            (name.rpartition("/")[2], f"{level}: {message}" if level != "ok" else message)
+            for name, level, message in view.node_words(time.monotonic())
+            if not name.endswith(("bag_recorder", "operator_page"))
+        ]
+        return rows
+
+    def _set(self, name: str, text: str) -> None:
+        if self.labels[name].text != text:
+            self.labels[name].set_text(text)
+
+    def _rows(self, name: str, rows: Sequence[tuple[str, str]]) -> None:
+        """Show names and values, made anew only if the names have changed."""
+        element, cells = self.rows[name]
+        keys = [key for key, _ in rows]
+        if cells is None or [key for key, _ in cells] != keys:
+            element.clear()
+            cells = []
+            with element:
+                for key, value in rows:
+                    ui.label(key)
+                    cells.append((key, ui.label(value)))
+            self.rows[name] = (element, cells)
+        for (_, value), (_, label) in zip(rows, cells, strict=True):
+            if label.text != value:
+                label.set_text(value)
+            bad = value.startswith(("error", "stale", "fault", "stopped"))
+            label.classes(add="bad" if bad else "", remove="" if bad else "bad")
+
+
+def _clock(seconds: float) -> str:
+    """Return a time [s] as minutes and seconds."""
+    if not seconds >= 0:
+        return "–"
+    return f"{int(seconds // 60)}:{int(seconds % 60):02d}"
+
+
+def _of_day(stamp: int) -> str:
+    return time.strftime("%H:%M:%S", time.localtime(stamp / NANOSECONDS_PER_SECOND))

@@ -1,0 +1,257 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+operator_page: the page of a live run or a replay, as a node that looks on.
+
+Nobody waits for it. Messages wait in subscriptions without an executor until they are taken, some
+times a second; samples are subscribed to only while time passes as it does for a walker. If it
+is the operator's heartbeat, it publishes a sign of life for as long as the page is watched.
+"""
+
+import importlib
+import os
+import queue
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.serialization import deserialize_message
+from std_srvs.srv import SetBool, Trigger
+
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
+from gait_entrainment.settings import setting, settings_of
+from gait_entrainment_msgs.msg import Note
+from gait_entrainment_nodes.messaging import topics
+from gait_entrainment_nodes.messaging.stamps import header
+from gait_entrainment_nodes.nodes.loop import run_node
+from gait_entrainment_nodes.nodes.parameters import texts
+from gait_entrainment_nodes.nodes.participant import Participant
+from gait_entrainment_nodes.nodes.rclpy_internals import RawReader
+from gait_entrainment_page.access import Access, Seat, listen
+from gait_entrainment_page.actions import ActionError, Command
+from gait_entrainment_page.view import View
+
+# How often messages are taken, and the heartbeat is published if it is wanted [s].
+PERIOD = 0.05
+MOST_AT_ONCE = 1000
+# How long a node may take to answer [s].
+ANSWER_TIMEOUT = 3.0
+# Beyond this pace, against the wall clock, samples are not looked at: nobody could follow.
+FASTEST = 4.0
+# While it loads, which takes seconds: a third of the share of who walks or records.
+_NICENESS = 5
+# Instants of a run that differ from the wall clock by more are simulated or recorded [ns].
+_ANOTHER_TIME = 60 * NANOSECONDS_PER_SECOND
+
+LOOKED_AT = (
+    topics.EXPERIMENT_STATE,
+    topics.STRIDES,
+    topics.PULSE_PHASES,
+    topics.ENTRAINMENT,
+    topics.GAIT_EVENTS,
+    topics.ROBOT_SETUP,
+    topics.TROUBLE,
+    topics.OPERATOR_NOTES,
+    topics.DIAGNOSTICS,
+)
+SAMPLED = (
+    (topics.ROBOT_STATE, topics.LOOKING_ON),
+    # Only the latest posture is drawn.
+    (topics.JOINT_STATES, topics.quality(1, reliable=False)),
+)
+SERVICES = {
+    "stop": (Trigger, "perturbator/stop"),
+    "arm": (Trigger, "perturbator/arm"),
+    "pause": (SetBool, "session/pause"),
+    "repeat": (Trigger, "session/repeat"),
+}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Parameters of the node."""
+
+    host: str = setting("127.0.0.1", "address to serve the page at; another one asks for a token")
+    port: int = setting(8080, "port of the page; 0: a free one", "1", (0, 65535))
+    heartbeat: bool = setting(False, "the page is the operator's sign of life")
+    heartbeat_timeout: float = setting(
+        1.0, "longest silence of the operator's browser", "s", (0.2, 10.0)
+    )
+    blinded: bool = setting(False, "do not show what would tell the condition")
+    foxglove: int = setting(
+        0, "port of a Foxglove connection to the same data; 0: none", "1", (0, 65535)
+    )
+    record: str = setting("", "folder of the record, whose disk is looked after")
+    command: tuple[str, ...] = texts("options of the entrain run that the page may start")
+
+
+class OperatorPage(Participant):
+    """ROS side of the page."""
+
+    settings: Settings
+    # It waits for nobody, but its turn does not come before that of others.
+    real_time = False
+
+    def __init__(self) -> None:
+        super().__init__("operator_page")
+        self.begin_participation(settings=Settings, fixed=settings_of(Settings))
+        settings, self.view = self.settings, View()
+        access = Access.of_environment(settings.host)
+        listener = listen(settings.host, settings.port)
+        self._foxglove: Any = None
+        if settings.foxglove:
+            # Not at the top: it is optional.
+            from gait_entrainment_page.foxglove_server import FoxgloveServer
+
+            self._foxglove = FoxgloveServer(settings.host, settings.foxglove)
+        self.offer(topics.OPERATOR_NOTES)
+        if settings.heartbeat:
+            self.offer(topics.OPERATOR_HEARTBEAT)
+        self._services_asked = {n: self.create_client(k, s) for n, (k, s) in SERVICES.items()}
+        self._wishes: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._readers: dict[str, tuple[topics.Topic, RawReader]] = {}
+        for topic in LOOKED_AT:
+            # A writer of the latest state overwrites: a reader that hangs does not hold it up.
+            lasting = topic.qos is topics.LATEST_STATE
+            self._look_at(topic, topic.qos if lasting else topics.LOOKING_ON)
+        self._follow(not self.get_parameter("use_sim_time").value)
+        self._seen = (0, 0)  # when the pace was measured: run's time, wall time [ns]
+        self._due = time.monotonic()
+        # Not at the top: it takes seconds to load, see main.
+        from gait_entrainment_page.layout import Page
+
+        self.page = Page(
+            lambda: self.view,
+            Seat(settings.heartbeat_timeout),
+            access,
+            listener,
+            robot=self,
+            command=Command(settings.command, heartbeat=settings.heartbeat),
+            heartbeat=settings.heartbeat,
+            blinded=settings.blinded,
+            record=settings.record,
+        )
+
+    # Looking
+
+    def _look_at(self, topic: topics.Topic, qos: Any) -> None:
+        self._readers[topic.name] = topic, RawReader(self, topic.type, topic.name, qos)
+
+    def _follow(self, wanted: bool) -> None:
+        """Look at the samples, or no longer."""
+        for topic, qos in SAMPLED:
+            if wanted and topic.name not in self._readers:
+                self._look_at(topic, qos)
+            elif not wanted and topic.name in self._readers:
+                self._readers.pop(topic.name)[1].destroy()
+
+    def next_deadline(self) -> float:
+        """Return when to take messages."""
+        return self._due
+
+    def on_deadline(self) -> None:
+        """Take what has come, do what was asked for, and say that somebody watches."""
+        self._due = time.monotonic() + PERIOD
+        if self.settings.heartbeat and self.page.seat.watched:
+            self.publish(topics.OPERATOR_HEARTBEAT, topics.OPERATOR_HEARTBEAT.type())
+        while not self._wishes.empty():
+            self._wishes.get()()
+        taken = [
+            (received, topic, data)
+            for topic, reader in self._readers.values()
+            for received, data in reader.take(MOST_AT_ONCE)
+        ]
+        taken.sort(key=lambda message: message[0])
+        with self.view.lock:
+            for received, topic, data in taken:
+                self._take(received, topic, data)
+
+    def _take(self, received: int, topic: topics.Topic, data: bytes) -> None:
+        message = deserialize_message(data, topic.type)
+        if self._foxglove is not None:
+            self._foxglove.send(topic, data, received)
+        if topic is topics.DIAGNOSTICS:
+            self.view.take_diagnostics(message, time.monotonic())
+            return
+        self.view.take(topic.name, message)
+        if topic is topics.GAIT_EVENTS:
+            walked, passed = self.view.now - self._seen[0], received - self._seen[1]
+            if not 0 <= walked < _ANOTHER_TIME:
+                self._seen = (self.view.now, received)
+            elif walked > NANOSECONDS_PER_SECOND // 2:
+                self._seen = (self.view.now, received)
+                self._follow(walked < FASTEST * passed)
+
+    # Acting, from the threads of the web server
+
+    def offered(self) -> set[str]:
+        """Return which of stop, arm, pause and repeat somebody answers."""
+        return {name for name, client in self._services_asked.items() if client.service_is_ready()}
+
+    def stop(self) -> str:
+        """Stop a robot that another machine drives, over ROS; return the answer."""
+        return self._ask("stop", Trigger.Request())
+
+    def arm(self) -> str:
+        """Arm the robot; return the answer."""
+        return self._ask("arm", Trigger.Request())
+
+    def pause(self, *, paused: bool) -> str:
+        """Have the session wait before its next block, or go on."""
+        return self._ask("pause", SetBool.Request(data=paused))
+
+    def repeat(self) -> str:
+        """Have the session walk its last block again."""
+        return self._ask("repeat", Trigger.Request())
+
+    def note(self, text: str) -> str:
+        """Publish a note, with the run's own time where that is not the wall clock's."""
+
+        def publish() -> None:
+            now = time.time_ns()
+            simulated = self.view.going_on and abs(now - self.view.now) > _ANOTHER_TIME
+            stamp = self.view.now if simulated else now
+            self.publish(topics.OPERATOR_NOTES, Note(header=header(stamp), text=text))
+
+        self._wishes.put(publish)
+        return "noted"
+
+    def _ask(self, name: str, request: Any) -> str:
+        """Ask a service; ActionError if it refuses or does not answer."""
+        answered, answers = threading.Event(), []
+
+        def on_answer(future: Any) -> None:
+            answers.append(future.result())
+            answered.set()
+
+        def ask() -> None:
+            self._services_asked[name].call_async(request).add_done_callback(on_answer)
+
+        self._wishes.put(ask)
+        if not answered.wait(ANSWER_TIMEOUT):
+            raise ActionError(f"{SERVICES[name][1]} does not answer")
+        answer = answers[0]
+        if not answer.success:
+            raise ActionError(answer.message or f"{SERVICES[name][1]} refused")
+        return str(answer.message)
+
+    def on_stop(self) -> None:
+        """Close the page."""
+        self.page.close()
+
+
+def _load() -> None:
+    """Load the web server, and let who has work to do come first meanwhile."""
+    os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)  # of this thread alone
+    importlib.import_module("gait_entrainment_page.layout")
+
+
+def main() -> int:
+    """Run the node."""
+    loading = threading.Thread(target=_load)
+    loading.start()
+    loading.join()
+    return run_node(OperatorPage)

@@ -1,0 +1,339 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+What the page shows of a run, without ROS and without a browser.
+
+Messages go in, whoever decoded them; out come figures, sentences and the points of the charts.
+Every history is bounded, so that the ten-thousandth stride costs what the first one did.
+"""
+
+import contextlib
+import math
+import statistics
+import threading
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from gait_entrainment.conventions import (
+    NANOSECONDS_PER_SECOND,
+    EventKind,
+    Side,
+    nanoseconds_of,
+)
+from gait_entrainment.gait.verdict import Reason, Verdict
+from gait_entrainment.outcome import MEANINGS
+from gait_entrainment.robot import DeviceError, find_driver
+from gait_entrainment_bags import topic_names as names
+from gait_entrainment_bags.messages import MessageError, event_of, state_of
+
+# Strides and pulses in the charts: more would not be told apart on a screen.
+STRIDES_SHOWN = 200
+# Readings of the robot that are kept, and how many of a stride are drawn.
+READINGS_KEPT, READINGS_DRAWN = 4000, 400
+# Events by which the rate of the detector is told.
+_EVENTS_COUNTED = 10
+_LINES_KEPT = 8
+# States of a node come once a second; without one for so long it is called silent [s], as in rqt.
+STALE_AFTER = 5.0
+PARTS = ("waiting", "baseline", "pulses", "washout", "finished", "failed", "rest")
+STATUSES = ("inactive", "active", "stopped", "fault")
+_LEVELS = ("ok", "warning", "error", "stale")
+JOINTS = ("l_hip", "r_hip", "l_ankle", "r_ankle")
+# Limits that are told, with what follows the number.
+_LIMITS = {"torque": " N m", "duration": " s", "rate": " N m/s", "rising": " pulses"}
+_NAN = math.nan
+
+
+@dataclass(frozen=True)
+class NodeState:
+    """What a node last said of itself."""
+
+    level: str  # ok, warning, error or stale
+    message: str
+    values: dict[str, str]
+    heard_at: float  # on the clock of whoever calls [s]
+
+
+class View:
+    """
+    The run as it stands. ``lock`` is held by whoever reads or writes it.
+
+    Stamps are nanoseconds, as recorded; ``version`` grows with what the charts are made of.
+    """
+
+    def __init__(self) -> None:
+        self.lock = threading.RLock()
+        self._take: dict[str, Callable[[Any], None]] = {
+            names.EXPERIMENT_STATE: self._on_state,
+            names.STRIDES: self._on_stride,
+            names.PULSE_PHASES: self._on_phase,
+            names.ENTRAINMENT: self._on_verdict,
+            names.GAIT_EVENTS: self._on_event,
+            names.ROBOT_STATE: self._on_robot,
+            names.ROBOT_SETUP: self._on_setup,
+            names.TROUBLE: self._on_trouble,
+            names.JOINT_STATES: self._on_joints,
+            names.OPERATOR_NOTES: self._on_note,
+        }
+        self.version = self.now = 0
+        self.nodes: dict[str, NodeState] = {}
+        self._reset()
+
+    def _reset(self) -> None:
+        """Forget the run: another one begins."""
+        self.state: Any = None  # latest ExperimentState
+        self.side: Side | None = None  # the perturbed leg
+        self.strides: deque[tuple[int, float]] = deque(maxlen=STRIDES_SHOWN)  # number, period [s]
+        # Of each pulse: stride, phase lag [s].
+        self.lags: deque[tuple[int, float]] = deque(maxlen=STRIDES_SHOWN)
+        # The latest double stances before a toe-off of the perturbed leg [s].
+        self.stances: deque[float] = deque(maxlen=_EVENTS_COUNTED)
+        self.verdict: Any = None  # latest Entrainment
+        self.robot: Any = None  # latest AnkleRobotState
+        self.setup: Any = None  # latest AnkleRobotSetup
+        self.simulated = False  # the robot: what it measures is computed
+        self.legs: tuple[float, ...] = ()  # hips and ankles, left and right [rad]
+        self.event: Any = None  # latest GaitEvent
+        self.events = 0
+        # Of the last whole stride: seconds from its start, commanded, measured [N m].
+        self.torque: list[tuple[float, float, float]] = []
+        self.toe_off = self.double_stance = _NAN  # of that stride, from its start [s]
+        self.troubles: deque[str] = deque(maxlen=_LINES_KEPT)
+        self.notes: deque[tuple[int, str, str]] = deque(maxlen=_LINES_KEPT)
+        self._readings: deque[tuple[int, float, float]] = deque(maxlen=READINGS_KEPT)
+        self._strikes: deque[int] = deque(maxlen=_EVENTS_COUNTED)
+        self._toe_off_at = self._other_strike_at = 0
+
+    # What comes in
+
+    def take(self, topic: str, message: Any) -> None:
+        """Take a message of a topic, by its relative name; one without a meaning is left out."""
+        if (run := getattr(message, "run", 0)) and self.state is not None:
+            if run < self.state.run:
+                return
+            if run > self.state.run:
+                self._reset()
+        try:
+            self._take[topic](message)
+        except MessageError:
+            return
+        if hasattr(message, "header"):
+            self.now = max(self.now, nanoseconds_of(message.header.stamp))
+
+    def take_diagnostics(self, message: Any, heard_at: float) -> None:
+        """Take what nodes say of themselves; ``heard_at`` is any clock's time [s]."""
+        for status in message.status:
+            name = status.name.partition(":")[0]
+            level = _LEVELS[min(int.from_bytes(status.level, "little"), 3)]
+            values = {pair.key: pair.value for pair in status.values}
+            self.nodes[name] = NodeState(level, status.message, values, heard_at)
+
+    def _on_state(self, message: Any) -> None:
+        # Runs of two commands have the same number.
+        if self.state is not None and message.stride < self.state.stride:
+            self._reset()
+        self.state = message
+        self.version += 1
+
+    def _on_stride(self, message: Any) -> None:
+        self.side = Side(message.side)
+        self.strides.append((message.number, message.period))
+        start, end = nanoseconds_of(message.start), nanoseconds_of(message.header.stamp)
+        self.torque = self._torque_between(start, end)
+        self.toe_off = (self._toe_off_at - start) / NANOSECONDS_PER_SECOND
+        self.double_stance = self.stances[-1] if self.stances else _NAN
+        self.version += 1
+
+    def _torque_between(self, start: int, end: int) -> list[tuple[float, float, float]]:
+        """Return the readings of a stride, thinned; the one before it says how it began."""
+        within, before = [], (0, 0.0, _NAN)
+        for reading in self._readings:
+            if reading[0] < start:
+                before = reading
+            elif reading[0] <= end:
+                within.append(reading)
+        thin = max(1, math.ceil(len(within) / READINGS_DRAWN))
+        if not within and not before[0]:
+            return []
+        last = within[-1] if within else before
+        drawn = [(start, *before[1:]), *within[::thin], (end, *last[1:])]
+        return [((at - start) / NANOSECONDS_PER_SECOND, c, m) for at, c, m in drawn]
+
+    def _on_phase(self, message: Any) -> None:
+        self.lags.append((message.stride, message.phase_lag))
+        self.version += 1
+
+    def _on_verdict(self, message: Any) -> None:
+        self.verdict = message
+        self.version += 1
+
+    def _on_event(self, message: Any) -> None:
+        event = event_of(message)
+        self.event, self.events = message, self.events + 1
+        if event.kind is EventKind.HEEL_STRIKE:
+            self._strikes.append(event.stamp)
+            if event.side is not self.side:
+                self._other_strike_at = event.stamp
+        elif event.side is self.side and self._other_strike_at:
+            self._toe_off_at = event.stamp
+            passed = event.stamp - self._other_strike_at
+            self.stances.append(passed / NANOSECONDS_PER_SECOND)
+
+    def _on_robot(self, message: Any) -> None:
+        self.robot, reading = message, state_of(message)
+        self._readings.append((reading.stamp, reading.commanded, reading.measured))
+
+    def _on_setup(self, message: Any) -> None:
+        self.setup, self.side = message, Side(message.side)
+        with contextlib.suppress(DeviceError):  # a driver that is not installed here
+            self.simulated = find_driver(message.driver).simulated
+
+    def _on_trouble(self, message: Any) -> None:
+        self.troubles.append(message.message)
+
+    def _on_joints(self, message: Any) -> None:
+        angles = dict(zip(message.name, message.position, strict=False))
+        if angles.keys() >= set(JOINTS):
+            self.legs = tuple(angles[joint] for joint in JOINTS)
+
+    def _on_note(self, message: Any) -> None:
+        stamp = nanoseconds_of(message.header.stamp)
+        self.notes.append((stamp, message.author, message.text))
+
+    # What is shown: sentences and figures
+
+    @property
+    def part(self) -> str:
+        """The part of the protocol, one of PARTS."""
+        return PARTS[min(self.state.phase, len(PARTS) - 1)] if self.state else "waiting"
+
+    @property
+    def going_on(self) -> bool:
+        """Whether a run has begun and not ended."""
+        return self.state is not None and self.part not in ("finished", "failed")
+
+    @property
+    def period(self) -> float:
+        """Median period of the last strides [s]; NaN if unknown."""
+        last = [period for _, period in [*self.strides][-10:] if not math.isnan(period)]
+        return statistics.median(last) if last else _NAN
+
+    def part_words(self) -> str:
+        """Return the part of the protocol, and the block by its neutral name if it has several."""
+        if self.state is None:
+            return "no run"
+        blocks = getattr(self.state, "blocks", 1)  # which bags of earlier versions lack
+        if blocks < 2:
+            return self.part
+        return f"{self.part}, {self.state.block_name or self.state.block} of {blocks} blocks"
+
+    def time_left(self) -> float:
+        """Return how long the rest takes at the period of the last strides [s]; NaN if unknown."""
+        if self.part == "finished":
+            return 0.0
+        if not self.going_on:
+            return _NAN
+        return float(max(self.state.strides - self.state.stride, 0) * self.period)
+
+    def lag(self) -> str:
+        """Return the latest phase lag, and where in the stride it lies."""
+        if not self.lags:
+            return "no pulse yet"
+        stride, lag = self.lags[-1]
+        period = dict(self.strides).get(stride) or (self.strides[-1][1] if self.strides else _NAN)
+        percent = (
+            "" if math.isnan(period) else f" = {_signed(100 * lag / period, 1)} % of the stride"
+        )
+        return f"{_signed(1e3 * lag, 0)} ms{percent}"
+
+    def verdict_words(self) -> tuple[str, str]:
+        """Return the verdict, and its figures in a sentence."""
+        found = self.verdict
+        if found is None:
+            return "no verdict yet", "It needs a baseline and some pulses."
+        verdict, reason = Verdict(found.verdict), Reason(found.reason)
+        word = verdict.name.lower()
+        if verdict is Verdict.ENTRAINED:
+            return f"entrained since stride {found.entrained_since_stride}", (
+                f"Over {found.window} pulses the lag moves by {_signed(1e3 * found.drift, 2)} ms"
+                f" a stride; strides last {found.mean_period:.4f} s, pulses come every"
+                f" {found.pulse_period:.4f} s."
+            )
+        meaning = MEANINGS[word if reason is Reason.NONE else reason.name.lower()]
+        figures = ""
+        if not math.isnan(found.drift):
+            figures = (
+                f" The lag moves by {_signed(1e3 * found.drift, 1)} ms a stride, give or take"
+                f" {1e3 * found.drift_interval:.1f}, over {found.window} pulses."
+            )
+        return word, f"{meaning[0].upper()}{meaning[1:]}.{figures}"
+
+    def measured(self) -> str:
+        """Return the torque as measured; never zero where none was measured."""
+        if self.robot is None:
+            return "nothing heard of the robot"
+        torque = self.robot.measured_torque
+        if math.isnan(torque):
+            return "not measured"
+        return _torque(torque) + (" (simulated)" if self.simulated else "")
+
+    def robot_words(self) -> list[tuple[str, str]]:
+        """Return what there is to say of the robot: names and values."""
+        rows = [("state", "not heard")]
+        if self.robot is not None:
+            rows = [("state", STATUSES[min(self.robot.status, 3)])]
+            rows.append(("commanded", _torque(self.robot.commanded_torque)))
+            rows.append(("measured", self.measured()))
+            rows.append(("faults", ", ".join(self.robot.faults) or "none"))
+        if (setup := self.setup) is not None:
+            limits = dict(zip(setup.limit_names, setup.limits, strict=False))
+            rows.append(("driver", setup.driver.partition(":")[0]))
+            if not self.simulated:
+                rows.append(("armed by", setup.armed_by or "nobody"))
+                rows.append(("watchdog", setup.watchdog or "not proved"))
+            told = [f"{n} {limits[n]:.4g}{u}" for n, u in _LIMITS.items() if limits.get(n)]
+            rows.append(("limits", ", ".join(told)))
+        return rows
+
+    def sensor_words(self) -> list[tuple[str, str]]:
+        """Return what there is to say of the detection of gait events."""
+        if (event := self.event) is None:
+            return [("gait events", "none yet")]
+        kind = EventKind(event.kind).name.lower().replace("_", " ")
+        rows = [("last event", f"{kind}, {Side(event.side).name.lower()}, step {event.step}")]
+        if hasattr(event, "detector"):  # which bags of earlier versions lack
+            known = nanoseconds_of(event.detected_at) - nanoseconds_of(event.header.stamp)
+            exact = not event.detector
+            rows += [
+                ("source", event.source),
+                ("detector", "none: exact events" if exact else event.detector),
+                ("uncertainty", "exact" if exact else f"{1e3 * event.uncertainty:.1f} ms"),
+            ]
+            rows += [] if exact else [("known after", f"{known / 1e6:.0f} ms")]
+        if len(self._strikes) > 1:
+            span = (self._strikes[-1] - self._strikes[0]) / NANOSECONDS_PER_SECOND
+            if span > 0:
+                rows.append(("rate", f"{60 * (len(self._strikes) - 1) / span:.1f} steps a minute"))
+        return rows
+
+    def node_words(self, now: float) -> list[tuple[str, str, str]]:
+        """Return name, level and message of every node; ``now`` is on the clock of `heard_at`."""
+        rows = []
+        for name, state in sorted(self.nodes.items()):
+            silent = now - state.heard_at
+            stale = silent > STALE_AFTER
+            level = "stale" if stale else state.level
+            rows.append((name, level, f"silent for {silent:.0f} s" if stale else state.message))
+        return rows
+
+
+def _torque(value: float) -> str:
+    return f"{_signed(value, 2)} N m"
+
+
+def _signed(value: float, digits: int) -> str:
+    """Return a number with its sign, and so many digits; no negative zero."""
+    return f"{round(value, digits) + 0.0:+.{digits}f}"

@@ -1,0 +1,184 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The view: what is said of a run, bounded histories, and what it must never say."""
+
+import json
+import math
+from types import SimpleNamespace as Message
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
+from gait_entrainment_page.charts import lag_chart, period_chart, torque_chart
+from gait_entrainment_page.view import READINGS_DRAWN, STALE_AFTER, STRIDES_SHOWN, View
+
+PERIOD = NANOSECONDS_PER_SECOND
+LEFT, RIGHT, STRIKE, TOE_OFF = 0, 1, 0, 1
+
+
+def stamp(at):
+    return Message(sec=at // NANOSECONDS_PER_SECOND, nanosec=at % NANOSECONDS_PER_SECOND)
+
+
+def header(at):
+    return Message(stamp=stamp(at))
+
+
+def state(stride, strides, phase=2, run=1):
+    return Message(
+        header=header(stride * PERIOD), run=run, phase=phase, stride=stride, strides=strides,
+        measured_period=1.0, pulse_period=0.98, blocks=1, block=1, block_name="", message="",
+    )  # fmt: skip
+
+
+def event(at, kind, side):
+    return Message(
+        header=header(at), run=1, kind=kind, side=side, step=1, source="s", detector="",
+        uncertainty=0.0, detected_at=stamp(0),
+    )  # fmt: skip
+
+
+def robot(at, commanded, measured, faults=()):
+    return Message(
+        header=header(at), run=1, status=1, commanded_torque=commanded, measured_torque=measured,
+        angle=0.0, faults=list(faults),
+    )  # fmt: skip
+
+
+def walk(view, first, last, strides, readings=20):
+    """Walk strides of one second: toe-off at 0.6 s, behind a double stance of 0.2 s."""
+    for number in range(first, last + 1):
+        start = number * PERIOD
+        view.take("gait_events", event(start, STRIKE, RIGHT))
+        view.take("gait_events", event(start + PERIOD * 4 // 10, STRIKE, LEFT))
+        view.take("gait_events", event(start + PERIOD * 6 // 10, TOE_OFF, RIGHT))
+        for reading in range(readings):
+            torque = 10.0 if reading == readings // 2 else 0.0
+            at = start + PERIOD * reading // readings
+            view.take("perturbator/state", robot(at, torque, torque / 2))
+        view.take(
+            "gait/pulse_phases",
+            Message(header=header(start), run=1, stride=number, phase_lag=-0.1),
+        )
+        end = start + PERIOD
+        stride = Message(header=header(end), run=1, side=RIGHT, number=number, period=1.0)
+        stride.start = stamp(start)
+        view.take("gait/strides", stride)
+        view.take("experiment/state", state(number, strides))
+
+
+def size(view):
+    charts = (period_chart, lag_chart, torque_chart)
+    return sum(len(json.dumps(chart(view, blinded=False))) for chart in charts)
+
+
+def test_ten_thousand_strides_cost_what_the_first_hundreds_did():
+    view = View()
+    walk(view, 1, 300, 10_000)
+    before = size(view)
+    walk(view, 301, 10_000, 10_000, readings=2)
+    assert len(view.strides) == len(view.lags) == STRIDES_SHOWN
+    assert view.strides[-1] == (10_000, 1.0)
+    assert size(view) < 1.1 * before
+    assert view.time_left() == 0.0
+
+
+def test_the_last_stride_and_its_double_stance_are_cut_out():
+    view = View()
+    walk(view, 1, 3, 10)
+    assert view.torque[0][0] == 0.0
+    assert view.torque[-1][0] == pytest.approx(1.0)
+    assert max(commanded for _, commanded, _ in view.torque) == 10.0
+    assert max(measured for _, _, measured in view.torque) == 5.0
+    assert view.toe_off == pytest.approx(0.6)
+    assert view.double_stance == pytest.approx(0.2)
+    assert view.time_left() == pytest.approx(7.0)
+    assert "-100 ms = -10.0 % of the stride" in view.lag()
+    area = lag_chart(view, blinded=False)["series"][0]["markArea"]["data"][0]
+    assert (area[0]["yAxis"], area[1]["yAxis"]) == (pytest.approx(-200.0), 0)
+
+
+def test_dense_readings_are_thinned():
+    view = View()
+    walk(view, 1, 2, 10, readings=2000)
+    assert len(view.torque) <= READINGS_DRAWN + 2
+
+
+def test_torque_that_was_not_measured_is_never_called_zero():
+    view = View()
+    assert "0" not in view.measured()
+    view.take("perturbator/state", robot(PERIOD, 0.0, math.nan))
+    assert view.measured() == "not measured"
+    view.take("perturbator/state", robot(2 * PERIOD, 0.0, -0.001))
+    assert view.measured() == "+0.00 N m"
+
+
+def test_a_simulated_torque_is_called_so():
+    view = View()
+    view.take(
+        "perturbator/setup",
+        Message(header=header(0), run=1, side=RIGHT, driver="ideal", armed_by="", watchdog="",
+                limit_names=["torque"], limits=[30.0]),
+    )  # fmt: skip
+    view.take("perturbator/state", robot(PERIOD, 0.0, 0.0))
+    assert "simulated" in view.measured()
+
+
+def test_another_run_begins_anew_also_of_another_command():
+    view = View()
+    walk(view, 1, 5, 10)
+    view.take("experiment/state", state(0, 20, phase=1))  # the number of its run is the same
+    assert list(view.strides) == []
+    walk(view, 1, 5, 20)
+    view.take("experiment/state", state(0, 20, phase=1, run=2))
+    assert list(view.strides) == []
+    walk(view, 1, 2, 20)  # of the run before, on its way for long
+    assert list(view.strides) == []
+
+
+def test_a_blinded_chart_shows_no_condition():
+    view = View()
+    walk(view, 1, 5, 10)
+    names = [line["name"] for line in period_chart(view, blinded=True)["series"]]
+    assert "pulse period" not in names
+    assert lag_chart(view, blinded=True)["series"] == []
+    assert torque_chart(view, blinded=True)["series"] == []
+
+
+def test_a_node_that_falls_silent_is_called_so():
+    view = View()
+    status = Message(name="ns/walker_sim: state", level=b"\0", message="ready", values=[])
+    view.take_diagnostics(Message(status=[status]), heard_at=100.0)
+    assert view.node_words(101.0) == [("ns/walker_sim", "ok", "ready")]
+    later = 100.0 + STALE_AFTER + 1
+    assert view.node_words(later) == [("ns/walker_sim", "stale", "silent for 6 s")]
+
+
+VALUES = st.just(math.nan) | st.floats(-1e6, 1e6)
+KINDS = st.sampled_from(["event", "robot", "stride", "state"])
+
+
+@given(st.lists(st.tuples(KINDS, VALUES, VALUES), max_size=60))
+def test_whatever_comes_can_be_shown(messages):
+    view = View()
+    for number, (kind, one, other) in enumerate(messages, start=1):
+        at = number * PERIOD
+        if kind == "event":  # kinds and sides that there are, and others
+            view.take("gait_events", event(at, number % 3, number % 4))
+        elif kind == "robot":
+            view.take("perturbator/state", robot(at, one, other))
+        elif kind == "state":
+            view.take("experiment/state", state(number % 7, 7, phase=number % 8))
+        else:
+            message = Message(header=header(at), run=1, side=number % 2, number=number)
+            message.start, message.period = stamp(at - PERIOD), abs(one) + 1e-3
+            view.take("gait/strides", message)
+    assert view.part
+    assert view.lag()
+    assert view.verdict_words()
+    assert view.robot_words()
+    assert view.sensor_words()
+    size(view)

@@ -1,0 +1,54 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+The pictures of docs/page.md: a real run with an emulated motor, as a browser shows it.
+
+    python tests/page/make_pictures.py        page_desktop.png and page_tablet.png in docs/figures
+
+The walk is that of the paper, in real time: it takes two minutes.
+"""
+
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+sys.path[:0] = [str(ROOT / "tests" / name) for name in ("page", ".", "system")]
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+
+from browser import DESKTOP, TABLET, chromium  # noqa: E402
+from harness import entrain_run  # noqa: E402
+from pages import Look, free_port, until_served  # noqa: E402
+from test_drivers import emulated_motor  # noqa: E402
+
+FIGURES = ROOT / "docs/figures"
+# A picture is taken in this stride, once the gait has locked and a pulse has come.
+SHOWN = 48
+
+
+def main() -> None:
+    """Take the pictures."""
+    port = free_port()
+    walk = ("--real-time", "--arm", "--unproved", "--baseline=10", "--pulses=60", "--washout=10")
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder)
+        with (
+            emulated_motor(place) as (driver, _),
+            entrain_run(
+                place / "bag", f"--driver={driver}", *walk, "--page", f"--port={port}"
+            ) as run,
+            chromium(DESKTOP) as desktop,
+            chromium(TABLET) as tablet,
+        ):
+            until_served(port, run)
+            shown = {"desktop": Look(desktop, port), "tablet": Look(tablet, port)}
+            shown["desktop"].note("harness fitted, treadmill at 1.1 m/s")
+            for name, look in shown.items():
+                look.until(f"{SHOWN} of 80", patience=150)
+                look.browser.save_screenshot(str(FIGURES / f"page_{name}.png"))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,50 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""STOP on the page, clicked in a real browser: it reaches every robot of this machine."""
+
+import os
+import re
+import signal
+import time
+
+from harness import entrain_run
+from pages import Look, free_port, page, until_served
+from test_drivers import emulated_motor
+from time_to_zero import GONE, HEIGHT, WALK, rows_of, wait_for_pulse
+
+from gait_entrainment_bringup.node_list import NODES, PAGE
+
+# Pulses follow each other by 470 ms: torque that lasts longer than this [ms] goes on.
+GOES_ON = 470
+
+
+def test_a_page_that_dies_harms_no_run_and_stop_on_the_next_one_ends_the_torque(tmp_path, browser):
+    port = free_port()
+    with emulated_motor(tmp_path) as (driver, trace):
+        options = (f"--driver={driver}", *WALK, "--page", f"--port={port}")
+        with entrain_run(tmp_path / "bag", *options) as run:
+            domain = run.domain()
+            until_served(port, run)
+            look = Look(browser, port)
+            look.until("pulses", "ak_mit_can")
+            os.kill(run.find_nodes((*NODES, PAGE))[PAGE], signal.SIGKILL)
+            look.until("No connection to the page's server", "STOP does not work from here")
+            assert run.process.poll() is None, run.text
+            with page(tmp_path, port=port, ROS_DOMAIN_ID=str(domain)):
+                look.until_not("No connection to the page's server")
+                look.until("pulses", "You are the operator")
+                stop = browser.find_element("id", "stop")
+                assert wait_for_pulse(run, trace, 1), run.text
+                since = time.time_ns()
+                stop.click()
+                told = look.until("STOP:", "measured)", "the stop is latched")
+                assert run.wait() == 1
+                look.until("failed", "latched: stopped")
+    rows = [row for row in rows_of(trace) if row[0] >= since]
+    pushing = [at for at, _, torque in rows if abs(torque) > GONE]
+    print(f"zero after {(max(pushing, default=since) - since) / 1e6:.0f} ms")
+    assert not pushing or (pushing[-1] - since) / 1e6 < GOES_ON
+    assert max(command for at, command, _ in rows if at > since + GOES_ON * 10**6) < HEIGHT / 2
+    # What is told is what the loop measured when it answered.
+    assert re.search(r"motor\S*: torque .*\([-+]\d+\.\d\d N m measured\)", told), told
