@@ -15,10 +15,11 @@ import pytest
 TESTS = Path(__file__).parents[2] / "ros2_ws/src/gait_entrainment_sensors/test"
 sys.path.insert(0, str(TESTS))
 
-from public_data import belt, foot_rates, foot_reference  # noqa: E402
+from public_data import belt, children, foot_rates, foot_reference  # noqa: E402
 from scoring import score  # noqa: E402
 
 from gait_entrainment.conventions import EventKind, Side  # noqa: E402
+from gait_entrainment.experiment import GaitError  # noqa: E402
 from gait_entrainment.gait import analyze  # noqa: E402
 from gait_entrainment.parameters import Variation  # noqa: E402
 from gait_entrainment.protocol import Protocol  # noqa: E402
@@ -97,13 +98,26 @@ def test_a_real_belt():
     )
 
 
+def test_numbering_of_children():
+    total = refused = 0
+    for found in children():
+        total += len(found)
+        refused += len(found) - len(number(found, "")[0])
+    print(f"\n50 children, every tenth event lost: {refused} of {total} detections refused")
+
+
 @pytest.mark.parametrize(("kind", "detector"), CHAINS)
 def test_the_default_protocol_through_sensors(kind, detector):
     verdicts, outside, sizes, shifts = Counter(), 0, [], []
     errors = {event: [] for event in EventKind}
     for seed in range(SEEDS):
         protocol = replace(Protocol(), variation=Variation(0.02), seed=seed)
-        run = rehearse(protocol, Sensors(kind, find_detector(detector), protocol.side, seed=seed))
+        sensors = Sensors(kind, find_detector(detector), protocol.side, seed=seed)
+        try:
+            run = rehearse(protocol, sensors)
+        except GaitError:  # no torque follows a gait that is not known
+            verdicts["ended"] += 1
+            continue
         seen, exact = (
             a.entrainments[-1].verdict.name.lower() if a.entrainments else "none"
             for a in (run.analysis, run.true_analysis)
@@ -124,11 +138,14 @@ def test_the_default_protocol_through_sensors(kind, detector):
                 sizes.append(found.median_size)
         pairs = zip(run.analysis.pulses[-1:], run.true_analysis.pulses[-1:], strict=False)
         shifts += [a.phase_lag - b.phase_lag for a, b in pairs if seen == exact == "entrained"]
-    print(f"\n{kind}, {detector}: verdict as of exact events in {verdicts[True]} of {SEEDS}")
+    print(
+        f"\n{kind}, {detector}: verdict as of exact events in {verdicts[True]} of {SEEDS}, "
+        f"{verdicts['ended']} ended as if nobody walked"
+    )
     for event, found in errors.items():
         mean = sum(found) / max(len(found), 1)
         print(f"  {event.name.lower():11} bias {mean * 1e3:+.1f} ms of {len(found)}")
-    print(f"  median size of a strike's error: at most {max(sizes) * 1e3:.1f} ms in a run")
+    print(f"  median size of a strike's error: at most {max(sizes, default=0) * 1e3:.1f} ms")
     print(f"  pulses outside the plan: {outside}")
     if shifts:
         print(f"  shift of the last lag of the locked: {sum(shifts) / len(shifts) * 1e3:+.1f} ms")

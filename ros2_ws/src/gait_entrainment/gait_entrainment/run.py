@@ -6,8 +6,7 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import count
+from itertools import chain
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.experiment import BlockRun
@@ -48,7 +47,6 @@ def analyze_blocks(
     side: Side,
     settings: VerdictSettings | None = None,
     unknown: Sequence[tuple[int, int]] = (),
-    toe_off_bias: float = 0.0,
 ) -> tuple[Analysis, tuple[JudgedBlock, ...]]:
     """
     Analyze a run, and each of its blocks, unless its protocol is one of fixed length.
@@ -57,20 +55,20 @@ def analyze_blocks(
     blocks, pulses, verdicts and holes of the run are those of its blocks.
     """
     plans = [block.plan for block in blocks]
-    judge = partial(analyze, side=side, toe_off_bias=toe_off_bias)
-    whole = judge(events, onsets, settings=settings_for(plans, settings), unknown=unknown)
+    whole = analyze(events, onsets, side, settings_for(plans, settings), unknown)
     if len(blocks) <= 1 and not any(block.plan.open_ended for block in blocks):
         return whole, ()
     judged = []
     for block in blocks:
         start = block.start or 0
         end = math.inf if block.end is None else block.end
-        analysis = judge(
+        analysis = analyze(
             [event for event in events if start <= event.stamp <= end],
             [onset for onset in onsets if start <= onset < end],
-            settings=settings_for([block.plan], settings),
-            unknown=[hole for hole in unknown if start < hole[1] and hole[0] < end],
-            strides_before=block.strides_before,
+            side,
+            settings_for([block.plan], settings),
+            [hole for hole in unknown if start < hole[1] and hole[0] < end],
+            block.strides_before,
         )
         strides = [stride.number for stride in analysis.strides if stride.end == end]
         judged.append(
@@ -84,13 +82,11 @@ def analyze_blocks(
             )
         )
     parts = [block.analysis for block in judged]
-    numbers = count(1)
-    return replace(
-        whole,
-        pulses=tuple(replace(p, number=next(numbers)) for part in parts for p in part.pulses),
-        entrainments=tuple(e for part in parts for e in part.entrainments),
-        holes=tuple(hole for part in parts for hole in part.holes),
-    ), tuple(judged)
+    pulses, entrainments, holes = (
+        tuple(chain.from_iterable(getattr(part, name) for part in parts))
+        for name in ("pulses", "entrainments", "holes")
+    )
+    return replace(whole, pulses=pulses, entrainments=entrainments, holes=holes), tuple(judged)
 
 
 @dataclass(frozen=True)

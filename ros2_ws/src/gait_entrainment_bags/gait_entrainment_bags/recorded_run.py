@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from gait_entrainment.conventions import Side
 from gait_entrainment.experiment import BlockRun, Conductor, GaitError
 from gait_entrainment.gait import Analysis, GaitEvent, Stride, VerdictSettings, analyze
-from gait_entrainment.gait.analyzer import TOE_OFF_BIAS, Result
+from gait_entrainment.gait.analyzer import Result
 from gait_entrainment.protocol import Protocol, ProtocolError, read_protocol
 from gait_entrainment.robot import MeasuredOnsets, TorqueProfile
 from gait_entrainment.run import Run, analyze_blocks, settings_for
@@ -36,7 +36,7 @@ from gait_entrainment_bags.holes import hole_before
 from gait_entrainment_bags.mcap_records import BagMessage
 from gait_entrainment_bags.reader import BagReader
 from gait_entrainment_bags.recovery import RECOVERY_KEY
-from gait_entrainment_bags.truth import detector_errors, lag_shift
+from gait_entrainment_bags.truth import TOE_OFF_BIAS, detector_errors, lag_shift, without_bias
 from gait_entrainment_bags.writer import ENDED_EARLY
 from gait_entrainment_commands.outcome import outcome_of, timing_outcome
 
@@ -115,14 +115,12 @@ def read_run(
         recorded_side = _side_in(bag, topic_names.STRIDES)
         live_side = side if recorded_side is None else recorded_side
         bias = _toe_off_bias(bag)
+        events = without_bias(record.events, bias)
         told = settings_for(protocol.sequence if protocol else (), settings)
-        begun = onsets[live_onset]
-        live = analyze(record.events, begun, live_side, told, record.unknown, 0, bias)
+        live = analyze(events, onsets[live_onset], live_side, told, record.unknown)
         blocks = _conducted(protocol, record.events) if protocol else ()
         begun = onsets[onset or live_onset]
-        analysis, judged = analyze_blocks(
-            blocks, record.events, begun, side, settings, record.unknown, bias
-        )
+        analysis, judged = analyze_blocks(blocks, events, begun, side, settings, record.unknown)
         measured_period, pulse_period = _periods(blocks, analysis)
         run = RecordedRun(
             protocol=protocol,
@@ -189,13 +187,6 @@ def _side_in(bag: BagReader, relative: str) -> Side | None:
     return None
 
 
-def periods_of(
-    protocol: Protocol | None, events: Sequence[GaitEvent], analysis: Analysis
-) -> tuple[float, float]:
-    """Return unperturbed and pulse period [s]: as a protocol plans them, else as analyzed."""
-    return _periods(_conducted(protocol, events) if protocol else (), analysis)
-
-
 def _conducted(protocol: Protocol, events: Sequence[GaitEvent]) -> Sequence[BlockRun]:
     """Return the blocks of a protocol, as they were planned on a walk."""
     conductor = Conductor(protocol)
@@ -205,6 +196,13 @@ def _conducted(protocol: Protocol, events: Sequence[GaitEvent]) -> Sequence[Bloc
     except (GaitError, ProtocolError):
         pass  # too few events are left to plan by: the periods stay unknown
     return conductor.blocks
+
+
+def periods_of(
+    protocol: Protocol | None, events: Sequence[GaitEvent], analysis: Analysis
+) -> tuple[float, float]:
+    """Return unperturbed and pulse period [s]: as a protocol plans them, else as analyzed."""
+    return _periods(_conducted(protocol, events) if protocol else (), analysis)
 
 
 def _periods(blocks: Sequence[BlockRun], analysis: Analysis) -> tuple[float, float]:

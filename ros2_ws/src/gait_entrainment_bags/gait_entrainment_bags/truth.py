@@ -6,16 +6,28 @@
 import math
 import statistics
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
-from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side, nanoseconds
 from gait_entrainment.gait import Analysis, GaitEvent
+from gait_entrainment.settings import Setting
 from gait_entrainment_commands.outcome import final_phase_lag
 
+TOE_OFF_BIAS = Setting("by how much toe-offs are detected late", unit="s", least=-0.2, most=0.2)
 # An event is found if one of its kind and side was detected within this share of a stride.
 WINDOW = 0.25
+
+
+def without_bias(events: Iterable[GaitEvent], bias: float) -> list[GaitEvent]:
+    """Return events whose toe-offs are known to be late by a bias [s] as they were."""
+    late = nanoseconds(bias)
+    return [
+        replace(e, stamp=e.stamp - late) if late and e.kind is EventKind.TOE_OFF else e
+        for e in events
+    ]
 
 
 def detector_errors(

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.gait import GaitEvent
-from gait_entrainment_bags.truth import detection_lines, detector_errors
+from gait_entrainment_bags.truth import detection_lines, detector_errors, without_bias
 
 MS = 10**6
 
@@ -66,3 +66,11 @@ def test_nothing_is_said_of_exact_events_and_all_of_detected_ones():
     assert "+4.0 ms" in bias
     assert "6.0 ms" in uncertainty
     assert "40 of 40 heel strikes, 0 false, +0.0 ms (SD 0.0); 40 of 40 toe-offs" in errors
+
+
+def test_a_known_bias_of_toe_off_is_taken_off_and_nothing_else():
+    late = [
+        replace(e, stamp=e.stamp + 4 * MS) if e.kind is EventKind.TOE_OFF else e for e in TRUTH
+    ]
+    assert without_bias(late, 0.004) == TRUTH
+    assert without_bias(TRUTH, 0.0) == TRUTH

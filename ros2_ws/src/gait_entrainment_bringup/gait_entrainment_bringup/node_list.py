@@ -18,7 +18,7 @@ import yaml
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.gait import GaitLimits
-from gait_entrainment.protocol import Protocol, said_of, write_protocol
+from gait_entrainment.protocol import Protocol, said_limits, write_protocol
 from gait_entrainment.robot import find_driver
 from gait_entrainment.run import settings_for
 from gait_entrainment_bags import BagError, BagReader
@@ -147,7 +147,7 @@ def parameters(
             "armed": armed,
             "unproved": unproved,
             **{f"planned.{name}": value for name, value in asdict(protocol.planned).items()},
-            **{f"limits.{name}": value for name, value in said_of(protocol, "limits").items()},
+            **{f"limits.{name}": value for name, value in said_limits(protocol).items()},
         },
         "gait_analyzer": {
             "side": side,
@@ -228,7 +228,7 @@ def gentle_limits(protocol: Protocol) -> dict[str, float]:
     ]
     if any(rates):
         gentle["rate"] = min(max(rates), 1e6)
-    return gentle | said_of(protocol, "limits")
+    return gentle | said_limits(protocol)
 
 
 def _verdict(protocol: Protocol | None) -> dict[str, Any]:

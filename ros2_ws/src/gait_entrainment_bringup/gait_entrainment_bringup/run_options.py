@@ -12,10 +12,10 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from gait_entrainment.errors import UsageError
-from gait_entrainment.gait.analyzer import TOE_OFF_BIAS
 from gait_entrainment.protocol import Protocol
 from gait_entrainment.robot import LimitError, find_driver
 from gait_entrainment.settings import Setting
+from gait_entrainment_bags.truth import TOE_OFF_BIAS
 from gait_entrainment_bringup.node_list import (
     DETECTOR,
     LEAD_TIME,

@@ -112,8 +112,6 @@ def _parameters(protocol: Protocol) -> dict[str, Any]:
     parameters = content_of(protocol)
     for said, block in zip(parameters.get("blocks", [parameters]), protocol.sequence, strict=True):
         said["pulses"]["torque"] = block.torque(protocol.walker)
-    if not protocol.variation.coefficient:
-        parameters.pop("variation", None)  # the paper's walker
     return parameters
 
 

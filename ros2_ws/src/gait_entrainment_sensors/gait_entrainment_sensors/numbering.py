@@ -5,8 +5,8 @@
 Step numbers for what was detected, by a model of the period.
 
 A sensor does not know which step it sees, and one that counts loses count at the first event that
-it misses. Here a place in the gait follows from the time since the latest event of the same kind
-and side, in strides of the person's own median: a missed event leaves a gap in the numbers, a
+it misses. Here a place in the gait follows from the time since the latest event, in strides of the
+person's own median: a missed event leaves a gap in the numbers, a
 doubled one finds its place taken, and neither moves the number of any other event.
 """
 
@@ -25,8 +25,8 @@ _PLACES = 4
 _OWN_STRIDES = 9
 # From so many on the median is known: one missed event can spoil one of them.
 _KNOWN_STRIDES = 3
-# Refused detections in a row after which it is the model that is wrong, not they: three strides.
-_CONVINCING = 3 * _PLACES
+# Detections of a kind and side refused in a row after which it is the model that is wrong.
+_CONVINCING = 3
 # Strides for which places are remembered, to see which are taken.
 _REMEMBERED = 4 * _PLACES
 
@@ -60,8 +60,10 @@ class Numbering:
         self._even = first_side  # the side whose strikes have even numbers
         self._known: dict[int, float] = {}  # remembered events: place -> time [s]
         self._strides: deque[float] = deque(maxlen=_OWN_STRIDES)
+        # Time of the latest detection of each kind and side [s], and its place; None if refused.
+        self._previous: list[tuple[float, int | None]] = [(-math.inf, None)] * _PLACES
         self._latest = -1  # place
-        self._refused = 0  # in a row
+        self._refused = [0] * _PLACES  # in a row, by the first place of kind and side
 
     @property
     def period(self) -> float:
@@ -77,13 +79,16 @@ class Numbering:
             fate, place = "", self._begin(detection)
         else:
             fate, place = self._place(detection)
+        first = self._first_place(detection)
+        if fate != "repeated":
+            self._measure(first, detection.time, None if fate else place)
         if fate:
             setattr(self.counts, fate, getattr(self.counts, fate) + 1)
-            self._refused += 1
-            if self._refused < _CONVINCING:
+            self._refused[first] += fate != "repeated"
+            if self._refused[first] < _CONVINCING:
                 return None
             place = self._restart(detection)
-        self._refused = 0
+        self._refused[first] = 0
         self._accept(detection, place)
         step = (place + 1) // 2
         stamp, sure = nanoseconds(detection.time), detection.uncertainty
@@ -138,28 +143,36 @@ class Numbering:
         before = max((p for p, known in self._known.items() if known < time), default=-1)
         after = min((p for p, known in self._known.items() if known >= time), default=math.inf)
         same = max((p for p in self._known if (p - first) % _PLACES == 0), default=None)
-        if same is not None and time - self._known[same] < least:
+        if same is not None and abs(time - self._known[same]) < least:
             return "repeated", same
         if before < 0:  # earlier than all that is remembered
             return "implausible", first
         place = before + 1 + (first - before - 1) % _PLACES  # the next of the kind and side
         if self._known_period():
-            # By the latest of the kind and side; else by any, a quarter of a stride a place.
-            reference = before if same is None else same
-            strides = (time - self._known[reference]) / self.period
-            place = first + _PLACES * round((reference - first) / _PLACES + strides)
+            # From the latest event, a quarter of a stride a place: the error is one place at most.
+            strides = (time - self._known[before]) / self.period
+            place = first + _PLACES * round((before - first) / _PLACES + strides)
             if place in self._known:
                 return "repeated", place
-            whole = (place - reference) / _PLACES
-            if same is not None and strides < (1 - self.limits.stride_change) * whole:
-                return "implausible", place
+            if same is not None:
+                least = (1 - self.limits.stride_change) * self.period * (place - same) / _PLACES
+                if time - self._known[same] < least:
+                    return "implausible", place
         return ("" if before < place < after else "implausible"), place
 
+    def _measure(self, first: int, time: float, place: int | None) -> None:
+        """
+        Take the stride since the latest detection of a kind and side, whether taken or refused.
+
+        Were those refused left out, a period of two strides would confirm itself.
+        """
+        (before, known), self._previous[first] = self._previous[first], (time, place)
+        strides = 1 if place is None or known is None else max((place - known) // _PLACES, 1)
+        if self.limits.stride_least <= (time - before) / strides <= self.limits.stride_most:
+            self._strides.append((time - before) / strides)
+
     def _accept(self, detection: Detection, place: int) -> None:
-        """Remember an event, and the stride that it closes."""
-        stride = detection.time - self._known.get(place - _PLACES, -math.inf)
-        if self.limits.stride_least <= stride <= self.limits.stride_most:
-            self._strides.append(stride)
+        """Remember an event."""
         counts, latest = self.counts, self._latest
         counts.numbered += 1
         if place < latest:
@@ -177,6 +190,7 @@ class Numbering:
         place = self._latest + passed + 1
         place += (self._first_place(detection) - place) % _PLACES
         self._known = {}
+        self._refused = [0] * _PLACES
         self._strides.clear()
         self.counts.restarts += 1
         return place

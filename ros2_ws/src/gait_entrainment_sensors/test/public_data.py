@@ -4,12 +4,15 @@
 """Public gait recordings, which stand beside the repository and are not part of it."""
 
 import csv
+import itertools
 import math
+import random
 from pathlib import Path
 
 import pytest
 
 from gait_entrainment.conventions import EventKind, Side
+from gait_entrainment_sensors.detection import Detection
 from gait_entrainment_sensors.recording import Stream
 
 DATA = Path(__file__).parents[5] / "shared" / "data"
@@ -60,3 +63,30 @@ def belt():
     path = needed(DATA / "gaitanalysistoolkit" / "example_vertical_grf.csv")
     with path.open() as file:
         return [(float(time), (float(force),)) for time, force in csv.reader(file)]
+
+
+def children():
+    """
+    Return the events of both feet that the stride periods of 50 children tell, every tenth lost.
+
+    The record is of one foot's strides; those of the other are put in their middle, toe-offs at
+    an eighth of a stride after the other foot's strike.
+    """
+    found = []
+    for path in sorted(needed(DATA / "gait_maturation").glob("*-*.txt")):
+        generator, events = random.Random(1), []
+        strikes = [
+            float(line.split()[0]) for line in path.read_text().splitlines() if line.strip()
+        ]
+        for start, end in itertools.pairwise(strikes):
+            for kind, side, share in (
+                (EventKind.HEEL_STRIKE, Side.RIGHT, 0.0),
+                (EventKind.TOE_OFF, Side.LEFT, 0.125),
+                (EventKind.HEEL_STRIKE, Side.LEFT, 0.5),
+                (EventKind.TOE_OFF, Side.RIGHT, 0.625),
+            ):
+                time = start + share * (end - start)
+                if len(events) < 12 or generator.random() > 0.1:
+                    events.append(Detection(kind, side, time, time + 0.02, 0.0))
+        found.append(events)
+    return found

@@ -4,11 +4,12 @@
 """Step numbers: gaps stay gaps, and no missed or doubled event contradicts the others."""
 
 import random
+from itertools import pairwise
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from public_data import foot_rates
+from public_data import children, foot_rates
 from walks import STRIDE, detections
 
 from gait_entrainment.conventions import EventKind, Side
@@ -103,6 +104,27 @@ def test_of_a_real_walk_27_right_strides_are_left_whatever_event_is_lost_or_doub
         analysis = analyze(numbered(changed)[1], (), Side.RIGHT)
         assert len(analysis.strides) >= 27
         assert analysis.event_counts.contradictory == 0
+
+
+def test_strides_of_children_with_every_tenth_event_lost_are_numbered():
+    total = refused = 0
+    for found in children()[::5]:
+        numbering, events = numbered(found)
+        total, refused = total + len(found), refused + len(found) - len(events)
+        assert numbering.counts.restarts == 0
+        assert all(a.place < b.place for a, b in pairwise(events))
+    assert refused < 1e-3 * total
+
+
+def test_a_period_of_two_strides_does_not_confirm_itself():
+    slow = [Detection(d.kind, d.side, 2 * d.time, 2 * d.detected_at, 0.0) for d in detections(3)]
+    late = slow[-1].time
+    quick = [
+        Detection(d.kind, d.side, d.time + late, d.detected_at + late, 0.0) for d in detections(30)
+    ]
+    numbering, events = numbered([*slow, *quick])
+    assert len(events) >= len(slow) + len(quick) - 12
+    assert numbering.period == pytest.approx(STRIDE)
 
 
 def test_a_pause_is_a_gap_and_a_stop_is_told():

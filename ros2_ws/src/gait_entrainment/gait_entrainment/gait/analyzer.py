@@ -7,9 +7,9 @@ import math
 from bisect import bisect_left
 from collections import deque
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from gait_entrainment.conventions import EventKind, Side, nanoseconds
+from gait_entrainment.conventions import Side
 from gait_entrainment.gait.plausibility import GaitLimits
 from gait_entrainment.gait.pulse_phase import (
     LagFollower,
@@ -25,10 +25,8 @@ from gait_entrainment.gait.strides import (
     UnperturbedPeriod,
 )
 from gait_entrainment.gait.verdict import Entrainment, EntrainmentTest, VerdictSettings
-from gait_entrainment.settings import Setting
 
 Result = Stride | PulsePhase | Entrainment
-TOE_OFF_BIAS = Setting("by how much toe-offs are detected late", unit="s", least=-0.2, most=0.2)
 # Whose strides they are is not known here: ten times smaller or larger than a person's.
 _ANYBODY = GaitLimits(stride_least=0.03, stride_most=50.0)
 # So many strides in a row that are known to be without a pulse are the pause before another train.
@@ -65,17 +63,11 @@ class GaitAnalyzer:
     to its own, once the next stride is closed too. So results depend on the events and the onsets,
     never on how events and promises interleave, except for a stop, which happens when it happens.
     Lags are followed, and verdicts formed, since the latest of ``holes`` or of the trains began.
-    ``toe_off_bias`` [s] is by how much the source is known to see toe-offs late.
     """
 
     def __init__(
-        self,
-        side: Side,
-        settings: VerdictSettings | None = None,
-        strides_before: int = 0,
-        toe_off_bias: float = 0.0,
+        self, side: Side, settings: VerdictSettings | None = None, strides_before: int = 0
     ) -> None:
-        self._bias = nanoseconds(toe_off_bias)
         self._tracker = StrideTracker(side, _ANYBODY)
         self._strides_before = strides_before  # of the leg in the run, which are of no interest
         self._test = EntrainmentTest(settings or VerdictSettings())
@@ -99,8 +91,6 @@ class GaitAnalyzer:
 
     def add_event(self, event: GaitEvent) -> list[Result]:
         """Take one gait event; return the results that it completes, in order."""
-        if self._bias and event.kind is EventKind.TOE_OFF:
-            event = replace(event, stamp=event.stamp - self._bias)
         stride = self._tracker.add(event)
         if stride is None:
             return []
@@ -235,7 +225,6 @@ def analyze(
     settings: VerdictSettings | None = None,
     unknown: Iterable[tuple[int, int]] = (),
     strides_before: int = 0,
-    toe_off_bias: float = 0.0,
 ) -> Analysis:
     """
     Analyze a whole run of one perturbed leg offline, with the very class that runs online.
@@ -244,7 +233,7 @@ def analyze(
     which pulses began from one instant to another [ns]. Of a part of a run so many strides of the
     leg came before.
     """
-    analyzer = GaitAnalyzer(side, settings, strides_before, toe_off_bias)
+    analyzer = GaitAnalyzer(side, settings, strides_before)
     for start, end in unknown:
         analyzer.add_hole(start, end)
     results = [result for event in events for result in analyzer.add_event(event)]

@@ -8,6 +8,6 @@ from gait_entrainment.protocol.protocol import FIELDS, Protocol, content_of
 from gait_entrainment.protocol.reader import (
     DEFAULT_PROTOCOL,
     read_protocol,
-    said_of,
+    said_limits,
     write_protocol,
 )

@@ -82,17 +82,16 @@ def write_protocol(protocol: Protocol) -> str:
     content = content_of(protocol)
     for block in content.get("blocks", [content]):
         block["pulses"] = {k: v for k, v in block["pulses"].items() if v is not None}
-    content["limits"] = said_of(protocol, "limits")
-    content["variation"] = said_of(protocol, "variation")
+    content["limits"] = said_limits(protocol)
     said = {k: v for k, v in content.items() if v != {}}
     text: str = yaml.safe_dump(said, sort_keys=False)
     return text
 
 
-def said_of(protocol: Protocol, section: str) -> dict[str, Any]:
-    """Return what a protocol says of a section: all that is not as it is by itself."""
-    unsaid = asdict(getattr(DEFAULT_PROTOCOL, section))
-    return {k: v for k, v in asdict(getattr(protocol, section)).items() if v != unsaid[k]}
+def said_limits(protocol: Protocol) -> dict[str, Any]:
+    """Return what a protocol says of the limits: all that is not as it is by itself."""
+    unsaid = asdict(DEFAULT_PROTOCOL.limits)
+    return {k: v for k, v in asdict(protocol.limits).items() if v != unsaid[k]}
 
 
 def _entries(source: Path | str) -> Iterator[tuple[str, _Entry]]:

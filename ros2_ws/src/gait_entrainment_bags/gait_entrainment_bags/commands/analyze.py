@@ -9,7 +9,6 @@ from pathlib import Path
 
 from gait_entrainment.errors import UsageError
 from gait_entrainment.gait import analyze
-from gait_entrainment.gait.analyzer import TOE_OFF_BIAS
 from gait_entrainment.run import Run
 from gait_entrainment_bags.commands.record_options import add_record_options, told_of_record
 from gait_entrainment_bags.figures import draw_figures
@@ -19,7 +18,7 @@ from gait_entrainment_bags.recorded_run import (
     read_run,
     recorded_outcome,
 )
-from gait_entrainment_bags.truth import detection_lines
+from gait_entrainment_bags.truth import TOE_OFF_BIAS, detection_lines, without_bias
 from gait_entrainment_commands.drawing import add_dpi_option, chosen_dpi
 from gait_entrainment_commands.outcome import outcome_of, summary, timing_summary
 from gait_entrainment_commands.outcome_options import add_outcome_options
@@ -106,7 +105,7 @@ def _of_tables(options: argparse.Namespace) -> int:
     told = told_of_record(options)
     bias = float(TOE_OFF_BIAS.parse("--toe-off-bias", options.toe_off_bias or "0"))
     events, onsets = read_events(options.events), read_onsets(options.pulses)
-    analysis = analyze(events, onsets, told["side"], toe_off_bias=bias)
+    analysis = analyze(without_bias(events, bias), onsets, told["side"])
     periods = periods_of(told["protocol"], events, analysis)
     run = Run(told["protocol"], tuple(events), tuple(onsets), (), *periods, analysis, ())
     outcome = outcome_of(run) | ({"toe_off_bias": bias} if bias else {})

@@ -18,9 +18,10 @@ from std_srvs.srv import Trigger
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.gait import VerdictSettings
-from gait_entrainment.gait.analyzer import TOE_OFF_BIAS, Result
+from gait_entrainment.gait.analyzer import Result
 from gait_entrainment.settings import setting
 from gait_entrainment_bags.messages import MessageError, nanoseconds_of
+from gait_entrainment_bags.truth import TOE_OFF_BIAS
 from gait_entrainment_msgs import msg
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.nodes.gait_analyzer_run import RESULTS, Run

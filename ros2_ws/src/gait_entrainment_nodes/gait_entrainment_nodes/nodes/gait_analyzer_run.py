@@ -21,6 +21,7 @@ from gait_entrainment_bags.messages import (
     state_of,
     stop_of,
 )
+from gait_entrainment_bags.truth import without_bias
 from gait_entrainment_msgs import msg
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.stamps import header, to_time
@@ -54,7 +55,8 @@ class Run:
         self.number, self.side = number, side
         self.promised_until = 0  # all pulses up to this instant are known
         self.end: int | None = None  # of the walk, once it is known
-        self._analyzer = GaitAnalyzer(side, settings, toe_off_bias=toe_off_bias)
+        self._analyzer = GaitAnalyzer(side, settings)
+        self._bias = toe_off_bias
         self._measured = MeasuredOnsets() if measured else None
         self._events = 0
         self._closed = False  # nothing will be promised any more
@@ -78,7 +80,8 @@ class Run:
         """Take one gait event."""
         taken = event_of(event)
         self._events += 1
-        return self._analyzer.add_event(taken)
+        (mended,) = without_bias([taken], self._bias)
+        return self._analyzer.add_event(mended)
 
     def add_profile(self, message: msg.TorqueProfile) -> list[Result]:
         """Take the onsets that are promised, or a stop: the instant from which torque is zero."""

@@ -47,7 +47,7 @@ JOINTS = ["l_hip", "r_hip", "l_ankle", "r_ankle"]
 class Settings:
     """Parameters of the node, beside those of the walker."""
 
-    seed: int = setting(0, "seed of the variation", within=(0, 2**63 - 1))
+    seed: int = setting(0, "seed of the variation", "1", (0, 2**32 - 1))
     first_heel_strike: Side = setting(Side.RIGHT, "leg of heel strike 0: left or right")
     sample_rate: float = setting(
         200.0, "rate of the sampled topics; 0 samples at gait events only", "Hz", (0.0, 1000.0)
