@@ -123,7 +123,7 @@ def test_the_default_protocol_through_sensors(kind, detector):
             for a in (run.analysis, run.true_analysis)
         )
         verdicts[seen == exact] += 1
-        planned = {run.train.onset(n) for n in range(run.train.count)} if run.train else set()
+        planned = set(run.train.onsets) if run.train else set()
         outside += sum(onset not in planned for onset in run.onsets)
         for event in EventKind:
             found = score(

@@ -11,6 +11,7 @@ import yaml
 
 from gait_entrainment.protocol import DEFAULT_PROTOCOL
 from gait_entrainment.settings import settings_of
+from gait_entrainment_bags import BagWriter, TopicInfo, find_definition
 from gait_entrainment_bringup.node_list import (
     DISPLAY,
     NODES,
@@ -148,3 +149,22 @@ def test_torque_is_stopped_first_and_the_record_last():
     assert set(STOP_ORDER) == {*NODES, *nodes_for("sensed"), DISPLAY, PAGE}
     assert STOP_ORDER[0] == "perturbator"
     assert STOP_ORDER[-1] == "bag_recorder"
+
+
+def test_a_bag_of_an_earlier_version_is_replayed_under_the_names_of_today(tmp_path):
+    progress = "gait_entrainment_msgs/msg/Progress"
+    event = "gait_entrainment_msgs/msg/GaitEvent"
+    told = {"protocol": "{baseline: 20}\n"}
+    bag = BagWriter(tmp_path / "bag", ros_distro="jazzy", custom_data=told)
+    for name, kind in (
+        ("/truth/gait_events", event),
+        ("/gait_events", event),
+        ("/walker_sim/progress", progress),
+    ):
+        bag.add_topic(TopicInfo(name, kind, find_definition(kind).schema_text))
+        bag.write(name, bytes(64), 1, 1)
+    bag.close()
+    namespace, given = replay_parameters(tmp_path / "bag")
+    assert namespace == ""
+    assert given["bag_player"]["remap"] == ["/walker_sim/progress:=/walker/progress"]
+    assert "/walker/progress" in given["bag_player"]["expect"]

@@ -14,9 +14,10 @@ from dataclasses import dataclass
 
 from gait_entrainment.conventions import Side, nanoseconds
 from gait_entrainment.experiment import Conductor
-from gait_entrainment.gait import Analysis, GaitEvent, analyze
+from gait_entrainment.gait import Analysis, GaitEvent
 from gait_entrainment.protocol import Protocol
-from gait_entrainment.robot import PulseTrain, find_driver
+from gait_entrainment.robot import LimitError, PulseTrain, find_driver
+from gait_entrainment.run import analyze_blocks
 from gait_entrainment.walker import Ending, Walker
 from gait_entrainment_sensors.detection import ChosenDetector, Detection
 from gait_entrainment_sensors.emulated import EmulatedSensor, EmulatedSettings
@@ -30,7 +31,7 @@ class Rehearsal:
     truth: tuple[GaitEvent, ...]  # the walker's exact events
     events: tuple[GaitEvent, ...]  # what was detected and numbered, in that order
     onsets: tuple[int, ...]  # of the pulses [ns]
-    train: PulseTrain | None  # as planned
+    train: PulseTrain | None  # as planned in the last block
     analysis: Analysis  # of the detected events
     true_analysis: Analysis  # of the exact events, with the same pulses
     ending: Ending | None  # fall or fly-off
@@ -82,7 +83,13 @@ def rehearse(protocol: Protocol, sensors: Sensors) -> Rehearsal:
     Raises as `gait_entrainment.simulate` does, and GaitError if the detected gait is not one that
     torque may follow.
     """
-    robot = find_driver(protocol.driver).make(protocol.side, protocol.limits, protocol.seed)
+    driver = find_driver(protocol.driver)
+    if not driver.simulated:
+        raise LimitError(
+            f"driver: {driver.name} runs in real time only; use entrain run --real-time"
+        )
+    robot = driver.make(protocol.side, protocol.limits, protocol.seed)
+    protocol.check_limits()
     robot.configure()
     robot.activate()
     robot.begin(0)
@@ -112,8 +119,8 @@ def rehearse(protocol: Protocol, sensors: Sensors) -> Rehearsal:
         events=tuple(detected),
         onsets=tuple(onsets),
         train=conductor.block.train,
-        analysis=analyze(detected, onsets, protocol.side),
-        true_analysis=analyze(truth, onsets, protocol.side),
+        analysis=analyze_blocks(conductor.blocks, detected, onsets, protocol.side)[0],
+        true_analysis=analyze_blocks(conductor.blocks, truth, onsets, protocol.side)[0],
         ending=walker.ending,
         troubles=sensors.troubles(),
     )

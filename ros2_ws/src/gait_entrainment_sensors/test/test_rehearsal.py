@@ -55,5 +55,5 @@ def test_steps_have_the_numbers_of_the_walker():
         exact = number[event.kind, event.side, event.step]
         assert event.stamp == pytest.approx(exact, abs=20_000_000)
     assert rehearsal.train is not None
-    planned = {rehearsal.train.onset(n) for n in range(rehearsal.train.count)}
+    planned = set(rehearsal.train.onsets)
     assert set(rehearsal.onsets) <= planned

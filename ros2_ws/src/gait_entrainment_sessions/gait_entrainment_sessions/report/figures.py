@@ -64,11 +64,12 @@ def draw_circle(findings: Findings) -> Any:
     figure = Figure(figsize=(4.6, 4.6), layout="constrained")
     axes = _round(figure)
     pulses = findings.part.analysis.pulses
-    last = {pulse.number for pulse in pulses[-findings.direction.count :]}
-    most = max((pulse.number for pulse in pulses), default=1)
-    for pulse in pulses:
-        colour = BLUE if pulse.number in last else GREY
-        axes.plot(2 * math.pi * pulse.phase, pulse.number / most, ".", color=colour, ms=5)
+    angles = 2 * np.pi * np.array([pulse.phase for pulse in pulses])
+    places = np.array([pulse.number for pulse in pulses])
+    places = places / places.max(initial=1)
+    last = len(pulses) - findings.direction.count
+    axes.plot(angles[:last], places[:last], ".", color=GREY, ms=5)
+    axes.plot(angles[last:], places[last:], ".", color=BLUE, ms=5)
     if findings.direction.count:
         angle = 2 * math.pi * findings.direction.phase
         arrow = {"arrowstyle": "-|>", "color": ORANGE, "lw": 2}
