@@ -78,7 +78,8 @@ class Look:
         """Wait until all words are shown; return the text."""
         deadline = time.monotonic() + patience
         while not all(word in (text := self.text) for word in words):
-            assert time.monotonic() < deadline, f"no {words} in:\n{text}"
+            log = self.browser.get_log("browser") if time.monotonic() > deadline else []
+            assert time.monotonic() < deadline, f"no {words} in:\n{text}\n{log}"
             time.sleep(0.05)
         return text
 

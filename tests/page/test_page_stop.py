@@ -22,7 +22,8 @@ GOES_ON = 470
 def test_a_page_that_dies_harms_no_run_and_stop_on_the_next_one_ends_the_torque(tmp_path, browser):
     port = free_port()
     with emulated_motor(tmp_path) as (driver, trace):
-        options = (f"--driver={driver}", *WALK, "--page", f"--port={port}")
+        walk = (*WALK, "--pulses=300")
+        options = (f"--driver={driver}", *walk, "--page", f"--port={port}")
         with entrain_run(tmp_path / "bag", *options) as run:
             domain = run.domain()
             until_served(port, run)

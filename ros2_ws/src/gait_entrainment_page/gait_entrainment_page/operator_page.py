@@ -34,8 +34,9 @@ from gait_entrainment_page.access import Access, Seat, listen
 from gait_entrainment_page.actions import ActionError, Command
 from gait_entrainment_page.view import View
 
-# How often messages are taken, and the heartbeat is published if it is wanted [s].
-PERIOD = 0.05
+# How often messages are taken, and the heartbeat is published if it is wanted [s]; where nobody
+# could follow, it is enough to look now and then.
+PERIOD, IDLE_PERIOD = 0.05, 0.25
 MOST_AT_ONCE = 1000
 # How long a node may take to answer [s].
 ANSWER_TIMEOUT = 3.0
@@ -154,7 +155,8 @@ class OperatorPage(Participant):
 
     def on_deadline(self) -> None:
         """Take what has come, do what was asked for, and say that somebody watches."""
-        self._due = time.monotonic() + PERIOD
+        following = topics.JOINT_STATES.name in self._readers
+        self._due = time.monotonic() + (PERIOD if following else IDLE_PERIOD)
         if self.settings.heartbeat and self.page.seat.watched:
             self.publish(topics.OPERATOR_HEARTBEAT, topics.OPERATOR_HEARTBEAT.type())
         while not self._wishes.empty():

@@ -1,0 +1,134 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+What the page costs a run, and how soon its STOP acts: the figures of docs/page.md.
+
+    python tests/page/measure_page.py cpu speed lateness frozen stop      all, or some of them
+"""
+
+import os
+import random
+import signal
+import statistics
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+sys.path[:0] = [str(ROOT / "tests" / name) for name in ("page", ".", "system", "safety")]
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+
+from browser import chromium  # noqa: E402
+from harness import NODES, QUICK, cpu_seconds, entrain_run  # noqa: E402
+from pages import Look, free_port, page, until_served  # noqa: E402
+from test_drivers import emulated_motor  # noqa: E402
+from time_to_zero import GONE, WALK, rows_of, wait_for_pulse  # noqa: E402
+
+from gait_entrainment_bringup.node_list import PAGE  # noqa: E402
+
+WATCHED = 12.0  # [s]
+BROWSERS = 10
+
+
+def share(process: int) -> str:
+    """Return the share of a core that a process uses."""
+    before, begin = cpu_seconds(process), time.monotonic()
+    time.sleep(WATCHED)
+    return f"{100 * (cpu_seconds(process) - before) / (time.monotonic() - begin):.1f} %"
+
+
+def cpu(folder: Path) -> None:
+    """Tell what the page uses with no browser, one and ten."""
+    port, robot = free_port(), "--driver=emulated:state_rate=200"
+    walk = ("--real-time", robot, "--pulses=300", "--page", f"--port={port}")
+    with entrain_run(folder / "cpu", *walk) as run:
+        process = run.find_nodes((*NODES, PAGE))[PAGE]
+        until_served(port, run)
+        print("cpu, no browser:", share(process), flush=True)
+        with chromium() as browser:
+            Look(browser, port).until("baseline")
+            print("cpu, one browser:", share(process), flush=True)
+            for _ in range(BROWSERS - 1):
+                browser.switch_to.new_window("tab")
+                browser.get(f"http://127.0.0.1:{port}/")
+            print(f"cpu, {BROWSERS} browsers:", share(process), flush=True)
+
+
+def speed(folder: Path) -> None:
+    """Tell how fast a lock-step run is with a page beside it, by pairs."""
+    ratios = []
+    with page(folder, ROS_DOMAIN_ID="55"):
+        for pair in range(6):
+            speeds = []
+            for domain in ("56", "55"):
+                bag = folder / f"{domain}_{pair}"
+                walk = ("--pulses=100", "--json")
+                with entrain_run(bag, *walk, ROS_DOMAIN_ID=domain) as run:
+                    speeds.append(run.outcome()["real_time_factor"])
+            ratios.append(speeds[1] / speeds[0])
+            print("lock-step without, with:", [f"{s:.1f}" for s in speeds], flush=True)
+    print(f"ratio, median: {statistics.median(ratios):.3f}")
+
+
+def lateness(folder: Path) -> None:
+    """Tell how late samples are in real time, without and with a page."""
+    for number in range(4):
+        walk = (*QUICK, "--real-time", "--json", "--baseline=3", "--pulses=45", "--washout=2")
+        with_page = ("--page", f"--port={free_port()}") if number % 2 else ()
+        with entrain_run(folder / f"late_{number}", *walk, *with_page) as run:
+            told = run.outcome()
+            print("with page:" if with_page else "without:", told["publish_lateness_ms"],
+                  told["promises"], "lost", told["lost"], flush=True)  # fmt: skip
+
+
+def frozen(folder: Path) -> None:
+    """Tell what becomes of a run whose page is frozen, in real time and in lock-step."""
+    port = free_port()
+    walk = (*QUICK, "--real-time", "--json", "--pulses=50", "--sample-rate=1000")
+    with entrain_run(folder / "frozen", *walk, "--page", f"--port={port}") as run:
+        process = run.find_nodes((*NODES, PAGE))[PAGE]
+        until_served(port, run)
+        os.kill(process, signal.SIGSTOP)
+        told = run.outcome()
+        print("frozen, real time:", told["promises"], "lost", told["lost"], flush=True)
+    with page(folder, ROS_DOMAIN_ID="57") as served:
+        os.kill(served.process.pid, signal.SIGSTOP)
+        with entrain_run(folder / "held", "--json", ROS_DOMAIN_ID="57") as run:
+            print("frozen, lock-step:", run.outcome()["real_time_factor"], "times real time")
+
+
+def stop(folder: Path) -> None:
+    """Tell how long torque lasts after STOP is clicked in mid-pulse, at the emulated motor."""
+    for number in range(4):
+        place = folder / f"stop_{number}"
+        place.mkdir()
+        with emulated_motor(place) as (driver, trace), chromium() as browser:
+            port = free_port()
+            walk = (f"--driver={driver}", *WALK, "--pulses=300", "--page", f"--port={port}")
+            with entrain_run(place / "bag", *walk) as run:
+                until_served(port, run)
+                Look(browser, port).until("ak_mit_can")
+                button = browser.find_element("id", "stop")
+                if not wait_for_pulse(run, trace, 1):
+                    print("the run ended before:", run.text[-200:])
+                    continue
+                time.sleep(0.03 * random.random())
+                since = time.time_ns()
+                button.click()
+                run.wait()
+        pushing = [at for at, _, torque in rows_of(trace) if at >= since and abs(torque) > GONE]
+        print(f"STOP: {(max(pushing, default=since) - since) / 1e6:.0f} ms", flush=True)
+
+
+def main() -> None:
+    """Measure what is asked for."""
+    measures = {m.__name__: m for m in (cpu, speed, lateness, frozen, stop)}
+    for name in sys.argv[1:] or measures:
+        with tempfile.TemporaryDirectory() as folder:
+            measures[name](Path(folder))
+
+
+if __name__ == "__main__":
+    main()
