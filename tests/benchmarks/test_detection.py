@@ -24,6 +24,7 @@ def test_events_come_soon_after_the_sample_that_decides(detector, tmp_path):
             *("entrain", "run", "--real-time", "--json", "--no-figures", "--walker=sensed"),
             *(f"--detector={detector}", "--out", str(tmp_path / "bag")),
             *("--baseline=5", f"--pulses={STRIDES - 6}", "--washout=1"),
+            "--sample-rate=500",  # what sensors measured is sent every 2 ms
         ],
         stdout=subprocess.PIPE,
         text=True,
