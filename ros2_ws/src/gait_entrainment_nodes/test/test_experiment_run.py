@@ -83,6 +83,26 @@ class Bench:
         return instant
 
 
+def test_many_pulses_are_requested_in_parts_the_next_before_the_promises_reach_it():
+    bench = Bench()
+    protocol = Protocol(baseline=2, pulses=PulsePlan(count=450), washout=1)
+    bench.run.begin(Conductor(protocol, 0.5), 10 * SECOND)
+    instant = bench.walk_to_planning()
+    requested = []
+    while len(requested) < 3:
+        for train in bench.trains[len(requested) :]:
+            requested.append(len(train.pulses))
+            assert train.onsets[0] > bench.run.promised_until
+            bench.run.take_answer(True)
+        bench.promise()
+        bench.strike(instant)
+        bench.report(instant)
+        instant += SECOND
+    assert requested == [200, 200, 50]
+    onsets = [onset for train in bench.trains for onset in train.onsets]
+    assert onsets == list(bench.run.conductor.block.train.onsets)
+
+
 @pytest.fixture
 def bench():
     bench = Bench()

@@ -25,6 +25,8 @@ from gait_entrainment_nodes.messaging.stamps import header, to_time
 
 # How long the reason of the perturbator may come after its effect [s]: they are on two topics.
 REASON_TIMEOUT = 0.5
+# Pulses in one goal: a message of more would hold up who sends it, and who takes it.
+_GOAL_PULSES = 200
 PERTURBATOR, WALKER, RECORDER = "perturbator", "walker_sim", "bag_recorder"
 
 
@@ -76,6 +78,8 @@ class Run:
         self._grant = self._recorded_grant = -1
         self._covered_until = 0  # by profiles [ns since 1970]
         self._planning = 0  # requests of pulses that were not answered yet
+        self._rest: PulseTrain | None = None  # pulses that are still to be requested
+        self._next_part_at = 0  # when they are [ns since 1970]
         self._shown: tuple[Part, int] | None = None
         self.forgive()
 
@@ -150,8 +154,8 @@ class Run:
             return
         self._events += 1
         if train is not None:
-            self._planning, self._planning_at = self._planning + 1, self._clock()
-            self._request(train)
+            self._rest = self._rest.followed_by(train) if self._rest else train
+            self._request_part()
         self._answer()
 
     def take_progress(self, progress: msg.Progress) -> None:
@@ -203,6 +207,16 @@ class Run:
 
     # What goes out
 
+    def _request_part(self) -> None:
+        """Request as many pulses as one goal holds, the next ones once half of these are over."""
+        assert self._rest is not None
+        side, pulses = self._rest.side, self._rest.pulses
+        part, rest = pulses[:_GOAL_PULSES], pulses[_GOAL_PULSES:]
+        self._rest = PulseTrain(side, rest) if rest else None
+        self._next_part_at = part[len(part) // 2].onset
+        self._planning, self._planning_at = self._planning + 1, self._clock()
+        self._request(PulseTrain(side, part))
+
     def _answer(self) -> None:
         """Answer the latest progress with a horizon, unless something is still to come."""
         progress, conductor = self._progress, self.conductor
@@ -210,8 +224,12 @@ class Run:
             return
         if self._events < progress.events:
             return
+        known_until = nanoseconds_of(progress.header.stamp)
+        if self._rest and known_until >= self._next_part_at:
+            self._request_part()
+            return
         self._progress = None
-        self.known_until = nanoseconds_of(progress.header.stamp)
+        self.known_until = known_until
         if progress.state != msg.Progress.WALKING:
             self.final = progress
             return
