@@ -16,6 +16,7 @@ table: action, motor, trials, median and worst [ms], further pulses, what the ru
 
 import argparse
 import contextlib
+import math
 import os
 import random
 import signal
@@ -178,7 +179,10 @@ def main() -> int:
         f"{'action':<24}{'motor':<8}{'trials':>7}{'median':>8}{'worst':>8}{'further pulses':>16}"
     )
     for (action, motor), results in sorted(found.items()):
-        times = [result[0] for result in results]
+        # Those that had ended before anything was done tell nothing.
+        times = [result[0] for result in results if not math.isnan(result[0])]
+        if not times:
+            continue
         print(
             f"{action:<24}{motor:<8}{len(times):>7}{statistics.median(times):>8.0f}"
             f"{max(times):>8.0f}{max(result[1] for result in results):>16}"
