@@ -1,15 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A session through the nodes: killed, resumed, valid as BIDS, unblinded, stopped by a key."""
+"""A session through the nodes: killed, resumed, valid as BIDS, unblinded."""
 
 import json
-import os
-import pty
 import re
 import subprocess
-import termios
-import time
 from pathlib import Path
 
 import pytest
@@ -22,11 +18,10 @@ EXAMPLE = Path(__file__).parents[2] / "examples/sessions/blinded_sham.yaml"
 FOLDER = "sub-P03/ses-1"
 
 
-@pytest.fixture(scope="module")
-def short(tmp_path_factory):
-    """Return the blinded example with few strides, in a folder of its own."""
+def shortened(folder):
+    """Write the blinded example with few strides into a folder; return its path."""
     text = EXAMPLE.read_text().replace("count: 50", "count: 4").replace("side: left", "washout: 1")
-    path = tmp_path_factory.mktemp("session") / "session.yaml"
+    path = folder / "session.yaml"
     path.write_text(re.sub("washout: 1", "washout: 1\n  baseline: 3", text))
     return path
 
@@ -44,8 +39,9 @@ def ended(process):
 
 
 @pytest.fixture(scope="module")
-def conducted(short):
+def conducted(tmp_path_factory):
     """Return the folder of a session whose process was killed in its first block, then resumed."""
+    short = shortened(tmp_path_factory.mktemp("session"))
     study = short.parent / "study"
     first = entrain("session", short, "--out", study, stdin=subprocess.DEVNULL)
     assert first.stdout.readline().startswith("block 1 of 2")
@@ -98,23 +94,3 @@ def test_tables_are_exported_over_all_of_a_study(conducted, tmp_path):
     code, out, err = ended(entrain(*words, "--format", "parquet"))
     assert (code, err) == (0, "")
     assert out.count("table ") == len(list(tmp_path.glob("*.parquet"))) == 4
-
-
-def test_the_space_bar_stops_a_block(short):
-    ours, theirs = pty.openpty()
-    study = short.parent / "stopped"
-    process = entrain("session", short, "--out", study, "--real-time", stdin=theirs)
-    os.write(ours, b"\n")  # the answer to what is next
-    while not process.stdout.readline().endswith("block 1\n"):
-        pass
-    deadline = time.monotonic() + PATIENCE
-    while termios.tcgetattr(theirs)[3] & termios.ICANON:  # until keys are taken at once
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-    os.write(ours, b" ")
-    code, _, err = ended(process)
-    os.close(ours)
-    os.close(theirs)
-    assert code == 1
-    assert "entrain session: block 1: stopped by the space bar" in err
-    assert SessionFolder(study / FOLDER).ledger[-1].what == "failed"

@@ -79,6 +79,15 @@ def test_who_does_not_obey_is_killed(programs):
     assert programs.ended() == {"stubborn": -signal.SIGKILL, "one": 0}
 
 
+@pytest.fixture
+def interruptible():
+    """Heed Ctrl-C, also where the tests run in the background of a shell, which ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 def test_second_ctrl_c_does_not_break_off_the_stopping(programs):
     started(programs, "one", "stubborn", "two")
     impatient = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
