@@ -49,6 +49,7 @@ def until_served(port: int, *commands: Started) -> None:
 def page(folder: Path, *options: str, port: int = 0, **environment: str) -> Iterator[Started]:
     """Start ``entrain page`` and wait until it serves; ``port`` of the result says where."""
     port = port or free_port()
+    environment.setdefault("ROS_DOMAIN_ID", "98")  # where no run of another test is
     command = ["entrain", "page", f"--port={port}", *options]
     started: Any = Started(command, folder / f"page-{port}.out", **environment)
     started.port = port

@@ -18,7 +18,7 @@ EACH = (*NODES, DISPLAY)
 # From the signal to the end of the process [s], on a machine that does other things too.
 PROMPTLY = 5.0
 # Pulses that are on nearly all the time.
-BROAD = (*QUICK, "--pulses=100000", "--width=0.4", "--baseline=2")
+BROAD = (*QUICK, "--pulses=2000", "--width=0.4", "--baseline=2")
 
 
 def assert_idle(nodes):

@@ -12,6 +12,7 @@ that was held up has lost no sample.
 import pickle
 import select
 import socket
+import threading
 from collections import deque
 from dataclasses import dataclass
 from typing import Any
@@ -34,12 +35,13 @@ class Sample:
 
 
 class Link:
-    """One end of the link."""
+    """One end of the link; any thread may send, a stop among others."""
 
     def __init__(self, end: socket.socket) -> None:
         self._socket = end
         end.setblocking(False)
         self._waiting: deque[bytes] = deque()  # packets that have not been sent yet
+        self._sending = threading.RLock()  # nobody waits while it is held: sends do not block
 
     def fileno(self) -> int:
         """Return the descriptor that becomes readable with a message."""
@@ -47,15 +49,18 @@ class Link:
 
     def send(self, *message: Any) -> None:
         """Send a message, or keep it until the other side takes it."""
-        self._waiting.append(pickle.dumps(message))
-        self._flush()
+        packet = pickle.dumps(message)
+        with self._sending:
+            self._waiting.append(packet)
+            self._flush()
 
     def send_samples(self, samples: list[Any]) -> None:
         """Send samples as far as the other side takes them, and empty the list by as many."""
-        self._flush()
-        while samples and not self._waiting:
-            self.send("samples", samples[:_PACKET_SAMPLES])
-            del samples[:_PACKET_SAMPLES]
+        with self._sending:
+            self._flush()
+            while samples and not self._waiting:
+                self.send("samples", samples[:_PACKET_SAMPLES])
+                del samples[:_PACKET_SAMPLES]
 
     def received(self) -> list[Any]:
         """

@@ -85,7 +85,7 @@ class Bench:
 
 def test_many_pulses_are_requested_in_parts_the_next_before_the_promises_reach_it():
     bench = Bench()
-    protocol = Protocol(baseline=2, pulses=PulsePlan(count=450), washout=1)
+    protocol = Protocol(baseline=2, pulses=PulsePlan(count=4500), washout=1)
     bench.run.begin(Conductor(protocol, 0.5), 10 * SECOND)
     instant = bench.walk_to_planning()
     requested = []
@@ -98,7 +98,7 @@ def test_many_pulses_are_requested_in_parts_the_next_before_the_promises_reach_i
         bench.strike(instant)
         bench.report(instant)
         instant += SECOND
-    assert requested == [200, 200, 50]
+    assert requested == [2000, 2000, 500]
     onsets = [onset for train in bench.trains for onset in train.onsets]
     assert onsets == list(bench.run.conductor.block.train.onsets)
 

@@ -25,8 +25,8 @@ from gait_entrainment_nodes.messaging.stamps import header, to_time
 
 # How long the reason of the perturbator may come after its effect [s]: they are on two topics.
 REASON_TIMEOUT = 0.5
-# Pulses in one goal: a message of more would hold up who sends it, and who takes it.
-_GOAL_PULSES = 200
+# Pulses in one goal, an hour's: a message of more would hold up who sends it, and who takes it.
+_GOAL_PULSES = 2000
 PERTURBATOR, WALKER, RECORDER = "perturbator", "walker_sim", "bag_recorder"
 
 
