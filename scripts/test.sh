@@ -16,9 +16,9 @@ run() {
 }
 
 devices=ros2_ws/src/gait_entrainment_drivers/test
-alone=("$devices/test_torque_loop.py" tests/safety tests/page/test_page_stop.py
+alone=("$devices/test_torque_loop.py" tests/safety tests/page
     tests/system/test_{preflight,session_stop,stop_command}.py)
-waiting=("$devices" tests/page
+waiting=("$devices"
     tests/system/test_{deaths,drivers,interventions,person,perturbator,races,real_time_run}.py
     tests/system/test_{ros2_control,spectators,stopping}.py)
 run --numprocesses auto --dist loadfile \

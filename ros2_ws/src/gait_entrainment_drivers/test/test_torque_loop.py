@@ -95,8 +95,9 @@ def bench(tmp_path):
 )
 def test_what_a_device_does_wrong_is_a_fault_by_name_and_ends_the_torque(bench, does, fault):
     device = bench(does=does, after=0.0)
-    device.push(count=3)
-    device.until(lambda: fault in device.faults())
+    device.push(count=12)
+    device.until(device.faults)
+    assert fault in device.faults()
     asked = len(device.commands())
     device.until(lambda: len(device.commands()) > asked + 20)
     assert {torque for _, torque in device.commands()[asked:]} == {0.0}
