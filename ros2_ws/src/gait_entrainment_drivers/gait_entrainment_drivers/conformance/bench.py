@@ -26,6 +26,8 @@ from gait_entrainment.robot import (
 
 # How often a robot in real time is looked after [s].
 POLL = 0.005
+# What is still to be told after this process was held up comes within this time [s].
+_HELD_UP = 0.2
 # Period of the pulses of a harmless train [s].
 PERIOD = 0.4
 # Where the clock of a simulated run begins [ns].
@@ -306,6 +308,14 @@ class DriverBench(Bench):
         super().__init__(Side.RIGHT, tolerances or Tolerances())
         self.driver = driver
         self.limits = DeviceLimits()  # of the next robot
+
+    def run(self, seconds: float) -> None:
+        """Let time go by, and hear what a robot had to tell while this process was held up."""
+        super().run(seconds)
+        told = self.now - nanoseconds(self.tolerances.onset)
+        give_up = self.now + nanoseconds(_HELD_UP)
+        while not self.simulated and self.promised_until < told and self.now < give_up:
+            self.advance(self.now + self.stretch)
 
     def make(self, *, guarded: bool) -> Any:
         """Return a robot; always with the same seed, so that it does the same."""
