@@ -13,7 +13,13 @@ from dataclasses import dataclass
 from gait_entrainment.experiment import Conductor
 from gait_entrainment.gait import GaitEvent, VerdictSettings
 from gait_entrainment.protocol import Protocol
-from gait_entrainment.robot import LimitError, MeasuredOnsets, PulseTrain, find_driver
+from gait_entrainment.robot import (
+    GuardedRobot,
+    LimitError,
+    MeasuredOnsets,
+    PulseTrain,
+    find_driver,
+)
 from gait_entrainment.run import Run, analyze_blocks
 from gait_entrainment.walker import Ending, Walker
 
@@ -42,16 +48,7 @@ def simulate(
     Raises LimitError if the driver is unknown or the pulses are outside the protocol's limits,
     ProtocolError if the pulses would overlap at the measured period.
     """
-    driver = find_driver(protocol.driver)
-    if not driver.simulated:
-        raise LimitError(
-            f"driver: {driver.name} runs in real time only; use entrain run --real-time"
-        )
-    robot = driver.make(protocol.side, protocol.limits, protocol.seed)
-    protocol.check_limits()
-    robot.configure()
-    robot.activate()
-    robot.begin(0)
+    robot = begun_robot(protocol)
     conductor = Conductor(protocol)
     walker = Walker(protocol.walker, protocol.side, None, protocol.variation, protocol.seed)
     ended = False
@@ -93,3 +90,23 @@ def simulate(
         analysis=analysis,
         blocks=blocks,
     )
+
+
+def begun_robot(protocol: Protocol) -> GuardedRobot:
+    """
+    Return the simulated robot of a protocol, at the start of a run.
+
+    Raises LimitError if the driver is unknown or a real robot's, or the pulses are outside the
+    protocol's limits.
+    """
+    driver = find_driver(protocol.driver)
+    if not driver.simulated:
+        raise LimitError(
+            f"driver: {driver.name} runs in real time only; use entrain run --real-time"
+        )
+    robot = driver.make(protocol.side, protocol.limits, protocol.seed)
+    protocol.check_limits()
+    robot.configure()
+    robot.activate()
+    robot.begin(0)
+    return robot

@@ -16,8 +16,9 @@ from gait_entrainment.conventions import Side, nanoseconds
 from gait_entrainment.experiment import Conductor
 from gait_entrainment.gait import Analysis, GaitEvent
 from gait_entrainment.protocol import Protocol
-from gait_entrainment.robot import LimitError, PulseTrain, find_driver
+from gait_entrainment.robot import PulseTrain
 from gait_entrainment.run import analyze_blocks
+from gait_entrainment.simulation import begun_robot
 from gait_entrainment.walker import Ending, Walker
 from gait_entrainment_sensors.detection import ChosenDetector, Detection
 from gait_entrainment_sensors.emulated import EmulatedSensor, EmulatedSettings
@@ -83,16 +84,7 @@ def rehearse(protocol: Protocol, sensors: Sensors) -> Rehearsal:
     Raises as `gait_entrainment.simulate` does, and GaitError if the detected gait is not one that
     torque may follow.
     """
-    driver = find_driver(protocol.driver)
-    if not driver.simulated:
-        raise LimitError(
-            f"driver: {driver.name} runs in real time only; use entrain run --real-time"
-        )
-    robot = driver.make(protocol.side, protocol.limits, protocol.seed)
-    protocol.check_limits()
-    robot.configure()
-    robot.activate()
-    robot.begin(0)
+    robot = begun_robot(protocol)
     conductor = Conductor(protocol)
     walker = Walker(protocol.walker, protocol.side, None, protocol.variation, protocol.seed)
     ended = False
