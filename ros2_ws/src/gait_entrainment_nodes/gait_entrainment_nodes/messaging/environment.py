@@ -17,8 +17,9 @@ from ament_index_python.resources import get_resources
 from gait_entrainment.errors import EntrainmentError
 
 PACKAGE = "gait_entrainment_nodes"
-# Below the loop that times the torque.
-_PRIORITY = 10
+# Of the processes of a run in real time, below the loop that times the torque; the one whose
+# messages are judged by their punctuality does not wait until another has done its turn.
+PRIORITY, PUNCTUAL = 10, 11
 SHARED_MEMORY = Path("/dev/shm")
 # Fast DDS without a page for its locks there dies of SIGBUS; with some it does without the rest.
 _LOCKS = 1_000_000
@@ -110,7 +111,7 @@ def set_environment(domain: int, *, real_time: bool = False) -> dict[str, str]:
     return dict(os.environ)
 
 
-def come_before_others() -> None:
+def come_before_others(priority: int = PRIORITY) -> None:
     """
     Have all threads of this process scheduled before those of others, if the system permits.
 
@@ -120,7 +121,7 @@ def come_before_others() -> None:
     """
     for thread in Path("/proc/self/task").iterdir():
         with suppress(OSError):  # not permitted: it takes its turn like others; or ended meanwhile
-            os.sched_setscheduler(int(thread.name), os.SCHED_RR, os.sched_param(_PRIORITY))
+            os.sched_setscheduler(int(thread.name), os.SCHED_RR, os.sched_param(priority))
 
 
 def user_and_host() -> str:

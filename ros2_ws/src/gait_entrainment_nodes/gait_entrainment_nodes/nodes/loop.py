@@ -63,7 +63,7 @@ def run_node(make_node: Callable[[], Any]) -> int:
             domain = rclpy.get_default_context().get_domain_id()
             node.get_logger().info(f"started in ROS domain {domain}")
             if node.real_time:
-                come_before_others()
+                come_before_others(node.priority)
         except HelpRequestedError as answer:
             print(answer)
             return 0

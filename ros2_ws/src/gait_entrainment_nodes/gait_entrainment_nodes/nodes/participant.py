@@ -20,6 +20,7 @@ from gait_entrainment.settings import SettingError
 from gait_entrainment_msgs.msg import PublishedCounts
 from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.delays import delay_between, delays_wanted
+from gait_entrainment_nodes.messaging.environment import PRIORITY
 from gait_entrainment_nodes.messaging.publisher import CountedPublisher, StopRequestedError
 from gait_entrainment_nodes.messaging.stamps import header, to_time
 from gait_entrainment_nodes.messaging.topics import DIAGNOSTICS, PUBLISHED_COUNTS, Topic
@@ -48,6 +49,7 @@ class Participant(Node):
     """
 
     get_logger: Callable[[], RcutilsLogger]  # which rclpy does not type
+    priority = PRIORITY  # in real time, where the system permits it
     stopping = False  # set from outside: the node is to end
     failure: str | None = None  # why the node must end with exit code 1
     finished = False  # set to end the loop with exit code 0

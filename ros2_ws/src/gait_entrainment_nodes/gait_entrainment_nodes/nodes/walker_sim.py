@@ -28,6 +28,7 @@ from gait_entrainment_bags.messages import nanoseconds_of, profile_of, stop_of
 from gait_entrainment_msgs import msg
 from gait_entrainment_msgs.srv import StartRun
 from gait_entrainment_nodes.messaging import topics
+from gait_entrainment_nodes.messaging.environment import PUNCTUAL
 from gait_entrainment_nodes.messaging.raw_messages import MessageTemplate
 from gait_entrainment_nodes.messaging.stamps import (
     LOCK_STEP_START,
@@ -64,6 +65,7 @@ class WalkerSim(Participant):
     """ROS side of the walker: parameters, topics, services."""
 
     settings: Settings
+    priority = PUNCTUAL
     walker: WalkerParameters  # the next run begins with it
     variation: Variation
     run: Run | None
