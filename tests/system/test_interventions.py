@@ -104,7 +104,8 @@ def conducted(tmp_path_factory):
 def test_second_protocol_second_train_and_reset_are_refused_in_mid_run(conducted):
     handle = conducted.start()
     assert not conducted.nodes.conduct().accepted
-    train = goal_of(1, PulseTrain(Side.RIGHT, (Pulse((2**31 - 1) * 10**9, 5.0, 0.1),)))
+    pulse = Pulse((2**31 - 1) * 10**9, 5.0, 0.1)
+    train = goal_of(1, "a stranger's", PulseTrain(Side.RIGHT, (pulse,)))
     refused = conducted.probe.send_goal(
         DeliverPulseTrain, "perturbator/deliver_pulse_train", train
     )

@@ -20,7 +20,7 @@ from gait_entrainment_bags.messages import nanoseconds_of
 from gait_entrainment_bringup.node_list import STOP_ORDER
 from gait_entrainment_msgs.action import DeliverPulseTrain
 from gait_entrainment_msgs.msg import Horizon
-from gait_entrainment_nodes.messaging.goals import goal_of
+from gait_entrainment_nodes.messaging.goals import goal_of, seal_of
 from gait_entrainment_nodes.messaging.stamps import to_time
 from gait_entrainment_nodes.messaging.topics import (
     EMERGENCY_STOP,
@@ -32,6 +32,7 @@ from gait_entrainment_nodes.messaging.topics import (
 
 UP = (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE)
 SECOND = 10**9
+KEY = "the test's"
 
 
 class Conductor:
@@ -53,17 +54,17 @@ class Conductor:
     def promise(self, known, until, run=7):
         """Send a horizon between two instants [s]; return the profile that answers it."""
         begin, end = round(known * SECOND), round(until * SECOND)
-        message = Horizon(run=run, until=to_time(end))
+        message = Horizon(run=run, until=to_time(end), seal=seal_of(KEY))
         message.header.stamp = to_time(begin)
         count = len(self.profiles)
         self.horizons.publish(message)
         self.probe.until(lambda: len(self.profiles) > count, "a profile")
         return self.profiles[-1]
 
-    def request(self, onset, **changes):
+    def request(self, onset, key=KEY, **changes):
         """Ask for a train from an instant [s] on; return the goal's handle."""
         asked = {"period": 1.0, "count": 100, "torque": 5.0, "duration": 0.5} | changes
-        goal = goal_of(7, PulseTrain.periodic(Side.RIGHT, round(onset * SECOND), **asked))
+        goal = goal_of(7, key, PulseTrain.periodic(Side.RIGHT, round(onset * SECOND), **asked))
         return self.probe.send_goal(DeliverPulseTrain, "perturbator/deliver_pulse_train", goal)
 
 
@@ -104,6 +105,7 @@ def test_a_stranger_gets_no_pulses_that_are_not_of_the_protocol(tmp_path):
             ({"duration": 0.21}, "duration: 0.21 is not of the protocol's"),
             ({"count": 11}, "count: 11 is not"),
             ({"count": 0}, "count: 0; allowed: at least 1"),
+            ({"key": "a stranger's"}, "key: not that of the run"),
         ):
             begin, count = time.monotonic(), len(conductor.troubles)
             asked = {"duration": 0.2, "count": 10} | changes
@@ -112,7 +114,19 @@ def test_a_stranger_gets_no_pulses_that_are_not_of_the_protocol(tmp_path):
             nodes.probe.until(lambda h=heard, c=count: len(h) > c, "a reason")
             assert words in heard[-1].message
             assert time.monotonic() - begin < 5.0
-        assert conductor.request(3, duration=0.2, count=10).accepted
+        assert conductor.request(3, duration=0.2, count=5).accepted
+        # Of the height, width and number that the protocol has left: the same client, another one.
+        count = len(conductor.troubles)
+        for onset in (2.5, 3.5, 20):
+            assert not conductor.request(onset, "", duration=0.2, count=1).accepted
+        # Nor may a stranger move the horizon on.
+        conductor.horizons.publish(Horizon(run=7, until=to_time(50 * SECOND), seal="a stranger's"))
+        nodes.probe.until(lambda: len(conductor.troubles) == count + 4, "four reasons")
+        assert "not of who conducts the run" in conductor.troubles[-1].message
+        assert conductor.request(10, duration=0.2, count=5).accepted
+        assert not conductor.request(16, "", duration=0.2, count=1).accepted  # after the last part
+        onsets = [nanoseconds_of(onset) / SECOND for onset in conductor.promise(2, 20).onsets]
+        assert onsets == [3, 4, 5, 6, 7, 10, 11, 12, 13, 14]
 
 
 @pytest.mark.parametrize("driver", ["ideal", "emulated"])
@@ -182,6 +196,6 @@ def test_torque_ends_if_whoever_holds_the_emergency_stop_lets_go(tmp_path):
 
 def horizon_from(now):
     """Return a horizon from an instant [s] on."""
-    message = Horizon(run=7, until=to_time(round((now + 0.2) * SECOND)))
+    message = Horizon(run=7, until=to_time(round((now + 0.2) * SECOND)), seal=seal_of(KEY))
     message.header.stamp = to_time(round(now * SECOND))
     return message

@@ -16,14 +16,16 @@ import enum
 import math
 import statistics
 from collections import deque
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain, islice
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, nanoseconds
 from gait_entrainment.errors import EntrainmentError
 from gait_entrainment.gait import GaitEvent, GaitLimits, StrideTracker
 from gait_entrainment.gait.strides import PLACES
 from gait_entrainment.protocol import Block, Protocol, ProtocolError
-from gait_entrainment.robot import PulseTrain
+from gait_entrainment.robot import Pulse, PulseTrain
 
 # A stride is predicted to last as long as the mean of so many before it, as the timing of
 # exoskeletons by heel strikes does: more would follow a change of the gait too slowly.
@@ -32,6 +34,9 @@ PREDICTED_FROM = 5
 # before it has to be.
 STEADY_STRIDES = 10
 _MOST_UNSTEADY = 200
+# Pulses requested at once, an hour's: a message of more would hold up who sends it, and who takes
+# it.
+PART_PULSES = 2000
 
 
 class Part(enum.IntEnum):
@@ -68,7 +73,10 @@ class BlockRun:
     strides_before: int = 0  # of the perturbed leg in the run
     doubted_before: int = 0  # events that were not believed
     baseline: int = 0  # strides that it lasted; 0 while it does
-    train: PulseTrain | None = None  # planned so far
+    planned: int = 0  # pulses so far
+    first_onset: int | None = None  # of the pulses that are planned [ns]
+    pulses_end: int = 0  # of the last one that is planned [ns]
+    train: PulseTrain | None = None  # requested so far
     # Mean stride period over the baseline [s] and its standard error; NaN if not measured.
     measured_period: float = math.nan
     measured_period_error: float = math.nan
@@ -78,7 +86,7 @@ class BlockRun:
     @property
     def pulses_left(self) -> int:
         """Pulses that are not planned yet."""
-        return self.plan.pulses.count - (len(self.train.pulses) if self.train else 0)
+        return self.plan.pulses.count - self.planned
 
 
 class Conductor:
@@ -110,6 +118,8 @@ class Conductor:
         self._longest_promise = self._lookahead
         self._promised = 0  # up to this instant [ns]
         self._heights: list[float] = []  # of the pulses of the block [N m]
+        self._rest: Iterator[Pulse] = iter(())  # planned and not requested yet
+        self._next_part_at = 0  # the promise that is not made before they are [ns]
         self._resting_until: int | None = None  # between two blocks [ns]
         self._closing_strike: int | None = None  # strike that closes the last stride [ns]
 
@@ -125,20 +135,20 @@ class Conductor:
 
     def part(self, known_until: int) -> Part:
         """Return the part of the protocol that is under way at an instant [ns]."""
-        block, train = self.block, self.block.train
+        block, first = self.block, self.block.first_onset
         if self._closing_strike is not None:
             return Part.FINISHED
         if self._resting_until is not None:
             return Part.REST
-        if train is None and not block.plan.pulses.count and self._started > block.baseline > 0:
+        if first is None and not block.plan.pulses.count and self._started > block.baseline > 0:
             return Part.WASHOUT
-        if train is None or known_until < train.onsets[0]:
+        if first is None or known_until < first:
             return Part.BASELINE
-        return Part.PULSES if known_until < train.end or block.pulses_left else Part.WASHOUT
+        return Part.PULSES if known_until < block.pulses_end or block.pulses_left else Part.WASHOUT
 
-    def add_event(self, event: GaitEvent) -> PulseTrain | None:
+    def add_event(self, event: GaitEvent) -> None:
         """
-        Take one gait event; return the pulses to request, if this event lets them be planned.
+        Take one gait event, and plan the pulses that it lets be planned.
 
         Raises ProtocolError if they would overlap at the resulting period, GaitError if the
         baseline is not one to measure a period by.
@@ -146,7 +156,7 @@ class Conductor:
         strike = self._tracker.latest_strike
         stride = self._tracker.add(event)
         if self._tracker.latest_strike == strike:
-            return None  # not a heel strike of the leg, or not believed
+            return  # not a heel strike of the leg, or not believed
         if stride is not None:
             self._recent.append(stride.period)
             if not self.block.baseline:
@@ -155,17 +165,35 @@ class Conductor:
                 self._lookahead = min(self._longest_lookahead, *self._periods)
                 self._longest_promise = max(self._longest_promise, self._lookahead)
         if self._closing_strike is not None or not self._in_block(event.stamp):
-            return None
+            return
         block = self.block
         if not block.baseline:
-            return self._plan(event.stamp) if self._baseline_is_over(event.stamp) else None
-        if block.plan.pulses.phase is not None and block.pulses_left:
-            return self._plan_by_phase(event.stamp)
-        return None
+            if self._baseline_is_over(event.stamp):
+                self._plan(event.stamp)
+        elif block.plan.pulses.phase is not None and block.pulses_left:
+            self._plan_by_phase(event.stamp)
+
+    def due(self, known_until: int) -> PulseTrain | None:
+        """
+        Return pulses to request before the horizon at ``known_until`` [ns], if there are any.
+
+        Of many, a part: the next one is due before a promise reaches the middle of this one.
+        """
+        if self._until(known_until) < self._next_part_at:
+            return None
+        part = tuple(islice(self._rest, PART_PULSES))
+        if not part:
+            return None
+        self._next_part_at = part[len(part) // 2].onset
+        requested, before = PulseTrain(self.protocol.side, part), self.block.train
+        self.block.train = before.followed_by(requested) if before else requested
+        return requested
 
     def horizon(self, known_until: int) -> Horizon:
         """
         Return how far to promise, all events up to ``known_until`` [ns] having been added.
+
+        Pulses that are due by then have been requested.
 
         The first onset lies (1 + P) measured periods after a strike that was not yet known when
         the promise before was made, and no lookahead is longer than the shortest stride that
@@ -179,14 +207,19 @@ class Conductor:
 
         Raises GaitError if pulses are planned and nobody walks any more.
         """
+        until, last = self._until(known_until), self._closing_strike is not None
+        if not last:
+            walking = self.block.first_onset is not None and self._resting_until is None
+            if walking and (stopped := self._tracker.watch.stopped(known_until)):
+                raise GaitError(stopped)
+            self._promised = max(self._promised, until)
+        return Horizon(until, last)
+
+    def _until(self, known_until: int) -> int:
+        """Return how far the promise at an instant goes, both [ns]."""
         if self._closing_strike is not None:
-            return Horizon(self._closing_strike + nanoseconds(self._longest_promise), last=True)
-        walking = self.block.train is not None and self._resting_until is None
-        if walking and (stopped := self._tracker.watch.stopped(known_until)):
-            raise GaitError(stopped)
-        lookahead = min(self._lookahead, self._lookahead_by_phase())
-        self._promised = max(self._promised, known_until + nanoseconds(lookahead))
-        return Horizon(known_until + nanoseconds(lookahead), last=False)
+            return self._closing_strike + nanoseconds(self._longest_promise)
+        return known_until + nanoseconds(min(self._lookahead, self._lookahead_by_phase()))
 
     # Blocks
 
@@ -247,11 +280,11 @@ class Conductor:
 
     def _is_over(self, strike: int) -> bool:
         """Whether the block has ended at a strike [ns]."""
-        block, plan, train = self.block, self.block.plan, self.block.train
+        block, plan = self.block, self.block.plan
         washout = self._started - block.baseline - plan.pulses.count
         if not block.baseline or washout <= plan.washout:
             return False
-        pulses_end = train.end if train else block.start or 0
+        pulses_end = block.pulses_end or block.start or 0
         # The last block ends with its strides, whatever the pulse period.
         if block.number < len(self.protocol.sequence) and strike < pulses_end:
             return False
@@ -287,18 +320,26 @@ class Conductor:
         # The strike that ends the baseline is not known: a whole stride lies before the pulse.
         return max(lookahead, (1 + phase) * min(periods) * (1 - change))
 
-    def _plan_by_phase(self, strike: int) -> PulseTrain:
+    def _plan_by_phase(self, strike: int) -> None:
         """Plan the pulse of the stride that starts with a strike [ns]."""
         block, plan = self.block, self.block.plan.pulses
         assert plan.phase is not None
         period = statistics.fmean(self._predicted() or [block.measured_period])
         onset = max(strike + nanoseconds(plan.phase * period), self._promised)
-        height = self._heights[-block.pulses_left]
-        planned = PulseTrain(self.protocol.side, (plan.pulse(onset, height),))
-        block.train = block.train.followed_by(planned) if block.train else planned
-        return planned
+        self._add_pulses([onset])
 
-    def _plan(self, strike: int) -> PulseTrain | None:
+    def _add_pulses(self, onsets: Sequence[int]) -> None:
+        """Add the next pulses of the block at their onsets [ns], to be requested when due."""
+        block, plan = self.block, self.block.plan.pulses
+        heights = self._heights[block.planned :]
+        self._rest = chain(self._rest, map(plan.pulse, onsets, heights))
+        self._next_part_at = 0
+        block.planned += len(onsets)
+        if block.first_onset is None:
+            block.first_onset = onsets[0]
+        block.pulses_end = onsets[-1] + nanoseconds(plan.width)
+
+    def _plan(self, strike: int) -> None:
         """Plan the pulses at the strike [ns] that starts the last baseline stride."""
         protocol, block, plan = self.protocol, self.block, self.block.plan.pulses
         lasted = self._started if block.plan.open_baseline else block.plan.baseline
@@ -309,7 +350,7 @@ class Conductor:
         elif plan.period is not None:  # the best guess if no complete stride was asked for
             stride = plan.period
         elif plan.count == 0:
-            return None
+            return
         else:
             raise ProtocolError(
                 "baseline: no complete stride was seen from which period_offset could be measured"
@@ -320,17 +361,15 @@ class Conductor:
         seed = protocol.seed, block.number
         self._heights = plan.heights(block.plan.torque(protocol.walker), seed)
         if plan.count == 0 or plan.phase is not None:
-            return None
+            return
         delay = nanoseconds((1 + plan.initial_phase) * stride)
         if self._periods:
             # The stamps of a constant gait are rounded, so its next stride can be a nanosecond
             # longer than the mean: a pulse at phase 0 is not to come before the strike.
             delay = math.floor((1 + plan.initial_phase) * stride * NANOSECONDS_PER_SECOND) + 1
         block.pulse_period = plan.period_for(stride)
-        onsets = plan.onsets(max(strike + delay, self._promised), block.pulse_period, seed)
-        pulses = (plan.pulse(*pulse) for pulse in zip(onsets, self._heights, strict=True))
-        block.train = PulseTrain(protocol.side, tuple(pulses))
-        return block.train
+        first = max(strike + delay, self._promised)
+        self._add_pulses(plan.onsets(first, block.pulse_period, seed))
 
     def _require_plausible_baseline(self) -> None:
         """Raise GaitError if the baseline's strides are not those of one gait."""

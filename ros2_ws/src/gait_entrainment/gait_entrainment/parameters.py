@@ -17,7 +17,7 @@ from functools import cached_property
 from typing import Any
 
 from gait_entrainment import geometry
-from gait_entrainment.settings import SettingError, check_settings, setting
+from gait_entrainment.settings import Checked, SettingError, check_settings, setting
 
 
 class ParameterError(SettingError):
@@ -297,7 +297,7 @@ class WalkerParameters:
 
 
 @dataclass(frozen=True)
-class Variation:
+class Variation(Checked):
     """
     How the stride period varies by itself, which that of the paper's walker does not.
 
@@ -308,7 +308,3 @@ class Variation:
     exponent: float = setting(
         0.75, "its long-range (Hurst) exponent; 0.5: white", "1", (0.5, 1.0), most_excluded=True
     )
-
-    def __post_init__(self) -> None:
-        """Check both fields."""
-        check_settings(self)

@@ -143,3 +143,11 @@ def check_settings(instance: Any) -> None:
     """Check every setting of a dataclass, as its ``__post_init__``; floats become floats."""
     for name, rule in settings_of(type(instance)).items():
         object.__setattr__(instance, name, rule.check(name, getattr(instance, name)))
+
+
+class Checked:
+    """A frozen dataclass of settings that is checked when it is made; raises SettingError."""
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        check_settings(self)

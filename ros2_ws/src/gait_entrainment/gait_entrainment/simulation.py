@@ -29,7 +29,7 @@ class Simulation(Run):
     """What came of a simulated experiment; stamps count from its start."""
 
     protocol: Protocol
-    train: PulseTrain | None  # as planned in the last block; None if nobody walked so far
+    train: PulseTrain | None  # as requested in the last block; None if nobody walked so far
     ending: Ending | None  # fall or fly-off; None if every stride was walked
 
 
@@ -70,9 +70,9 @@ def simulate(
         for transition in walker.advance(horizon.until):
             event = GaitEvent(transition.stamp, transition.kind, transition.side, transition.step)
             events.append(event)
-            train = conductor.add_event(event)
-            if train is not None:
-                robot.schedule(train)
+            conductor.add_event(event)
+        while train := conductor.due(walker.time_reached):
+            robot.schedule(train)
         ended = horizon.last or walker.ending is not None
     measured.finish()
     if measured_onsets:

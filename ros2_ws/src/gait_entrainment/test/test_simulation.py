@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gait_entrainment import experiment
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.gait import Verdict
 from gait_entrainment.parameters import WalkerParameters
@@ -64,9 +65,13 @@ def test_events_alternate_and_are_numbered(default):
 
 
 @settings(derandomize=True, deadline=None, max_examples=8)
-@given(phase=st.floats(0, 1, exclude_max=True), offset=st.floats(-0.07, -0.02))
-def test_the_same_as_one_walk_over_the_whole_torque(phase, offset):
-    """Cutting into grants changes nothing: one uncut walk gives the same stamps."""
+@given(
+    phase=st.floats(0, 1, exclude_max=True),
+    offset=st.floats(-0.07, -0.02),
+    part=st.integers(1, 10),
+)
+def test_the_same_as_one_walk_over_the_whole_torque(phase, offset, part):
+    """Cutting into grants and requests changes nothing: one uncut walk gives the same stamps."""
     import numpy as np
 
     protocol = Protocol(
@@ -74,7 +79,9 @@ def test_the_same_as_one_walk_over_the_whole_torque(phase, offset):
         washout=2,
         pulses=PulsePlan(count=10, period_offset=offset, initial_phase=phase),
     )
-    cut = simulate(protocol)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(experiment, "PART_PULSES", part)
+        cut = simulate(protocol)
     end = cut.events[-1].stamp
     train = cut.train
     times, torques = [0], [0.0]

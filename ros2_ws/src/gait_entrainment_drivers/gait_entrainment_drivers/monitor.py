@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 
 from gait_entrainment.robot.faults import Fault
-from gait_entrainment.settings import check_settings, setting
+from gait_entrainment.settings import Checked, setting
 from gait_entrainment_drivers.device import Reading
 
 # Measured torque below this share of the peak is what a sensor shows without any.
@@ -37,7 +37,7 @@ SECOND_MASTER = Fault(
 
 
 @dataclass(frozen=True)
-class MonitorSettings:
+class MonitorSettings(Checked):
     """
     What a reading may be, and how far measured torque may be from what was asked for.
 
@@ -58,10 +58,6 @@ class MonitorSettings:
     angle_most: float = setting(1.3, "largest joint angle", "rad", (-7.0, 7.0))
     velocity: float = setting(25.0, "largest joint velocity", "rad/s", (0.1, 200.0))
     temperature: float = setting(80.0, "highest temperature of the motor", "deg C", (20.0, 200.0))
-
-    def __post_init__(self) -> None:
-        """Check every field."""
-        check_settings(self)
 
 
 class Monitor:

@@ -34,7 +34,7 @@ from gait_entrainment_drivers.conformance.checks import COMMON
 from gait_entrainment_msgs.action import DeliverPulseTrain
 from gait_entrainment_msgs.msg import Horizon
 from gait_entrainment_nodes.messaging.client import Client
-from gait_entrainment_nodes.messaging.goals import goal_of
+from gait_entrainment_nodes.messaging.goals import goal_of, seal_of
 from gait_entrainment_nodes.messaging.stamps import header, to_time
 from gait_entrainment_nodes.messaging.topics import HORIZON, PULSES, ROBOT_STATE, TORQUE_PROFILE
 
@@ -43,6 +43,9 @@ PATIENCE = 5.0
 SILENCE = 0.3
 # How far horizons lead in real time [ns].
 LEAD = 200_000_000
+# What shows that the pulses of a run are asked for by who sends its horizons.
+KEY = "the kit's"
+SEAL = seal_of(KEY)
 
 
 class _NodeRobot:
@@ -54,6 +57,7 @@ class _NodeRobot:
         self.capabilities = SimpleNamespace(simulated=simulated, **unknown)
         self.faults: tuple[Fault, ...] = ()
         self.run = 0
+        self.key = KEY
         self.goal: Any = None  # the latest that was accepted, unless it was ended early
         self.announced: list[int] = []  # onsets [ns]
         self.client = Client("entrain_driver_check")
@@ -99,7 +103,7 @@ class _NodeRobot:
             account.clear()
 
     def schedule(self, train: PulseTrain) -> None:
-        goal = goal_of(self.run, train)
+        goal = goal_of(self.run, self.key, train)
         handle = self.client.send_goal(DeliverPulseTrain, self._train, goal, patience=PATIENCE)
         if not handle.accepted:
             unarmed = not (self.capabilities.simulated or self._arm)
@@ -115,7 +119,7 @@ class _NodeRobot:
         onsets: list[int] = []
         if self._promised_until < until:  # a horizon without length would end the run
             begin, end = header(self._promised_until), to_time(horizon)
-            self._horizons.publish(Horizon(header=begin, run=run, until=end))
+            self._horizons.publish(Horizon(header=begin, run=run, until=end, seal=SEAL))
         while self._promised_until < until:
             if not self.client.wait(lambda: self._profiles, patience):
                 raise DeviceError(f"A horizon was not answered within {patience:g} s.")
@@ -251,13 +255,16 @@ class NodeBench(Bench):
 
 
 def other_run(bench: NodeBench) -> None:
-    """A train for another run than the one under way is refused."""
+    """A train for another run than the one under way is refused, and a train of somebody else."""
     bench.start()
     bench.robot.run += 7
     bench.require_refused(bench.train(), "for another run")
     bench.robot.run -= 7
+    bench.robot.key = "of somebody else"
+    bench.require_refused(bench.train(), "of somebody else")
+    bench.robot.key = KEY
     bench.run(bench.lead + 0.2)
-    bench.require_no_torque("although the train was for another run")
+    bench.require_no_torque("although both trains were refused")
 
 
 def check_node(

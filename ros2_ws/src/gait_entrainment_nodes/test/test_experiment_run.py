@@ -10,6 +10,7 @@ from gait_entrainment.experiment import Conductor, Part
 from gait_entrainment.protocol import Protocol, PulsePlan
 from gait_entrainment_bags.messages import nanoseconds_of
 from gait_entrainment_msgs.msg import GaitEvent, Progress, TorqueProfile, Trouble
+from gait_entrainment_nodes.messaging.goals import seal_of
 from gait_entrainment_nodes.messaging.stamps import header, to_time
 from gait_entrainment_nodes.messaging.topics import EXPERIMENT_STATE, HORIZON
 from gait_entrainment_nodes.nodes.experiment_run import ExperimentError, Run
@@ -83,26 +84,6 @@ class Bench:
         return instant
 
 
-def test_many_pulses_are_requested_in_parts_the_next_before_the_promises_reach_it():
-    bench = Bench()
-    protocol = Protocol(baseline=2, pulses=PulsePlan(count=4500), washout=1)
-    bench.run.begin(Conductor(protocol, 0.5), 10 * SECOND)
-    instant = bench.walk_to_planning()
-    requested = []
-    while len(requested) < 3:
-        for train in bench.trains[len(requested) :]:
-            requested.append(len(train.pulses))
-            assert train.onsets[0] > bench.run.promised_until
-            bench.run.take_answer(True)
-        bench.promise()
-        bench.strike(instant)
-        bench.report(instant)
-        instant += SECOND
-    assert requested == [2000, 2000, 500]
-    onsets = [onset for train in bench.trains for onset in train.onsets]
-    assert onsets == list(bench.run.conductor.block.train.onsets)
-
-
 @pytest.fixture
 def bench():
     bench = Bench()
@@ -117,6 +98,7 @@ def blamed(failure):
 def test_each_progress_is_answered_once_all_that_it_covers_is_here(bench):
     (first,) = bench.horizons
     assert (first.run, first.last) == (7, False)
+    assert first.seal == seal_of(bench.run.key)
     assert nanoseconds_of(first.header.stamp) == 10 * SECOND
     assert nanoseconds_of(first.until) == 10 * SECOND + SECOND // 2
     bench.promise()

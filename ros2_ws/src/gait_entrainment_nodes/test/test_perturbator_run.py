@@ -4,6 +4,8 @@
 """One run of the ankle robot behind its guard: promises, and how trains end; without a node."""
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.robot import (
@@ -18,11 +20,12 @@ from gait_entrainment.robot import (
 from gait_entrainment.robot.faults import TORQUE_EXCEEDED
 from gait_entrainment_bags.messages import MessageError, nanoseconds_of, train_of
 from gait_entrainment_msgs.msg import AnkleRobotState
-from gait_entrainment_nodes.messaging.goals import goal_of
+from gait_entrainment_nodes.messaging.goals import goal_of, seal_of
 from gait_entrainment_nodes.messaging.topics import PULSES, TORQUE_PROFILE
 from gait_entrainment_nodes.nodes.perturbator_run import Result, Run
 
 SECOND = 10**9
+KEY = "of the experiment"
 TRAIN = PulseTrain.periodic(
     side=Side.RIGHT, first_onset=3 * SECOND, period=1.0, count=2, torque=5.0, duration=0.1
 )
@@ -36,7 +39,7 @@ class Bench:
         self.robot.configure()
         self.robot.activate()
         self.profiles, self.pulses, self.states, self.ended = [], [], [], []
-        self.run = Run(4, SECOND, self.robot, self.publish, self.ended.append)
+        self.run = Run(4, seal_of(KEY), SECOND, self.robot, self.publish, self.ended.append)
 
     def publish(self, topic, message):
         assert message.run == 4
@@ -56,7 +59,7 @@ def bench():
 
 def test_horizons_are_answered_with_adjoining_promises(bench):
     bench.run.take_horizon(SECOND, 2 * SECOND, last=False)
-    bench.run.schedule(TRAIN)
+    bench.run.schedule(TRAIN, KEY)
     bench.run.take_horizon(2 * SECOND, 4 * SECOND, last=True)
     idle, pulse = bench.profiles
     assert [profile.revision for profile in bench.profiles] == [0, 1]
@@ -72,7 +75,7 @@ def test_horizons_are_answered_with_adjoining_promises(bench):
 
 def test_train_is_delivered_once_its_last_pulse_is_promised(bench):
     bench.run.take_horizon(SECOND, 2 * SECOND, last=False)
-    bench.run.schedule(TRAIN)
+    bench.run.schedule(TRAIN, KEY)
     bench.run.take_horizon(2 * SECOND, 5 * SECOND, last=False)
     assert bench.outcomes() == [(Result.DELIVERED, 2, "every pulse was delivered")]
     assert [pulse.number for pulse in bench.pulses] == [1, 2]
@@ -84,7 +87,7 @@ def test_train_beyond_the_limits_is_refused_and_changes_nothing(bench):
         side=Side.RIGHT, first_onset=3 * SECOND, period=1.0, count=1, torque=1e3, duration=0.1
     )
     with pytest.raises(LimitError, match="torque"):
-        bench.run.schedule(too_much)
+        bench.run.schedule(too_much, KEY)
     bench.run.take_horizon(SECOND, 5 * SECOND, last=False)
     assert list(bench.profiles[0].torques) == [0.0]
     # No torque was due, so there is none to stop.
@@ -93,7 +96,7 @@ def test_train_beyond_the_limits_is_refused_and_changes_nothing(bench):
 
 
 def test_cancelling_stops_the_torque_at_the_latest_instant_known(bench):
-    bench.run.schedule(TRAIN)
+    bench.run.schedule(TRAIN, KEY)
     bench.run.take_horizon(2 * SECOND, 4 * SECOND, last=False)
     bench.run.end_torque(Result.CANCELLED, "cancelled by the client")
     assert bench.outcomes() == [(Result.CANCELLED, 1, "cancelled by the client")]
@@ -112,7 +115,7 @@ def test_cancelling_stops_the_torque_at_the_latest_instant_known(bench):
 
 
 def test_closing_horizon_is_answered_without_length_and_ends_the_train(bench):
-    bench.run.schedule(TRAIN)
+    bench.run.schedule(TRAIN, KEY)
     bench.run.take_horizon(SECOND, 4 * SECOND, last=False)
     bench.run.take_horizon(4 * SECOND, 4 * SECOND, last=True)
     assert bench.run.closed
@@ -136,11 +139,11 @@ def test_fault_is_told_the_walker_even_if_no_torque_was_due(bench):
     state = bench.states[-1]
     assert (state.status, list(state.faults)) == (AnkleRobotState.STOPPED, ["stopped"])
     with pytest.raises(DeviceError, match="latched"):
-        bench.run.schedule(TRAIN)
+        bench.run.schedule(TRAIN, KEY)
 
 
 def test_fault_found_in_what_was_delivered_is_no_delivered_train(bench, monkeypatch):
-    bench.run.schedule(TRAIN)
+    bench.run.schedule(TRAIN, KEY)
     promise = bench.robot.promise
 
     def exceed(until):
@@ -183,8 +186,8 @@ def test_real_robots_torque_is_promised_piece_by_piece(bench, monkeypatch):
 
 def test_trains_end_in_their_order_each_once_its_last_pulse_is_promised(bench):
     bench.run.take_horizon(SECOND, 2 * SECOND, last=False)
-    bench.run.schedule(TRAIN)
-    bench.run.schedule(TRAIN.shifted(5 * SECOND))
+    bench.run.schedule(TRAIN, KEY)
+    bench.run.schedule(TRAIN.shifted(5 * SECOND), KEY)
     assert bench.run.requested == 4
     bench.run.take_horizon(2 * SECOND, 7 * SECOND, last=False)
     assert bench.outcomes() == [(Result.DELIVERED, 2, "every pulse was delivered")]
@@ -195,6 +198,35 @@ def test_trains_end_in_their_order_each_once_its_last_pulse_is_promised(bench):
     assert bench.run.requested == 3
 
 
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(
+    key=st.text().filter(lambda key: key != KEY),
+    first=st.integers(0, 30 * 2),
+    count=st.integers(1, 5),
+    torque=st.sampled_from([5.0, -5.0, 0.1, 0.0]),
+    requested=st.integers(0, 2),
+    until=st.integers(2, 12),
+)
+def test_a_stranger_gets_no_pulse_before_between_or_after_those_of_the_run(
+    key, first, count, torque, requested, until
+):
+    bench = Bench()
+    for number in range(requested):
+        bench.run.schedule(TRAIN.shifted(4 * number * SECOND), KEY)
+    bench.run.take_horizon(SECOND, 2 * SECOND, last=False)
+    strange = PulseTrain.periodic(Side.RIGHT, first * SECOND // 2, 1.0, count, torque, 0.1)
+    before = bench.robot.train
+    for asked in (key, bench.run.seal):  # who listens knows the seal
+        with pytest.raises(LimitError, match="key: not that of the run"):
+            bench.run.schedule(strange, asked)
+    assert bench.robot.train is before
+    assert bench.run.requested == 2 * requested
+    bench.run.take_horizon(2 * SECOND, until * SECOND, last=False)
+    onsets = {nanoseconds_of(onset) for p in bench.profiles for onset in p.onsets}
+    assert onsets == set(before.onsets_within(0, until * SECOND) if before else ())
+    bench.robot.close()
+
+
 def test_pulses_of_every_shape_survive_the_goal():
     pulses = (
         Pulse(3 * SECOND, 5.0, 0.1),
@@ -203,8 +235,8 @@ def test_pulses_of_every_shape_survive_the_goal():
         Pulse(6 * SECOND, 2.0, 0.3, Shape.SAMPLES, samples=(0.0, 1.0, -0.5, 0.0)),
     )
     train = PulseTrain(Side.LEFT, pulses)
-    goal = goal_of(3, train)
-    assert goal.run == 3
+    goal = goal_of(3, KEY, train)
+    assert (goal.run, goal.key) == (3, KEY)
     assert train_of(goal) == train
     goal.pulses[2].shape = 9
     with pytest.raises(MessageError, match=r"shape: 9; allowed: 0 \(square\), 1"):

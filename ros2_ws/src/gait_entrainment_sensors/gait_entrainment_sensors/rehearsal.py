@@ -32,7 +32,7 @@ class Rehearsal:
     truth: tuple[GaitEvent, ...]  # the walker's exact events
     events: tuple[GaitEvent, ...]  # what was detected and numbered, in that order
     onsets: tuple[int, ...]  # of the pulses [ns]
-    train: PulseTrain | None  # as planned in the last block
+    train: PulseTrain | None  # as requested in the last block
     analysis: Analysis  # of the detected events
     true_analysis: Analysis  # of the exact events, with the same pulses
     ending: Ending | None  # fall or fly-off
@@ -102,9 +102,9 @@ def rehearse(protocol: Protocol, sensors: Sensors) -> Rehearsal:
         truth += events
         for event in sensors.see(walker, events):
             detected.append(event)
-            train = conductor.add_event(event)
-            if train is not None:
-                robot.schedule(train)
+            conductor.add_event(event)
+        while train := conductor.due(walker.time_reached - behind):
+            robot.schedule(train)
         ended = horizon.last or walker.ending is not None
     return Rehearsal(
         truth=tuple(truth),

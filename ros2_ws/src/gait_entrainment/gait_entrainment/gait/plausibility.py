@@ -14,7 +14,7 @@ from collections import deque
 from dataclasses import dataclass, replace
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
-from gait_entrainment.settings import check_settings, setting, settings_of
+from gait_entrainment.settings import Checked, setting, settings_of
 
 # Strides whose median is the person's own: enough that two wrong ones do not move it.
 _OWN_STRIDES = 7
@@ -23,7 +23,7 @@ _KNOWN_STRIDES = 3
 
 
 @dataclass(frozen=True)
-class GaitLimits:
+class GaitLimits(Checked):
     """
     What a stride can be.
 
@@ -37,10 +37,6 @@ class GaitLimits:
     stride_change: float = setting(0.4, "change from the own median", "1", (0.01, 1.0))
     silence: float = setting(1.5, "strides without a strike that end a gait", "1", (1.05, 10.0))
     baseline_spread: float = setting(0.15, "deviation of baseline strides", "1", (0.001, 1.0))
-
-    def __post_init__(self) -> None:
-        """Check every field."""
-        check_settings(self)
 
     def scaled(self, factor: float) -> "GaitLimits":
         """Return the limits with their times multiplied, as far as a setting allows."""

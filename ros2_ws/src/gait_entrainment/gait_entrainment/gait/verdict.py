@@ -24,7 +24,7 @@ from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment.gait.drift import Drift, drift_of
 from gait_entrainment.gait.pulse_phase import PulsePhase
 from gait_entrainment.gait.strides import Stride, UnperturbedPeriod
-from gait_entrainment.settings import check_settings, setting
+from gait_entrainment.settings import Checked, setting
 
 
 class Verdict(enum.IntEnum):
@@ -51,7 +51,7 @@ class Reason(enum.IntEnum):
 
 
 @dataclass(frozen=True)
-class VerdictSettings:
+class VerdictSettings(Checked):
     """
     Every number in the verdict; raises SettingError for one that is out of range.
 
@@ -86,10 +86,6 @@ class VerdictSettings:
     stretch_tolerance_deviations: float = setting(
         2.0, "the same in standard deviations of the lag, if that is more", "1", (0.0, 10.0)
     )
-
-    def __post_init__(self) -> None:
-        """Check every field."""
-        check_settings(self)
 
 
 @dataclass(frozen=True, slots=True)

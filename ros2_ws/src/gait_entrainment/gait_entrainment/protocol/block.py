@@ -17,7 +17,7 @@ from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, nanoseconds
 from gait_entrainment.errors import UsageError
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.robot import LimitError, Pulse, Shape
-from gait_entrainment.settings import check_settings, setting
+from gait_entrainment.settings import Checked, check_settings, setting
 
 # A million strides are three weeks of walking: no run is longer.
 _MOST = 1_000_000
@@ -37,7 +37,7 @@ def _either(unit: str, meaning: str, within: tuple[float, float], default: Any =
 
 
 @dataclass(frozen=True)
-class PulsePlan:
+class PulsePlan(Checked):
     """
     The pulses of a block.
 
@@ -90,10 +90,6 @@ class PulsePlan:
     catch_share: float = setting(0.0, "share of the pulses that are left out", "1", (0.0, 1.0))
     catch_pulses: str = setting("", "numbers of the pulses that are left out, such as [5, 12]")
 
-    def __post_init__(self) -> None:
-        """Check every field by itself; Block checks what concerns several."""
-        check_settings(self)
-
     def period_for(self, measured_period: float) -> float:
         """
         Return the first period of the pulses [s] for a measured stride period [s].
@@ -127,13 +123,13 @@ class PulsePlan:
         The period changes by the same amount from pulse to pulse, by ``sweep`` from the first to
         the last. Jitter is uniform and does not add up.
         """
-        change = self.sweep / max(self.count - 2, 1) / 2
+        n, change = np.arange(self.count), self.sweep / max(self.count - 2, 1) / 2
         late = np.zeros(self.count)
         if self.jitter:
             late = np.random.default_rng((*seed, 0)).uniform(-self.jitter, self.jitter, self.count)
             late -= late[0]
-        places = (n * period + n * (n - 1) * change + by for n, by in enumerate(late.tolist()))
-        return [first + nanoseconds(place) for place in places]
+        places = np.rint((n * period + n * (n - 1) * change + late) * NANOSECONDS_PER_SECOND)
+        return [first + place for place in places.astype(np.int64).tolist()]
 
     def pulse(self, onset: int, torque: float) -> Pulse:
         """Return a pulse of this shape at an onset [ns]; its torque [N m] is given."""
@@ -146,11 +142,9 @@ class PulsePlan:
         if self.catch_share:
             random, chosen = np.random.default_rng((*seed, 1)), self.catch_share * self.count
             left_out |= set(random.choice(self.count, round(chosen), replace=False) + 1)
-        steps = (
-            0.0 if number in left_out else min(number / (self.rising + 1), 1.0)
-            for number in range(1, self.count + 1)
-        )
-        return [torque * step for step in steps]
+        steps = np.minimum(np.arange(1, self.count + 1) / (self.rising + 1), 1.0)
+        steps[[number - 1 for number in left_out]] = 0.0
+        return list((torque * steps).tolist())
 
     def check(self) -> None:
         """Raise ProtocolError for what does not go together."""

@@ -197,8 +197,10 @@ class GuardedRobot:
             why = f"was armed more than {self.limits.arming:g} s ago" if lapsed else "is not armed"
             raise DeviceError(f"the device {why}; see that all is well, then arm it")
         before = self.train
-        self.limits.check(train, before.pulses if before else ())
-        self.limits.check_dose(self.dose, train)
+        earlier = before.pulses if before else ()
+        self.limits.check(train, earlier)
+        coming = [pulse for pulse in earlier if pulse.onset >= self.promised_until]
+        self.limits.check_dose(self.dose, [*coming, *train.pulses])
         peak = self.capabilities.peak_torque
         largest = max((pulse.torque for pulse in train.pulses), key=abs)
         if abs(largest) > peak:

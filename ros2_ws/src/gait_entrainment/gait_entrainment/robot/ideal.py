@@ -21,20 +21,16 @@ from gait_entrainment.robot.contract import Capabilities, RobotState
 from gait_entrainment.robot.profile import TorqueProfile
 from gait_entrainment.robot.pulse_train import Pulse, Shape
 from gait_entrainment.robot.simulated import SimulatedRobot
-from gait_entrainment.settings import check_settings, setting
+from gait_entrainment.settings import Checked, setting
 
 
 @dataclass(frozen=True)
-class IdealOptions:
+class IdealOptions(Checked):
     """The one thing to choose; it matters for pulses that are not square."""
 
     rate: float = setting(
         1000.0, "steps of torque per second along a flank or a curve", "Hz", (10.0, 100_000.0)
     )
-
-    def __post_init__(self) -> None:
-        """Check every field."""
-        check_settings(self)
 
 
 class IdealAnkleRobot(SimulatedRobot):

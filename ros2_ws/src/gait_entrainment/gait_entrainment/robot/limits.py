@@ -12,7 +12,7 @@ from typing import Any
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, nanoseconds
 from gait_entrainment.robot.faults import LimitError
 from gait_entrainment.robot.pulse_train import Pulse, PulseTrain, Shape
-from gait_entrainment.settings import check_settings, setting
+from gait_entrainment.settings import Checked, setting
 
 _NO_LIMIT = 1_000_000
 
@@ -26,16 +26,12 @@ class Dose:
 
 
 @dataclass(frozen=True)
-class PlannedPulses:
+class PlannedPulses(Checked):
     """The pulses that the protocol under way may ask for; nobody else asks for more."""
 
     torque: float = setting(200.0, "magnitude of the protocol's pulses", "N m", (0.0, 200.0))
     duration: float = setting(10.0, "their duration", "s", (0.0, 10.0))
     count: int = setting(_NO_LIMIT, "their number", "1", (0, _NO_LIMIT))
-
-    def __post_init__(self) -> None:
-        """Check every field."""
-        check_settings(self)
 
     def check(self, train: PulseTrain, before: int) -> None:
         """Raise LimitError if a train, after so many pulses, goes beyond the protocol."""
@@ -53,7 +49,7 @@ class PlannedPulses:
 
 
 @dataclass(frozen=True)
-class DeviceLimits:
+class DeviceLimits(Checked):
     """
     What may be asked of an ankle robot, and when its silence counts as a fault.
 
@@ -99,10 +95,6 @@ class DeviceLimits:
         "s",
         (0.05, 60.0),
     )
-
-    def __post_init__(self) -> None:
-        """Check every field."""
-        check_settings(self)
 
     def check_pulse(self, pulse: Pulse) -> None:
         """
@@ -174,14 +166,14 @@ class DeviceLimits:
                 f"{60 / self.pulses_per_minute:g} s ({self.pulses_per_minute:g} pulses a minute)"
             )
 
-    def check_dose(self, dose: Dose, train: PulseTrain) -> None:
-        """Raise LimitError if a train is too much after what was received already."""
-        pulses = dose.pulses + len(train.pulses)
+    def check_dose(self, dose: Dose, coming: Sequence[Pulse]) -> None:
+        """Raise LimitError if pulses to come are too much after what was received already."""
+        pulses = dose.pulses + len(coming)
         if pulses > self.session_pulses:
             raise LimitError(
                 f"session_pulses: {pulses} with this train; allowed: at most {self.session_pulses}"
             )
-        impulse = dose.impulse + sum(pulse.impulse for pulse in train.pulses)
+        impulse = dose.impulse + sum(pulse.impulse for pulse in coming)
         if impulse > self.session_impulse:
             raise LimitError(
                 f"session_impulse: {impulse:.4g} N m s with this train; allowed: at most "

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gait_entrainment import experiment
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.experiment import Conductor, GaitError, Part
 from gait_entrainment.gait import GaitEvent, GaitLimits
@@ -52,10 +53,10 @@ def conduct(conductor, events):
             return horizons, trains
         reached = horizon.until
         while rest and rest[0].stamp <= reached:
-            train = conductor.add_event(rest.pop(0))
-            if train is not None:
-                trains.append(train)
-                assert train.onsets[0] >= reached, "an onset inside what was promised"
+            conductor.add_event(rest.pop(0))
+        while train := conductor.due(reached):
+            trains.append(train)
+            assert train.onsets[0] >= reached, "an onset inside what was promised"
 
 
 @settings(derandomize=True, deadline=None, max_examples=150)
@@ -110,7 +111,7 @@ def test_first_pulse_of_a_constant_gait_is_never_before_the_stride_after_the_bas
     strikes = [round((start + k * period) * 1e9) for k in range(baseline + 1)]
     for k, stamp in enumerate(strikes):
         conductor.add_event(GaitEvent(stamp, EventKind.HEEL_STRIKE, Side.RIGHT, 2 * k))
-    assert 0 <= conductor.block.train.onsets[0] - strikes[baseline] <= 2
+    assert 0 <= conductor.block.first_onset - strikes[baseline] <= 2
 
 
 def test_an_absolute_period_needs_no_measurement():
@@ -132,7 +133,9 @@ def test_phases_follow_the_plan():
     assert conductor.part(0) is Part.BASELINE
     for event in events[:9]:
         conductor.add_event(event)
-    train = conductor.block.train
+    train = conductor.due(events[8].stamp)
+    assert train is conductor.block.train
+    assert conductor.due(events[8].stamp) is None
     assert conductor.part(train.onsets[0] - 1) is Part.BASELINE
     assert conductor.part(train.onsets[0]) is Part.PULSES
     assert conductor.part(train.end) is Part.WASHOUT
@@ -145,7 +148,7 @@ def test_a_baseline_without_a_complete_stride_says_so():
     conductor = Conductor(Protocol(baseline=2, pulses=PulsePlan(count=2)))
     events = walk([1.2] * 4)
     # The strikes of stride 2 and 3 are missing: the baseline is over before a stride was closed.
-    assert conductor.add_event(events[0]) is None
+    conductor.add_event(events[0])
     third = [e for e in events if e.kind is EventKind.HEEL_STRIKE and e.step == 6]
     with pytest.raises(ProtocolError, match="no complete stride"):
         conductor.add_event(*third)
@@ -244,6 +247,33 @@ def test_a_baseline_goes_on_until_its_time_and_until_the_gait_is_steady():
     conductor = Conductor(Protocol(baseline_steady=0.01))
     with pytest.raises(GaitError, match="not steady after 201 strides; allowed: a higher"):
         conduct(conductor, walk([1.2, 1.3] * 110))
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(
+    periods=st.lists(st.floats(0.95, 1.45), min_size=14, max_size=14),
+    pulse_period=st.floats(0.11, 1.5),
+    part=st.integers(1, 30),
+    longest=st.sampled_from([0.1, math.inf]),
+)
+def test_many_pulses_are_requested_in_parts_each_before_a_promise_reaches_it(
+    periods, pulse_period, part, longest
+):
+    plan = PulsePlan(count=40, period=pulse_period, period_offset=None, jitter=0.004)
+    protocol = Protocol(baseline=3, washout=30, pulses=plan)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(experiment, "PART_PULSES", part)
+        conductor = Conductor(protocol, longest, ANY_GAIT)
+        horizons, trains = conduct(conductor, walk(periods))
+    block = conductor.block
+    onsets = plan.onsets(block.first_onset, pulse_period, (0, 1))
+    requested = [onset for train in trains for onset in train.onsets]
+    assert list(block.train.onsets) == requested == onsets[: len(requested)]
+    assert {len(train.pulses) for train in trains} <= {part, 40 % part or part}
+    # All that is promised is requested, and what is far off is not yet.
+    promised = sum(onset < horizons[-1].until for onset in onsets)
+    assert promised <= len(requested) <= promised + 2 * part
+    assert block.pulses_end == onsets[-1] + 10**8
 
 
 def test_sweep_jitter_ramp_and_catch_pulses():

@@ -238,7 +238,10 @@ def test_the_dose_goes_on_from_run_to_run_and_from_robot_to_robot():
     assert dose.impulse == pytest.approx(8 * 1.3)
     with pytest.raises(LimitError, match="session_pulses: 12"):
         next_robot().schedule(train())
-    next_robot().schedule(train(count=2))
+    robot = next_robot()
+    robot.schedule(train(count=2))
+    with pytest.raises(LimitError, match="session_pulses: 11"):  # those to come count as well
+        robot.schedule(train(first_onset=20 * SECOND, count=1))
 
 
 def test_only_the_pulses_of_the_protocol_are_asked_for():

@@ -3,14 +3,21 @@
 
 """Pulses as the goal of an action; gait_entrainment_bags.messages goes the other way."""
 
+from hashlib import sha256
+
 from gait_entrainment.robot import PulseTrain
 from gait_entrainment_msgs.action import DeliverPulseTrain
 from gait_entrainment_msgs.msg import Pulse
 from gait_entrainment_nodes.messaging.stamps import to_time
 
 
-def goal_of(run: int, train: PulseTrain) -> DeliverPulseTrain.Goal:
-    """Return the goal that asks for the pulses of a train in a run."""
+def seal_of(key: str) -> str:
+    """Return what everybody may know of the key by which a run's pulses are asked for."""
+    return sha256(key.encode()).hexdigest()
+
+
+def goal_of(run: int, key: str, train: PulseTrain) -> DeliverPulseTrain.Goal:
+    """Return the goal that asks for the pulses of a train in a run, of which one has the key."""
     pulses = [
         Pulse(
             onset=to_time(pulse.onset),
@@ -23,4 +30,4 @@ def goal_of(run: int, train: PulseTrain) -> DeliverPulseTrain.Goal:
         )
         for pulse in train.pulses
     ]
-    return DeliverPulseTrain.Goal(run=run, side=train.side, pulses=pulses)
+    return DeliverPulseTrain.Goal(run=run, key=key, side=train.side, pulses=pulses)

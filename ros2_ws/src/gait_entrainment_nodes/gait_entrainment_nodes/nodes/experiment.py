@@ -316,7 +316,7 @@ class Experiment(Participant):
             if result.outcome in (result.STOPPED, result.CANCELLED):
                 run.fail(ExperimentError(f"the pulses were ended: {result.message}"))
 
-        goal = goal_of(run.number, train)
+        goal = goal_of(run.number, run.key, train)
         self._deliver.send_goal_async(goal).add_done_callback(self.guarded(on_answered))
 
     # Waiting, on steady time

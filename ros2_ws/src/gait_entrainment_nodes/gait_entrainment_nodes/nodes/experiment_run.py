@@ -10,6 +10,7 @@ requested it promises nothing.
 """
 
 import math
+import secrets
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -21,12 +22,11 @@ from gait_entrainment.robot import PulseTrain
 from gait_entrainment_bags.messages import MessageError, event_of, nanoseconds_of
 from gait_entrainment_msgs import msg
 from gait_entrainment_nodes.messaging import topics
+from gait_entrainment_nodes.messaging.goals import seal_of
 from gait_entrainment_nodes.messaging.stamps import header, to_time
 
 # How long the reason of the perturbator may come after its effect [s]: they are on two topics.
 REASON_TIMEOUT = 0.5
-# Pulses in one goal, an hour's: a message of more would hold up who sends it, and who takes it.
-_GOAL_PULSES = 2000
 PERTURBATOR, WALKER, RECORDER = "perturbator", "walker_sim", "bag_recorder"
 
 
@@ -61,6 +61,8 @@ class Run:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.number, self.walker = number, walker
+        self.key = secrets.token_hex()  # whoever lacks it gets no pulses in this run
+        self._seal = seal_of(self.key)
         self.conductor: Conductor | None = None  # once the walker has started
         self.known_until = 0  # all events up to this instant have been seen [ns since 1970]
         self.promised_until = 0  # by the latest horizon [ns since 1970]; 0 before the first
@@ -77,9 +79,7 @@ class Run:
         self._progress: msg.Progress | None = None  # received, not answered yet
         self._grant = self._recorded_grant = -1
         self._covered_until = 0  # by profiles [ns since 1970]
-        self._planning = 0  # requests of pulses that were not answered yet
-        self._rest: PulseTrain | None = None  # pulses that are still to be requested
-        self._next_part_at = 0  # when they are [ns since 1970]
+        self._planning = False  # pulses were requested, and there is no answer yet
         self._shown: tuple[Part, int] | None = None
         self.forgive()
 
@@ -135,27 +135,24 @@ class Run:
             state.measured_period = block.measured_period
             state.measured_period_error = block.measured_period_error
             state.pulse_period = block.pulse_period
-            if block.train is not None:
-                state.first_onset = to_time(block.train.onsets[0])
+            if block.first_onset is not None:
+                state.first_onset = to_time(block.first_onset)
         return state
 
     # What comes in
 
     def take_event(self, event: msg.GaitEvent) -> None:
-        """Take one gait event; request the pulses when it is time."""
+        """Take one gait event, and what follows from it."""
         if self.conductor is None:
             return
         try:
-            train = self.conductor.add_event(event_of(event))
+            self.conductor.add_event(event_of(event))
         except MessageError:
             return  # no event: the analyzer tells
         except EntrainmentError as error:
             self.fail(ExperimentError(str(error)))
             return
         self._events += 1
-        if train is not None:
-            self._rest = self._rest.followed_by(train) if self._rest else train
-            self._request_part()
         self._answer()
 
     def take_progress(self, progress: msg.Progress) -> None:
@@ -198,7 +195,7 @@ class Run:
             self._note_stop()
             return
         self.trouble = ""  # about somebody else's pulses
-        self._planning -= 1
+        self._planning = False
         self._answer()
 
     def _note_stop(self) -> None:
@@ -207,29 +204,26 @@ class Run:
 
     # What goes out
 
-    def _request_part(self) -> None:
-        """Request as many pulses as one goal holds, the next ones once half of these are over."""
-        assert self._rest is not None
-        side, pulses = self._rest.side, self._rest.pulses
-        part, rest = pulses[:_GOAL_PULSES], pulses[_GOAL_PULSES:]
-        self._rest = PulseTrain(side, rest) if rest else None
-        self._next_part_at = part[len(part) // 2].onset
-        self._planning, self._planning_at = self._planning + 1, self._clock()
-        self._request(PulseTrain(side, part))
-
     def _answer(self) -> None:
-        """Answer the latest progress with a horizon, unless something is still to come."""
+        """
+        Request the pulses that are due, else answer the latest progress with a horizon.
+
+        Not while an answer of the perturbator, or an event, is still to come.
+        """
         progress, conductor = self._progress, self.conductor
-        if progress is None or conductor is None or self._planning or self.over:
+        if conductor is None or self._planning or self.over:
             return
-        if self._events < progress.events:
+        if progress is not None and self._events < progress.events:
+            progress = None
+        if progress is not None:
+            self.known_until = nanoseconds_of(progress.header.stamp)
+        if train := conductor.due(self.known_until):
+            self._planning, self._planning_at = True, self._clock()
+            self._request(train)
             return
-        known_until = nanoseconds_of(progress.header.stamp)
-        if self._rest and known_until >= self._next_part_at:
-            self._request_part()
+        if progress is None:
             return
         self._progress = None
-        self.known_until = known_until
         if progress.state != msg.Progress.WALKING:
             self.final = progress
             return
@@ -256,8 +250,8 @@ class Run:
         if self._covered_until >= self.promised_until:  # nothing was owed until now
             self._profile_at = self._clock()
         self.promised_until = until
-        known, until_time = header(self.known_until), to_time(until)
-        horizon = msg.Horizon(header=known, run=self.number, until=until_time, last=last)
+        horizon = msg.Horizon(header=header(self.known_until), run=self.number, last=last)
+        horizon.until, horizon.seal = to_time(until), self._seal
         self._publish(topics.HORIZON, horizon)
 
     # Who is silent

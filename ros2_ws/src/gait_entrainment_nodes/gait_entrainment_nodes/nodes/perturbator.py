@@ -114,6 +114,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
             self.offer(topic)
         self._now = 0  # latest instant that is known to be over [ns since 1970]
         self._latest_run = 0  # number of the latest run
+        self._foreign_seal = ""  # of the latest horizon that was not of who conducts the run
         self._look_at: float | None = None  # when to look after a real robot, steady time [s]
         # When the operator and the emergency stop were heard last, steady time [s].
         self._operator_at = self._deadman_at = -math.inf
@@ -358,7 +359,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
             raise LimitError(f"run: {goal.run} is not under way")
         train = train_of(goal)
         self.planned.check(train, self.run.requested)
-        self.run.schedule(train)
+        self.run.schedule(train, goal.key)
 
     def on_cancel(self) -> None:
         """Bring the torque to zero now: the next horizon may be long in coming."""
@@ -381,9 +382,15 @@ class Perturbator(Participant, TolerantLifecycleNode):
             return
         if new:
             self._end_torque("another run began")
+        elif self.run is not None and message.seal != self.run.seal:
+            if message.seal != self._foreign_seal:  # told once
+                self._foreign_seal = message.seal
+                self._report(DiagnosticStatus.WARN, "horizon ignored: not of who conducts the run")
+            return
         self._now = nanoseconds_of(message.header.stamp)
         if new:
-            self.run = Run(message.run, self._now, robot, self.publish, self._server.end)
+            start, publish, end = self._now, self.publish, self._server.end
+            self.run = Run(message.run, message.seal, start, robot, publish, end)
             self._latest_run = message.run
             self._publish_setup()
         assert self.run is not None

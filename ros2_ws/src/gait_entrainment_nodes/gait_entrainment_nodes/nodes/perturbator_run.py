@@ -13,11 +13,19 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from gait_entrainment.robot import GuardedRobot, Pulse, PulseTrain, RobotState, TorqueProfile
+from gait_entrainment.robot import (
+    GuardedRobot,
+    LimitError,
+    Pulse,
+    PulseTrain,
+    RobotState,
+    TorqueProfile,
+)
 from gait_entrainment.robot.faults import STOPPED
 from gait_entrainment_msgs import msg
 from gait_entrainment_msgs.action import DeliverPulseTrain
 from gait_entrainment_nodes.messaging import topics
+from gait_entrainment_nodes.messaging.goals import seal_of
 from gait_entrainment_nodes.messaging.stamps import header, to_time
 
 Result = DeliverPulseTrain.Result
@@ -27,20 +35,22 @@ class Run:
     """
     One run, from its first horizon to its closing one; all instants are [ns since 1970].
 
-    Torque is promised from ``start`` on. ``end_train`` takes the result of each train that was
+    Torque is promised from ``start`` on, and only who has the key of the ``seal`` gets pulses.
+    ``end_train`` takes the result of each train that was
     scheduled. Raises DeviceError, as most methods do, if the driver fails.
     """
 
     def __init__(
         self,
         number: int,
+        seal: str,
         start: int,
         robot: GuardedRobot,
         publish: Callable[[topics.Topic, Any], None],
         end_train: Callable[[Result], None],
     ) -> None:
         robot.begin(start)
-        self.number, self._robot = number, robot
+        self.number, self.seal, self._robot = number, seal, robot
         self._publish, self._train_ended = publish, end_train
         self.closed = False
         self._now = self._horizon = start
@@ -56,8 +66,14 @@ class Run:
         """Pulses of the run that were delivered or are still to come."""
         return self._told + sum(count for count, _ in self._under_way)
 
-    def schedule(self, train: PulseTrain) -> None:
-        """Schedule pulses; raises LimitError or DeviceError if the robot refuses them."""
+    def schedule(self, train: PulseTrain, key: str) -> None:
+        """
+        Schedule pulses that somebody with a key asks for.
+
+        Raises LimitError if it is not the key of the run, or as the robot does.
+        """
+        if seal_of(key) != self.seal:
+            raise LimitError("key: not that of the run; only who conducts it gets pulses")
         self._robot.schedule(train)
         self._committed = True
         self._under_way.append((len(train.pulses), train.end))
