@@ -34,7 +34,13 @@ from gait_entrainment_bags.recorded_run import read_run
 from gait_entrainment_bringup.node_list import STOP_ORDER
 from gait_entrainment_msgs.msg import AnkleRobotState
 from gait_entrainment_nodes.messaging.domain import claimed_domain
-from gait_entrainment_nodes.messaging.topics import DIAGNOSTICS, EXPERIMENT_STATE, ROBOT_STATE
+from gait_entrainment_nodes.messaging.topics import (
+    DIAGNOSTICS,
+    EXPERIMENT_STATE,
+    OPERATOR_HEARTBEAT,
+    ROBOT_STATE,
+    TROUBLE,
+)
 
 SHORT = ("--baseline=2", "--pulses=3", "--washout=1")
 WASHED_OUT = (*QUICK, "--baseline=2", "--pulses=2", "--washout=100000")
@@ -176,6 +182,31 @@ def test_killed_perturbator_leaves_zero_torque_by_the_motors_own_watchdog(tmp_pa
     while abs(torques_of(trace)[-1]) > 0.1:
         assert time.monotonic() < deadline
         time.sleep(0.05)
+
+
+def test_beside_a_page_that_is_a_heartbeat_a_frozen_command_ends_the_torque(tmp_path, motor):
+    driver, trace = motor
+    options = (f"--driver={driver}", *ARMED, *QUICK, "--heartbeat", "--limit-rising=1")
+    beats = OPERATOR_HEARTBEAT
+    with entrain_run(tmp_path / "bag", *options) as run, probe(run.domain()) as page:
+        states, troubles = page.listen(ROBOT_STATE), page.listen(TROUBLE)
+        heart = page.node.create_publisher(beats.type, beats.name, beats.qos)
+
+        def watched_until(condition):
+            def beat():
+                heart.publish(beats.type(data="operator_page"))
+                return condition()
+
+            page.until(beat, "what is watched", 120)
+
+        watched_until(lambda: states and states[-1].measured_torque > 2)
+        run.process.send_signal(signal.SIGSTOP)
+        watched_until(lambda: troubles)
+        assert "operator_silent: entrain_run silent for 0.3 s" in troubles[0].message
+        watched_until(lambda: abs(torques_of(trace)[-1]) < 0.1)
+        run.process.send_signal(signal.SIGCONT)
+        assert run.wait() == 1
+        assert "operator_silent: entrain_run silent" in run.text
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import pytest
 from harness import Session, claimed_domain, session, stamp_of
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 from test_drivers import emulated_motor
 
@@ -25,6 +25,7 @@ from gait_entrainment_nodes.messaging.stamps import to_time
 from gait_entrainment_nodes.messaging.topics import (
     EMERGENCY_STOP,
     HORIZON,
+    OPERATOR_HEARTBEAT,
     ROBOT_STATE,
     TORQUE_PROFILE,
     TROUBLE,
@@ -154,40 +155,58 @@ def test_deactivating_and_activating_in_a_run_breaks_no_promise(tmp_path, driver
         assert not any(torque for profile in off for torque in profile.torques)
 
 
-def test_torque_ends_if_whoever_holds_the_emergency_stop_lets_go(tmp_path):
+@pytest.mark.parametrize("silent", ["the emergency stop", "entrain_run", "operator_page"])
+def test_torque_ends_if_one_who_must_be_heard_falls_silent(tmp_path, silent):
     with emulated_motor(tmp_path) as (driver, _), claimed_domain() as domain:
         nodes = Session(tmp_path, domain, [f"--driver={driver}"], real_time=True, strangers=True)
-        nodes.arguments += ["-p", "deadman_timeout:=0.5", "-p", "operator_timeout:=0.0"]
+        nodes.arguments += ["-p", "deadman_timeout:=0.5", "-p", "operator_timeout:=0.5"]
+        nodes.arguments += ["-p", "operators:=[entrain_run, operator_page]"]
         nodes.arguments += ["-p", "unproved:=true"]
         try:
             nodes.start("perturbator")
             stop = EMERGENCY_STOP
-            button = nodes.probe.node.create_publisher(stop.type, stop.name, stop.qos)
+            beat = OPERATOR_HEARTBEAT
+            button, heart = (
+                nodes.probe.node.create_publisher(topic.type, topic.name, topic.qos)
+                for topic in (stop, beat)
+            )
+            alive = ["the emergency stop", "entrain_run", "operator_page"]
+
+            def live():
+                """Send horizons, hold the button and beat: those who are not silent."""
+                conductor.horizons.publish(horizon_from(time.time()))
+                for name in alive:
+                    if name == "the emergency stop":
+                        button.publish(Bool(data=False))
+                    else:
+                        heart.publish(String(data=name))
+                time.sleep(0.01)
+
             conductor = Conductor(nodes)
             states = nodes.probe.listen(ROBOT_STATE)
             assert nodes.probe.call(Trigger, "perturbator/arm").success
-            nodes.probe.until(lambda: button.get_subscription_count(), "the button's reader")
+            for publisher in (button, heart):
+                nodes.probe.until(publisher.get_subscription_count, "a reader")
             now = time.time()
             conductor.promise(now, now + 0.2)
-            button.publish(Bool(data=False))  # held before there is a train
+            live()  # before there is a train
             assert conductor.request(
                 time.time() + 1.0, period=10.0, count=3, duration=0.5
             ).accepted
 
-            def held():
-                """Hold the button, and send horizons, as often as this is asked."""
-                button.publish(Bool(data=False))
-                conductor.horizons.publish(horizon_from(time.time()))
-                time.sleep(0.01)
+            def pushed():
+                live()
                 return states and states[-1].measured_torque > 0.5
 
-            nodes.probe.until(held, "torque")
+            nodes.probe.until(pushed, "torque")
+            alive.remove(silent)
 
-            def let_go():
-                conductor.horizons.publish(horizon_from(time.time()))
-                return any(trouble.fault == "deadman_silent" for trouble in conductor.troubles)
+            def told():
+                live()
+                return [trouble for trouble in conductor.troubles if trouble.fault]
 
-            nodes.probe.until(let_go, "the fault")
+            (trouble,) = nodes.probe.until(told, "the fault")
+            assert f": {silent} silent for 0.5 s" in trouble.message
             nodes.probe.until(lambda: abs(states[-1].measured_torque) < 0.5, "no torque")
         finally:
             nodes.probe.client.close()

@@ -47,6 +47,8 @@ NODES = nodes_for("simulated")
 DISPLAY = "walker_display"
 # The operator's page: looks on as well, and is what one looks at, so it outlives the torque.
 PAGE = "operator_page"
+# The client that conducts a run, and by that name the operator who started it.
+RUN_CLIENT = "entrain_run"
 # In the order in which they are stopped: torque first, the record last.
 STOP_ORDER = (
     *("perturbator", "experiment", "walker_sim", "gait_detector", "sensor_sim"),

@@ -11,6 +11,7 @@ import tty
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from gait_entrainment_bringup.node_list import RUN_CLIENT
 from gait_entrainment_drivers.stop_channel import stop_all
 from gait_entrainment_nodes.messaging.client import Client
 from gait_entrainment_nodes.messaging.errors import NodeError
@@ -20,22 +21,16 @@ STOP_KEY = " "
 
 
 class Operator:
-    """
-    Called in each round of a client: says that somebody watches, and looks at the keyboard.
+    """Called in each round of a client: says that somebody watches, and looks at the keyboard."""
 
-    It says nothing if the operator's page is the ``heartbeat`` instead.
-    """
-
-    def __init__(self, client: Client, *, heartbeat: bool = True) -> None:
-        self._says_so = heartbeat
+    def __init__(self, client: Client) -> None:
         self._heartbeat = client.node.create_publisher(
             OPERATOR_HEARTBEAT.type, OPERATOR_HEARTBEAT.name, OPERATOR_HEARTBEAT.qos
         )
 
     def __call__(self) -> None:
         """Publish the heartbeat; raise NodeError if the stop key was pressed."""
-        if self._says_so:
-            self._heartbeat.publish(OPERATOR_HEARTBEAT.type())
+        self._heartbeat.publish(OPERATOR_HEARTBEAT.type(data=RUN_CLIENT))
         if pressed_key() == STOP_KEY:
             told = [f"{name}: {a.message if a else 'no answer'}" for name, a in stop_all().items()]
             raise NodeError("stopped by the space bar: " + "; ".join(told), "")

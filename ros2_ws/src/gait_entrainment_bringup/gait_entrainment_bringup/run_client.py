@@ -10,6 +10,7 @@ from action_msgs.msg import GoalStatus
 from tqdm import tqdm
 
 from gait_entrainment.protocol import Protocol, write_protocol
+from gait_entrainment_bringup.node_list import RUN_CLIENT
 from gait_entrainment_bringup.operator_console import Operator, keys_at_once
 from gait_entrainment_bringup.supervisor import Supervisor
 from gait_entrainment_bringup.watch import Watch
@@ -36,14 +37,13 @@ def conduct(
     quiet: bool,
     real_time: bool,
     silence: float,
-    heartbeat: bool = True,
 ) -> None:
     """
     Conduct a protocol through the experiment node to its end, and watch the processes meanwhile.
 
     ``on_start`` is called once the experiment has accepted it. In ``real_time`` this process comes
     before others. Nodes that nobody else watches may
-    be silent for ``silence`` [s]. Without ``heartbeat`` somebody else says that a person watches.
+    be silent for ``silence`` [s].
 
     Raises
     ------
@@ -52,7 +52,7 @@ def conduct(
 
     """
     bar = tqdm(total=protocol.strides, unit="stride", disable=True if quiet else None, leave=False)
-    with bar, keys_at_once(), Client("entrain_run") as client:
+    with bar, keys_at_once(), Client(RUN_CLIENT) as client:
         latest: dict[str, str] = {}
 
         def show(**values: str) -> None:
@@ -67,7 +67,7 @@ def conduct(
         client.action(RunProtocol, ACTION)
         # The recorder ends by itself once the record is complete.
         watch = Watch(client, supervisor, may_end=("bag_recorder",), asked=ASKED, silence=silence)
-        operator = Operator(client, heartbeat=heartbeat)
+        operator = Operator(client)
 
         def look() -> None:
             watch()

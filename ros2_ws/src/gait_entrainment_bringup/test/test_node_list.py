@@ -55,6 +55,7 @@ ELSEWHERE = {
     "experiment.longest_lookahead",
     "experiment.longest_clock_offset",
     "perturbator.operator_timeout",
+    "perturbator.operators",
     "experiment.protocol",
     "bag_recorder.topics",
     "bag_player.remap",
@@ -64,14 +65,11 @@ ELSEWHERE = {
 def declared(arguments):
     """Start every node with arguments; return its parameters by full name."""
     rclpy.init(args=arguments)
-    nodes = [make() for make in CLASSES]
-    found = {
-        f"{node.get_name()}.{name}": parameter.value
-        for node in nodes
-        for name, parameter in node._parameters.items()
-        if name != "output"
-    }
-    for node in nodes:
+    found = {}
+    for make in CLASSES:  # a bag of before may hold a topic as another type than a node's today
+        node = make()
+        parameters = node._parameters.items()
+        found |= {f"{node.get_name()}.{n}": p.value for n, p in parameters if n != "output"}
         node.destroy_node()
     rclpy.shutdown()
     return found

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rclpy.serialization import deserialize_message
+from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
@@ -158,7 +159,7 @@ class OperatorPage(Participant):
         following = topics.JOINT_STATES.name in self._readers
         self._due = time.monotonic() + (PERIOD if following else IDLE_PERIOD)
         if self.settings.heartbeat and self.page.seat.watched:
-            self.publish(topics.OPERATOR_HEARTBEAT, topics.OPERATOR_HEARTBEAT.type())
+            self.publish(topics.OPERATOR_HEARTBEAT, String(data=self.get_name()))
         while not self._wishes.empty():
             self._wishes.get()()
         taken = [

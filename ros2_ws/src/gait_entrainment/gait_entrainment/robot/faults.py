@@ -32,8 +32,7 @@ class Fault:
 STOPPED = Fault("stopped", "The stop was called.")
 OPERATOR_SILENT = Fault(
     "operator_silent",
-    "Whoever started the run fell silent for longer than the limit: its terminal is closed, or its"
-    " process is frozen.",
+    "An operator fell silent: a terminal or a page is closed, or a process is frozen.",
 )
 DEADMAN_SILENT = Fault(
     "deadman_silent", "The emergency stop fell silent: it was let go, or its node has ended."

@@ -20,6 +20,7 @@ from gait_entrainment_bags import BagError, BagReader, UnreadableBagError, recov
 from gait_entrainment_bringup.node_list import (
     PAGE,
     PERSON_SILENCE,
+    RUN_CLIENT,
     STOP_ORDER,
     nodes_for,
     parameter_arguments,
@@ -124,6 +125,7 @@ def run_experiment(
     ) as supervisor:
         given = chosen_parameters(protocol, bag, options)
         given[PAGE] |= options.page_parameters
+        given["perturbator"]["operators"] = [RUN_CLIENT, *([PAGE] if options.heartbeat else [])]
         custom_data = json.loads(given["bag_recorder"]["custom_data"])
         given["bag_recorder"]["custom_data"] = json.dumps(custom_data | dict(about or {}))
         arguments = parameter_arguments(given, supervisor.folder)
@@ -147,7 +149,6 @@ def run_experiment(
             quiet=quiet,
             real_time=options.real_time,
             silence=silence,
-            heartbeat=not options.heartbeat,
         )
         supervisor.wait_for_record()
         # No torque is left and the record is closed: in which order the rest ends does not matter.

@@ -17,7 +17,7 @@ from geometry_msgs.msg import WrenchStamped
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import Imu, JointState
-from std_msgs.msg import Bool, Empty, String
+from std_msgs.msg import Bool, String
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
@@ -92,7 +92,7 @@ ROBOT_SETUP = Topic(topic_names.ROBOT_SETUP, msg.AnkleRobotSetup, LATEST_STATE)
 TROUBLE = Topic(topic_names.TROUBLE, msg.Trouble)
 EMERGENCY_STOP = Topic(topic_names.EMERGENCY_STOP, Bool, SAID_ONCE)
 
-OPERATOR_HEARTBEAT = Topic(topic_names.OPERATOR_HEARTBEAT, Empty, HEARTBEAT)
+OPERATOR_HEARTBEAT = Topic(topic_names.OPERATOR_HEARTBEAT, String, HEARTBEAT)
 OPERATOR_NOTES = Topic(topic_names.OPERATOR_NOTES, msg.Note, LATEST_STATE)
 
 HORIZON = Topic(topic_names.HORIZON, msg.Horizon)

@@ -41,6 +41,7 @@ from gait_entrainment_nodes.messaging.environment import user_and_host
 from gait_entrainment_nodes.messaging.stamps import header
 from gait_entrainment_nodes.nodes.goal_server import GoalServer
 from gait_entrainment_nodes.nodes.loop import run_node
+from gait_entrainment_nodes.nodes.parameters import texts
 from gait_entrainment_nodes.nodes.participant import Participant
 from gait_entrainment_nodes.nodes.perturbator_run import Result, Run
 from gait_entrainment_nodes.nodes.rclpy_internals import TolerantLifecycleNode
@@ -69,6 +70,9 @@ class Settings:
         "longest silence of operator/heartbeat while torque may come; 0: nobody need watch",
         "s",
         (0.0, 60.0),
+    )
+    operators: tuple[str, ...] = texts(
+        "names on operator/heartbeat, each of which must be heard; empty: any one"
     )
     deadman_timeout: float = setting(
         0.0,
@@ -116,8 +120,9 @@ class Perturbator(Participant, TolerantLifecycleNode):
         self._latest_run = 0  # number of the latest run
         self._foreign_seal = ""  # of the latest horizon that was not of who conducts the run
         self._look_at: float | None = None  # when to look after a real robot, steady time [s]
-        # When the operator and the emergency stop were heard last, steady time [s].
-        self._operator_at = self._deadman_at = -math.inf
+        # When the operators, by name, and the emergency stop were heard last, steady time [s].
+        self._operators_at: dict[str, float] = {}
+        self._deadman_at = -math.inf
         self._stop_thread = StopThread(self.get_name(), self._stop_at_once)
 
         self.subscribe(topics.HORIZON, self._on_horizon)
@@ -274,20 +279,27 @@ class Perturbator(Participant, TolerantLifecycleNode):
             self._stop_at_once()
             self._report_faults("the emergency stop was pressed")
 
-    def _on_heartbeat(self, _: Any) -> None:
-        self._operator_at = time.monotonic()
+    def _on_heartbeat(self, message: Any) -> None:
+        self._operators_at[message.data] = time.monotonic()
 
     def _require_signs_of_life(self) -> None:
-        """End the torque if the operator, or who holds the emergency stop, is not there."""
-        robot, now = self._robot, time.monotonic()
+        """End the torque if an operator, or who holds the emergency stop, is not there."""
+        robot, settings, now = self._robot, self.settings, time.monotonic()
         if robot is None or robot.train is None:
             return
-        for heard_at, timeout, fault in (
-            (self._operator_at, self.settings.operator_timeout, OPERATOR_SILENT),
-            (self._deadman_at, self.settings.deadman_timeout, DEADMAN_SILENT),
+        heard, wanted = self._operators_at, list(filter(None, settings.operators))
+        operators = {name: heard.get(name, -math.inf) for name in wanted} or {
+            "every operator": max(heard.values(), default=-math.inf)
+        }
+        for watched, timeout, fault in (
+            (operators, settings.operator_timeout, OPERATOR_SILENT),
+            ({"the emergency stop": self._deadman_at}, settings.deadman_timeout, DEADMAN_SILENT),
         ):
-            if timeout and now - heard_at > timeout:
+            silent = [name for name, at in watched.items() if timeout and now - at > timeout]
+            if silent:
                 robot.stop(fault)
+                names = " and ".join(silent)
+                self._report_faults(f"{names} silent for {timeout:g} s: {fault.meaning}")
 
     def _end_torque(self, reason: str, outcome: int = Result.STOPPED) -> None:
         """Bring the torque to zero now, whatever was promised."""
