@@ -186,7 +186,8 @@ def test_killed_perturbator_leaves_zero_torque_by_the_motors_own_watchdog(tmp_pa
 
 def test_beside_a_page_that_is_a_heartbeat_a_frozen_command_ends_the_torque(tmp_path, motor):
     driver, trace = motor
-    options = (f"--driver={driver}", *ARMED, *QUICK, "--heartbeat", "--limit-rising=1")
+    quick = (*QUICK, "--baseline=4", "--limit-rising=1")
+    options = (f"--driver={driver}", *ARMED, *quick, "--heartbeat")
     beats = OPERATOR_HEARTBEAT
     with entrain_run(tmp_path / "bag", *options) as run, probe(run.domain()) as page:
         states, troubles = page.listen(ROBOT_STATE), page.listen(TROUBLE)

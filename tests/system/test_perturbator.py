@@ -180,7 +180,6 @@ def test_torque_ends_if_one_who_must_be_heard_falls_silent(tmp_path, silent):
                         button.publish(Bool(data=False))
                     else:
                         heart.publish(String(data=name))
-                time.sleep(0.01)
 
             conductor = Conductor(nodes)
             states = nodes.probe.listen(ROBOT_STATE)
@@ -189,24 +188,14 @@ def test_torque_ends_if_one_who_must_be_heard_falls_silent(tmp_path, silent):
                 nodes.probe.until(publisher.get_subscription_count, "a reader")
             now = time.time()
             conductor.promise(now, now + 0.2)
-            live()  # before there is a train
+            nodes.probe.client.each_round = live
             assert conductor.request(
                 time.time() + 1.0, period=10.0, count=3, duration=0.5
             ).accepted
-
-            def pushed():
-                live()
-                return states and states[-1].measured_torque > 0.5
-
-            nodes.probe.until(pushed, "torque")
+            nodes.probe.until(lambda: states and states[-1].measured_torque > 0.5, "torque")
             alive.remove(silent)
-
-            def told():
-                live()
-                return [trouble for trouble in conductor.troubles if trouble.fault]
-
-            (trouble,) = nodes.probe.until(told, "the fault")
-            assert f": {silent} silent for 0.5 s" in trouble.message
+            nodes.probe.until(lambda: conductor.troubles, "the fault")
+            assert f": {silent} silent for 0.5 s" in conductor.troubles[0].message
             nodes.probe.until(lambda: abs(states[-1].measured_torque) < 0.5, "no torque")
         finally:
             nodes.probe.client.close()

@@ -12,8 +12,8 @@ from gait_entrainment_nodes.messaging.client import Client
 from gait_entrainment_nodes.messaging.errors import NodeError
 from gait_entrainment_nodes.messaging.readers import who_hangs
 
-# A pause between two looks that is so long [s] says that this process was held up itself.
-HELD_UP = 1.0
+# A pause between two looks of this share of the silence says that this process was held up itself.
+HELD_UP = 1 / 3
 
 
 class Watch:
@@ -46,7 +46,7 @@ class Watch:
         """Look once."""
         ended = self._supervisor.check(self._may_end)
         now = time.monotonic()
-        if now - self._looked_at > HELD_UP:
+        if now - self._looked_at > HELD_UP * self._silence:
             self._since = now
         self._looked_at = now
         for node, sign in self._signs.items():
