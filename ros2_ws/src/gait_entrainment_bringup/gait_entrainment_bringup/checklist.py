@@ -16,7 +16,7 @@ from gait_entrainment.protocol import Protocol
 from gait_entrainment.robot import DeviceError, GuardedRobot, find_driver
 from gait_entrainment.robot.faults import STOPPED
 from gait_entrainment_bags.messages import nanoseconds_of
-from gait_entrainment_bringup.node_list import CLOCK_OFFSET, gentle_limits
+from gait_entrainment_bringup.node_list import CLOCK_OFFSET, limits_of
 from gait_entrainment_bringup.operator_console import STOP_KEY, pressed_key
 from gait_entrainment_drivers.monitor import NEAR_ZERO_SHARE
 from gait_entrainment_drivers.proof import proof_of
@@ -72,7 +72,7 @@ def points(
 
 
 def _limits(protocol: Protocol) -> Point:
-    limits = asdict(protocol.limits) | gentle_limits(protocol)
+    limits = asdict(protocol.limits) | limits_of(protocol, worn=True)
     told = ", ".join(f"{name} {value:g}" for name, value in limits.items())
     plan = protocol.planned
     most = "" if len(protocol.sequence) == 1 else "at most "

@@ -18,7 +18,7 @@ import yaml
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.gait import GaitLimits
-from gait_entrainment.protocol import Protocol, said_limits, write_protocol
+from gait_entrainment.protocol import Protocol, said, write_protocol
 from gait_entrainment.robot import find_driver
 from gait_entrainment.run import settings_for
 from gait_entrainment_bags import BagError, BagReader
@@ -149,7 +149,7 @@ def parameters(
             "armed": armed,
             "unproved": unproved,
             **{f"planned.{name}": value for name, value in asdict(protocol.planned).items()},
-            **{f"limits.{name}": value for name, value in said_limits(protocol).items()},
+            **{f"limits.{k}": v for k, v in limits_of(protocol, worn=measured).items()},
         },
         "gait_analyzer": {
             "side": side,
@@ -180,15 +180,9 @@ def parameters(
         given["experiment"]["longest_lookahead"] = lead_time + latency
     if measured:
         # A person wears it: who falls silent ends the torque, and so does a record that cannot
-        # be written. Whoever is silent is to be named before the robot misses the experiment.
+        # be written.
         given["experiment"]["silence_timeout"] = PERSON_SILENCE
-        given["perturbator"] |= {
-            "limits.silence": PERSON_SILENCE + 0.05,
-            "operator_timeout": PERSON_SILENCE,
-        }
-        # No person gets square pulses of full height from the first one on, unless it is said.
-        gentle = gentle_limits(protocol)
-        given["perturbator"] |= {f"limits.{name}": value for name, value in gentle.items()}
+        given["perturbator"]["operator_timeout"] = PERSON_SILENCE
         given["experiment"]["longest_clock_offset"] = CLOCK_OFFSET
         given["bag_recorder"]["required"] = True
     return {name: given[name] | {"use_sim_time": not real_time} for name in given}
@@ -219,18 +213,29 @@ def _add_detection(
     return float(max(chosen.make(side).latency for side in Side) + detecting["delivery"])
 
 
-def gentle_limits(protocol: Protocol) -> dict[str, float]:
-    """Return what limits the pulses of a real robot, unless the protocol says otherwise."""
-    # No two pulses closer than the shortest stride that is believed.
-    most = 60 / GaitLimits().stride_least
-    gentle: dict[str, float] = {"rising": RISING, "pulses_per_minute": most}
+def limits_of(protocol: Protocol, *, worn: bool) -> dict[str, Any]:
+    """
+    Return the limits that are not as by default: what the protocol says.
+
+    If a person has the robot ``worn``, no pulse is square and of full height from the first one
+    on, unless it is said.
+    """
+    if not worn:
+        return said(protocol.limits)
+    gentle: dict[str, float] = {
+        "rising": RISING,
+        # No two pulses closer than the shortest stride that is believed.
+        "pulses_per_minute": 60 / GaitLimits().stride_least,
+        # The experiment is to name who is silent before the robot misses it.
+        "silence": PERSON_SILENCE + 0.05,
+    }
     rates = [
         abs(block.torque(protocol.walker)) / (FLANK_SHARE * block.pulses.width)
         for block in protocol.sequence
     ]
     if any(rates):
         gentle["rate"] = min(max(rates), 1e6)
-    return gentle | said_limits(protocol)
+    return gentle | said(protocol.limits)
 
 
 def _verdict(protocol: Protocol | None) -> dict[str, Any]:

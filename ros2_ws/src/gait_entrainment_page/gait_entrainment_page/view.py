@@ -24,7 +24,8 @@ from gait_entrainment.conventions import (
     nanoseconds_of,
 )
 from gait_entrainment.gait.verdict import Reason, Verdict
-from gait_entrainment.robot import DeviceError, find_driver
+from gait_entrainment.robot import DeviceError, DeviceLimits, find_driver
+from gait_entrainment.settings import settings_of
 from gait_entrainment_bags import topic_names as names
 from gait_entrainment_bags.messages import MessageError, event_of, state_of
 from gait_entrainment_commands.outcome import MEANINGS
@@ -42,8 +43,8 @@ PARTS = ("waiting", "baseline", "pulses", "washout", "finished", "failed", "rest
 STATUSES = ("inactive", "active", "stopped", "fault")
 _LEVELS = ("ok", "warning", "error", "stale")
 JOINTS = ("l_hip", "r_hip", "l_ankle", "r_ankle")
-# Limits that are told, with what follows the number.
-_LIMITS = {"torque": " N m", "duration": " s", "rate": " N m/s", "rising": " pulses"}
+# Limits that are told.
+_LIMITS = ("torque", "duration", "rate", "rising")
 _NAN = math.nan
 
 
@@ -294,7 +295,8 @@ class View:
             if not self.simulated:
                 rows.append(("armed by", setup.armed_by or "nobody"))
                 rows.append(("watchdog", setup.watchdog or "not proved"))
-            told = [f"{n} {limits[n]:.4g}{u}" for n, u in _LIMITS.items() if limits.get(n)]
+            units = {n: told.unit.strip("1") for n, told in settings_of(DeviceLimits).items()}
+            told = [f"{n} {limits[n]:.4g} {units[n]}".rstrip() for n in _LIMITS if limits.get(n)]
             rows.append(("limits", ", ".join(told)))
         return rows
 

@@ -4,10 +4,9 @@
 """What an experiment shall do: the protocol file, validated."""
 
 from gait_entrainment.protocol.block import Block, ProtocolError, PulsePlan
-from gait_entrainment.protocol.protocol import FIELDS, Protocol, content_of
+from gait_entrainment.protocol.protocol import FIELDS, Protocol, content_of, said
 from gait_entrainment.protocol.reader import (
     DEFAULT_PROTOCOL,
     read_protocol,
-    said_limits,
     write_protocol,
 )

@@ -93,20 +93,21 @@ _ALWAYS_OF_PULSES = (
 
 def content_of(protocol: Protocol) -> dict[str, Any]:
     """Return what a protocol says, by section, field and block; words for what has words."""
-    content = _said(protocol, _ALWAYS)
-    content["pulses"] = _said(protocol.pulses, _ALWAYS_OF_PULSES)
+    content = said(protocol, _ALWAYS)
+    content["pulses"] = said(protocol.pulses, _ALWAYS_OF_PULSES)
     if protocol.blocks:
         for name in ("baseline", "pulses", "washout"):
             del content[name]
         always = ("name", "baseline", "pulses", "washout")
         content["blocks"] = [
-            _said(block, always) | {"pulses": _said(block.pulses, _ALWAYS_OF_PULSES)}
+            said(block, always) | {"pulses": said(block.pulses, _ALWAYS_OF_PULSES)}
             for block in protocol.blocks
         ]
     return content
 
 
-def _said(instance: Any, always: tuple[str, ...]) -> dict[str, Any]:
+def said(instance: Any, always: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Return what settings say: what is ``always`` said, and all that is not as by default."""
     told, unsaid = asdict(instance), asdict(type(instance)())
     chosen = [
         *always,

@@ -9,7 +9,7 @@ PyYAML's node graph keeps the line of every key, which its loaded dictionaries d
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -23,6 +23,7 @@ from gait_entrainment.protocol.protocol import (
     SECTIONS,
     Protocol,
     content_of,
+    said,
 )
 from gait_entrainment.settings import Setting, SettingError
 
@@ -82,16 +83,9 @@ def write_protocol(protocol: Protocol) -> str:
     content = content_of(protocol)
     for block in content.get("blocks", [content]):
         block["pulses"] = {k: v for k, v in block["pulses"].items() if v is not None}
-    content["limits"] = said_limits(protocol)
-    said = {k: v for k, v in content.items() if v != {}}
-    text: str = yaml.safe_dump(said, sort_keys=False)
+    content["limits"] = said(protocol.limits)
+    text: str = yaml.safe_dump({k: v for k, v in content.items() if v != {}}, sort_keys=False)
     return text
-
-
-def said_limits(protocol: Protocol) -> dict[str, Any]:
-    """Return what a protocol says of the limits: all that is not as it is by itself."""
-    unsaid = asdict(DEFAULT_PROTOCOL.limits)
-    return {k: v for k, v in asdict(protocol.limits).items() if v != unsaid[k]}
 
 
 def _entries(source: Path | str) -> Iterator[tuple[str, _Entry]]:
