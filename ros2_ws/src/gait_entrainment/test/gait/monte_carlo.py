@@ -4,20 +4,21 @@
 """
 Monte Carlo of the entrainment verdict on noisy walkers that are known to lock, or not to.
 
-Prints the table of docs/analysis.md: python monte_carlo.py [TRIALS]
+Prints the tables of docs/analysis.md: python monte_carlo.py [TRIALS]
 """
 
 import statistics
 import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.special import betaincinv
 from synthetic_gait import (
     Noise,
     Response,
+    Walk,
     autoregressive,
     follows_partly,
     ignores,
@@ -32,8 +33,10 @@ from synthetic_gait import (
 )
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.gait import GaitEvent, Verdict, analyze, drift_of
+from gait_entrainment.gait import Verdict, analyze, drift_of
 
+NOISES: tuple[Noise, ...] = (white, autoregressive, long_range)
+JUDGED = 40  # pulses, the most that the verdict judges at a time
 STEADY = 0.025  # coefficient of variation below which a recorded stretch is called steady
 
 
@@ -51,14 +54,15 @@ class Case:
         return f"| {walker} | {noise} | {100 * self.variation:g} % |"
 
 
-@dataclass(frozen=True)
+@dataclass
 class Outcome:
     """Verdicts of many independent trials of one case."""
 
-    trials: int
-    ever_entrained: int  # trials in which any stride was called entrained
-    final: Counter[Verdict]  # verdicts at the last pulse
-    since: list[int]  # entrained_since_stride, where entrained at the last pulse
+    trials: int = 0
+    ever_entrained: int = 0  # trials in which any stride was called entrained
+    final: Counter[Verdict] = field(default_factory=Counter)  # verdicts at the last pulse
+    slipped: Counter[Verdict] = field(default_factory=Counter)  # of those that slipped, in truth
+    since: list[int] = field(default_factory=list)  # entrained_since_stride, if at the last pulse
 
     def __str__(self) -> str:
         cells = [rate(self.ever_entrained, self.trials)]
@@ -66,6 +70,19 @@ class Outcome:
         others = [v for v in Verdict if v != Verdict.ENTRAINED]
         cells += [f"{100 * self.final[v] / self.trials:.1f}" for v in others]
         cells.append(f"{statistics.median(self.since):g}" if self.since else "-")
+        return " " + " | ".join(cells) + " |"
+
+    @property
+    def followed(self) -> Counter[Verdict]:
+        """Verdicts at the last pulse of the walkers that answered one pulse a stride, in truth."""
+        return self.final - self.slipped
+
+    def in_truth(self) -> str:
+        """Return how many slipped, and how many of the others and of them are called entrained."""
+        cells = [rate(self.slipped.total(), self.trials)]
+        for verdicts in (self.followed, self.slipped):
+            total, entrained = verdicts.total(), verdicts[Verdict.ENTRAINED]
+            cells.append(f"{rate(entrained, total)} of {total}" if total else "-")
         return " " + " | ".join(cells) + " |"
 
 
@@ -90,27 +107,32 @@ def run(case: Case, trials: int, seed: int = 2012) -> Outcome:
     )
 
 
-def run_recorded(response: Response, *, steady: bool, seed: int = 2012) -> Outcome:
-    """Let a walker respond on every recorded stretch that is steady, or is not."""
-    strides = [s for s in recorded_strides() if (np.std(s) < STEADY * np.mean(s)) == steady]
+def run_recorded(
+    response: Response, least: float = 0.0, below: float = 1.0, seed: int = 2012
+) -> Outcome:
+    """Let a walker respond on each recorded stretch with a CV of at least ``least``, ``below``."""
+    strides = recorded_strides()
     rngs = np.random.default_rng(seed).spawn(len(strides))
     return outcome_of(
-        perturbed(rng, response, free) for rng, free in zip(rngs, strides, strict=True)
+        perturbed(rng, response, free)
+        for rng, free in zip(rngs, strides, strict=True)
+        if least <= np.std(free) / np.mean(free) < below
     )
 
 
-def outcome_of(walks: Iterable[tuple[list[GaitEvent], list[int]]]) -> Outcome:
+def outcome_of(walks: Iterable[Walk]) -> Outcome:
     """Judge walks."""
-    trials, ever, final, since = 0, 0, Counter[Verdict](), []
-    for events, onsets in walks:
-        entrainments = analyze(events, onsets, Side.RIGHT).entrainments
-        trials += 1
-        ever += any(e.verdict == Verdict.ENTRAINED for e in entrainments)
+    outcome = Outcome()
+    for walk in walks:
+        entrainments = analyze(walk.events, walk.onsets, Side.RIGHT).entrainments
         last = entrainments[-1]
-        final[last.verdict] += 1
+        outcome.trials += 1
+        outcome.ever_entrained += any(e.verdict == Verdict.ENTRAINED for e in entrainments)
+        outcome.final[last.verdict] += 1
+        outcome.slipped[last.verdict] += walk.slipped(JUDGED)
         if last.entrained_since_stride is not None:
-            since.append(last.entrained_since_stride)
-    return Outcome(trials, ever, final, since)
+            outcome.since.append(last.entrained_since_stride)
+    return outcome
 
 
 def coverage(rng: np.random.Generator, trials: int) -> float:
@@ -123,29 +145,38 @@ def coverage(rng: np.random.Generator, trials: int) -> float:
     return covered / trials
 
 
-NOISES: tuple[Noise, ...] = (white, autoregressive, long_range)
-
-
-def cases() -> Iterator[Case]:
-    """Yield the rows of the table."""
+def outcomes(trials: int) -> Iterator[tuple[str, Outcome]]:
+    """Yield the rows of the tables: who walks, with which noise, and what came of it."""
     for response in (ignores, follows_partly, slips, locks, locks_within_80_ms):
         for variation in (0.03, 0.02, 0.01):
             for noise in NOISES:
-                yield Case(response, noise, variation)
+                case = Case(response, noise, variation)
+                yield str(case), run(case, trials)
+    for response in (ignores, locks, locks_within_80_ms) if recorded_strides() else ():
+        name = f"| {response.__name__.replace('_', ' ')} | recorded | "
+        yield f"{name}below {100 * STEADY:g} % |", run_recorded(response, below=STEADY)
+        yield f"{name}above {100 * STEADY:g} % |", run_recorded(response, least=STEADY)
+        yield f"{name}any |", run_recorded(response)
+
+
+def table(columns: str) -> str:
+    """Return the head of a table with these columns."""
+    return f"| walker | noise | CV | {columns} |\n{'| --- ' * (4 + columns.count('|'))}|"
 
 
 if __name__ == "__main__":
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
     print(
-        "| walker | noise | CV | ever entrained, % (95 % interval) | at the last pulse: "
-        "entrained, % | undecided, % | drifting, % | lost, % | untestable, % | entrained since "
-        "stride, median |"
+        table(
+            "ever entrained, % (95 % interval) | at the last pulse: entrained, % | undecided, % | "
+            "drifting, % | lost, % | untestable, % | entrained since stride, median"
+        )
     )
-    print("| --- " * 10 + "|")
-    for each in cases():
-        print(each, run(each, count), sep="", flush=True)
-    for walker in (ignores, locks) if recorded_strides() else ():
-        for limit, calm in (("below", True), ("above", False)):
-            name = f"| {walker.__name__} | recorded | {limit} {100 * STEADY:g} % |"
-            print(name, run_recorded(walker, steady=calm), sep="", flush=True)
+    locking = []
+    for row, outcome in outcomes(count):
+        print(row, outcome, sep="", flush=True)
+        if row.startswith("| locks"):
+            locking.append(row + outcome.in_truth())
+    print(table("slipped, % | entrained, % of those that did not slip | % of those that did"))
+    print(*locking, sep="\n")
     print(f"coverage of the drift's interval: {coverage(np.random.default_rng(1), 4 * count):.3f}")

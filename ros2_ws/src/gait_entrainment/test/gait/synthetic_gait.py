@@ -4,7 +4,9 @@
 """Synthetic gait events and pulses: exact ones for examples, noisy ones for Monte Carlo."""
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -103,6 +105,18 @@ Noise = Callable[[np.random.Generator, int], Floats]
 Response = Callable[[float], float]  # lag of a pulse [s] -> change of the stride period [s]
 
 
+class Walk(NamedTuple):
+    """One experiment, and what only its simulation knows."""
+
+    events: list[GaitEvent]
+    onsets: list[int]  # [ns]
+    answered: list[int]  # pulse that each stride under pulses answered, from 0
+
+    def slipped(self, last: int) -> bool:
+        """Whether pulses and strides were not one to one over the ``last`` strides with pulses."""
+        return any(b - a != 1 for a, b in pairwise(self.answered[-last:]))
+
+
 def noisy_walk(
     rng: np.random.Generator,
     response: Response,
@@ -111,9 +125,9 @@ def noisy_walk(
     offset: float = OFFSET,
     unperturbed: float = 1.934,
     counts: tuple[int, int, int] = (15, 50, 15),
-) -> tuple[list[GaitEvent], list[int]]:
+) -> Walk:
     """
-    Return the gait events and the pulse onsets of one experiment, as ``perturbed`` does.
+    Return one experiment, as ``perturbed`` does.
 
     Stride periods are ``unperturbed`` [s] plus noise with a coefficient of variation
     ``variation``; ``counts`` are the strides of baseline, pulses and washout.
@@ -129,9 +143,9 @@ def perturbed(
     offset: float = OFFSET,
     unperturbed: float | None = None,
     counts: tuple[int, int] = (15, 50),
-) -> tuple[list[GaitEvent], list[int]]:
+) -> Walk:
     """
-    Return the gait events and the pulse onsets of one experiment.
+    Return one experiment.
 
     Stride periods are ``free`` [s], plus the walker's response once there are pulses. The pulses
     are planned as the experiment plans them: period ``offset`` [s] away from the measured mean of
@@ -156,7 +170,7 @@ def perturbed(
     measured = float(np.mean(free[:baseline]))
     first = float(np.sum(free[: baseline - 1])) + (1 + rng.uniform()) * measured
     onsets = [nanoseconds(first) + nanoseconds(n * (measured + offset)) for n in range(pulses)]
-    strikes, toe_offs = [0.0], []
+    strikes, toe_offs, answered = [0.0], [], []
     for k in range(len(free)):
         start, period = strikes[-1], float(free[k])
         if baseline <= k < baseline + pulses:
@@ -165,12 +179,11 @@ def perturbed(
             n = round((expected - first) / (measured + offset))
             lag = first + n * (measured + offset) - expected
             period += response(lag)
+            answered.append(n)
         strikes.append(start + period)
         toe_offs.append(start + STANCE * period + float(jitter[k]))
-    return (
-        events_of([nanoseconds(t) for t in strikes], [nanoseconds(t) for t in toe_offs]),
-        onsets,
-    )
+    events = events_of([nanoseconds(t) for t in strikes], [nanoseconds(t) for t in toe_offs])
+    return Walk(events, onsets, answered)
 
 
 def ignores(_lag: float) -> float:

@@ -150,7 +150,7 @@ def disturb(events: list[GaitEvent], data: st.DataObject) -> list[GaitEvent]:
 @given(st.data(), st.sampled_from([ignores, locks]), st.integers(0, 10**6))
 def test_interleaving_of_events_and_promises_does_not_matter(data, response, seed) -> None:  # type: ignore[no-untyped-def]
     rng = np.random.default_rng(seed)
-    events, onsets = noisy_walk(rng, response, white, 0.02, counts=(4, 14, 2))
+    events, onsets, _ = noisy_walk(rng, response, white, 0.02, counts=(4, 14, 2))
     events = disturb(events, data)
     rule = VerdictSettings(window=5, successive=2)
     expected = analyze(events, onsets, Side.RIGHT, rule)
@@ -202,7 +202,7 @@ def moved(analysis: Analysis, by: int) -> str:
 @given(st.integers(-(10**18), 10**18), st.integers(0, 10**6))
 def test_only_differences_of_stamps_count(shift: int, seed: int) -> None:
     """Bit for bit, also where a double would resolve no better than 128 ns."""
-    events, onsets = noisy_walk(np.random.default_rng(seed), locks, white, 0.01)
+    events, onsets, _ = noisy_walk(np.random.default_rng(seed), locks, white, 0.01)
     shifted = [dataclasses.replace(e, stamp=e.stamp + shift) for e in events]
     here = analyze(events, onsets, Side.RIGHT)
     there = analyze(shifted, [onset + shift for onset in onsets], Side.RIGHT)

@@ -248,7 +248,7 @@ def reference(analysis: Analysis, rule: VerdictSettings) -> list[tuple[Verdict, 
 @pytest.mark.parametrize("seed", range(3))
 def test_agrees_with_a_second_implementation(response, noise, seed, variation) -> None:  # type: ignore[no-untyped-def]
     rng = np.random.default_rng(seed)
-    events, onsets = noisy_walk(rng, response, noise, variation, counts=(15, 60, 5))
+    events, onsets, _ = noisy_walk(rng, response, noise, variation, counts=(15, 60, 5))
     analysis = analyze(events, onsets, Side.RIGHT)
     published = [(e.verdict, e.entrained_since_stride) for e in analysis.entrainments]
     assert published == reference(analysis, VerdictSettings())
