@@ -8,6 +8,7 @@ import struct
 from functools import cache
 
 import numpy as np
+import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import WrenchStamped
 from hypothesis import given, settings
@@ -18,7 +19,12 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
 
+from gait_entrainment.conventions import EventKind, Side
+from gait_entrainment.experiment import Part
+from gait_entrainment.gait import Reason, Verdict
+from gait_entrainment.robot import Shape
 from gait_entrainment_bags import find_definition
+from gait_entrainment_msgs import msg
 from gait_entrainment_msgs.msg import AnkleRobotState, TorqueProfile
 from gait_entrainment_nodes.messaging.raw_messages import MessageTemplate, serialize
 from gait_entrainment_nodes.messaging.stamps import header, to_time
@@ -28,6 +34,22 @@ stamps = st.integers(0, (2**31 - 1) * 10**9)
 # ROS strings hold no NUL.
 texts = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=12)
 doubles = st.floats(allow_nan=False)
+
+
+@pytest.mark.parametrize(
+    ("message", "enums"),
+    [
+        (msg.Side, [Side]),
+        (msg.GaitEvent, [EventKind]),
+        (msg.Entrainment, [Verdict, Reason]),
+        (msg.ExperimentState, [Part]),
+        (msg.Pulse, [Shape]),
+    ],
+)
+def test_constants_of_messages_are_those_of_the_core(message, enums):
+    members = {member.name: member.value for enum in enums for member in enum}
+    names = [name for name in dir(type(message)) if name.isupper() and name[0] != "_"]
+    assert {name: getattr(message, name) for name in names} == members
 
 
 @cache
