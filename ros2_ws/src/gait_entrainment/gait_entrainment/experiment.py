@@ -146,15 +146,17 @@ class Conductor:
             return Part.BASELINE
         return Part.PULSES if known_until < block.pulses_end or block.pulses_left else Part.WASHOUT
 
-    def add_event(self, event: GaitEvent) -> None:
+    def add_event(self, event: GaitEvent, now: float = math.inf) -> None:
         """
         Take one gait event, and plan the pulses that it lets be planned.
+
+        One that is stamped later than ``now`` [ns] is not believed.
 
         Raises ProtocolError if they would overlap at the resulting period, GaitError if the
         baseline is not one to measure a period by.
         """
         strike = self._tracker.latest_strike
-        stride = self._tracker.add(event)
+        stride = self._tracker.add(event, now)
         if self._tracker.latest_strike == strike:
             return  # not a heel strike of the leg, or not believed
         if stride is not None:

@@ -190,6 +190,26 @@ def test_in_real_time_each_owes_what_it_does_by_itself():
     assert blamed(bench.after(0.1)) == ("perturbator has been silent for 3 s", "perturbator")
 
 
+@pytest.mark.parametrize(("ahead", "believed"), [(0.09, True), (0.11, False), (3600.0, False)])
+def test_in_real_time_what_is_stamped_ahead_has_not_happened(ahead, believed):
+    bench = Bench(real_time=True)
+    bench.begin()
+    bench.promise()
+    bench.strike(round((10 + ahead) * SECOND))  # the very first, so no stride is too long
+    bench.now += 0.5
+    bench.strike(10 * SECOND + SECOND // 2)
+    bench.now += 0.5
+    bench.strike(round((11 + ahead) * SECOND))
+    assert bench.run.failure is None
+    assert bench.run.conductor.strides == believed
+    bench.report(round((11 + ahead) * SECOND))
+    if not believed:
+        expected = (
+            f"walker_sim reports what is {ahead - 0.1:.3g} s ahead of what can be over by now"
+        )
+        assert blamed(bench.run.failure) == (expected, "walker_sim")
+
+
 def test_silence_counts_anew_after_this_process_was_held_up(bench):
     bench.now += 10.0
     bench.run.forgive()

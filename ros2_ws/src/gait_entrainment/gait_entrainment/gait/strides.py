@@ -99,8 +99,15 @@ class StrideTracker:
         self._strike_place = -1
         self._rival: StrideTracker | None = None  # of dropped events that fit together
 
-    def add(self, event: GaitEvent) -> Stride | None:
-        """Take one event; return the stride that it closes, if it closes one."""
+    def add(self, event: GaitEvent, now: float = math.inf) -> Stride | None:
+        """
+        Take one event; return the stride that it closes, if it closes one.
+
+        One that is stamped later than ``now`` [ns] has not happened: it never convinces.
+        """
+        if event.stamp > now:
+            self.counts.implausible += 1
+            return None
         fate = self._fate(event)
         setattr(self.counts, fate, getattr(self.counts, fate) + 1)
         if fate != "accepted":

@@ -4,6 +4,7 @@
 """Strides from gait events that are missing, doubled, late or contradictory."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -54,6 +55,20 @@ def test_strides_of_the_leg_that_strikes_first() -> None:
     ]
     assert [stride.period for stride in strides] == [2.0, 2.0]
     assert counts == EventCounts(accepted=9)
+
+
+@settings(derandomize=True, deadline=None)
+@given(st.lists(st.tuples(st.integers(0, 20), st.integers(1, 10**13), st.integers(0, 40))))
+def test_what_is_stamped_ahead_of_now_changes_nothing(wrong: list[tuple[int, int, int]]) -> None:
+    tracker, strides = StrideTracker(Side.RIGHT), []
+    for position, event in enumerate(walk(10)):
+        for at, ahead, step in wrong:
+            if at == position:
+                assert tracker.add(strike(step, event.stamp + ahead), event.stamp) is None
+        strides.append(tracker.add(event, event.stamp))
+    regular, counts = track(walk(10))
+    assert [stride for stride in strides if stride] == regular
+    assert tracker.counts == replace(counts, implausible=len(wrong))
 
 
 def test_strides_of_the_leg_that_strikes_second() -> None:

@@ -27,6 +27,8 @@ from gait_entrainment_nodes.messaging.stamps import header, to_time
 
 # How long the reason of the perturbator may come after its effect [s]: they are on two topics.
 REASON_TIMEOUT = 0.5
+# Real time: how far a stamp may lie ahead of the steady time since the start [ns]: clocks slew.
+STAMP_TOLERANCE = 100_000_000
 PERTURBATOR, WALKER, RECORDER = "perturbator", "walker_sim", "bag_recorder"
 
 
@@ -80,6 +82,7 @@ class Run:
         self._grant = self._recorded_grant = -1
         self._covered_until = 0  # by profiles [ns since 1970]
         self._planning = False  # pulses were requested, and there is no answer yet
+        self._began: int | None = None  # start of the walk, by the walker, minus steady time [ns]
         self._shown: tuple[Part, int] | None = None
         self.forgive()
 
@@ -98,6 +101,8 @@ class Run:
             # In real time the walk begins a little later than the walker's answer.
             later = max(start - time.time_ns(), 0) / NANOSECONDS_PER_SECOND
             self._progress_at = self._clock() + later
+            if self._real_time:
+                self._began = start - round(self._clock() * NANOSECONDS_PER_SECOND)
 
     def fail(self, error: ExperimentError) -> None:
         """End the run, if it is not over."""
@@ -146,7 +151,7 @@ class Run:
         if self.conductor is None:
             return
         try:
-            self.conductor.add_event(event_of(event))
+            self.conductor.add_event(event_of(event), self._latest_stamp())
         except MessageError:
             return  # no event: the analyzer tells
         except EntrainmentError as error:
@@ -158,6 +163,11 @@ class Run:
     def take_progress(self, progress: msg.Progress) -> None:
         """Take the walker's progress; it is answered once all that it covers is here."""
         if self.conductor is None:
+            return
+        ahead = nanoseconds_of(progress.header.stamp) - self._latest_stamp()
+        if ahead > 0:
+            lead = f"{ahead / NANOSECONDS_PER_SECOND:.3g} s ahead of what can be over by now"
+            self.fail(ExperimentError(f"{self.walker} reports what is {lead}", self.walker))
             return
         if self._progress is None:  # else this one only repeats that an answer is owed
             self._progress_at = self._clock()
@@ -197,6 +207,12 @@ class Run:
         self.trouble = ""  # about somebody else's pulses
         self._planning = False
         self._answer()
+
+    def _latest_stamp(self) -> float:
+        """Return the latest stamp [ns since 1970] that can be over, by the time since the start."""
+        if self._began is None:
+            return math.inf
+        return self._began + round(self._clock() * NANOSECONDS_PER_SECOND) + STAMP_TOLERANCE
 
     def _note_stop(self) -> None:
         if self.stopped_at is None:
