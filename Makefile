@@ -30,7 +30,7 @@ format: setup ## let ruff rewrite the sources
 bench: build ## measure the speeds in the README, each beside its baseline
 	@$(in_env) pytest -s -m benchmark tests/benchmarks
 
-figures: build ## draw the pictures in docs that take seconds anew
+figures: build ## draw the pictures in docs anew
 	@$(in_env) python scripts/make_figures.py
 
 docs: build ## HTML of the public names: docs/api/index.html

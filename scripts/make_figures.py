@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Draw anew the pictures in docs that take seconds: the run in README.md, and the results but sweeps.
+Draw anew the pictures in docs: the run in README.md, and the results.
 
     python scripts/make_figures.py        into docs, saying which of them have changed
 
-Sweeps walk for longer: `entrain results` draws them with their numbers.
-docs/figures/display.png shows RViz's scene and is not drawn here.
+Sweeps walk for longer: their pictures are drawn from the tables that `entrain results` leaves
+beside them. docs/figures/display.png shows RViz's scene and is not drawn here.
 """
 
 import contextlib
@@ -18,20 +18,26 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
 from matplotlib.image import imread
 from PIL import Image
 
+from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment_commands import main as entrain
 from gait_entrainment_studies.commands.results import COMMAND, FIGURE, TEMPLATE
+from gait_entrainment_studies.commands.sweep import borders_of, draw_sweep
 from gait_entrainment_studies.paper.figures import draw_figures
+from gait_entrainment_studies.sweep.plan import Axis, SweepPlan
+from gait_entrainment_studies.sweep.store import read_sweep
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 RUN = Path("figures/ankle_torque.png")
 # Commands whose pictures take seconds.
 QUICK = ("paper", "lock", "existence", "phase-response", "cohort")
+TABLES = sorted((DOCS / "results").glob("*_tongue.parquet"))
 # Of the pixels. A line moved by its own width changes more.
 _MAY_DIFFER = 0.0005
 
@@ -58,6 +64,27 @@ def draw_results(out: Path, commands: Sequence[str] = QUICK) -> dict[Path, Path]
     return drawn
 
 
+def swept(table: Path) -> tuple[SweepPlan, Any]:
+    """Return plan and table of a sweep that `entrain results` left."""
+    rows, provenance = read_sweep(table)
+    told = provenance["plan"]
+    axes = {name: Axis(**told[name]) for name in ("period_offsets", "torque_fractions")}
+    return SweepPlan(**{**told, **axes, "walker": WalkerParameters(**told["walker"])}), rows
+
+
+def draw_sweeps(out: Path) -> dict[Path, Path]:
+    """Draw the sweeps from their tables; return each picture by the one in docs."""
+    drawn = {}
+    for table in TABLES:
+        plan, rows = swept(table)
+        number = table.name.partition("_")[0]
+        for picture in draw_sweep(plan, rows, borders_of(plan), out / number):
+            place = Path("results") / f"{number}_{picture.name}"
+            if (DOCS / place).exists():
+                drawn[place] = picture
+    return drawn
+
+
 def same(picture: Path, other: Path) -> bool:
     """
     Return whether two pictures show the same.
@@ -81,6 +108,7 @@ def main() -> int:
         drawn = draw_run(Path(folder))
         with contextlib.redirect_stdout(io.StringIO()):
             drawn |= draw_results(Path(folder))
+            drawn |= draw_sweeps(Path(folder))
         for place, picture in drawn.items():
             known = DOCS / place
             if known.exists() and drawn_by_this_matplotlib(known) and same(known, picture):

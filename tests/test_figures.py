@@ -5,7 +5,7 @@
 The pictures in docs are what the code draws now.
 
 That of a run is compared in test_lock_step.py, those of the paper in test_paper.py: there they are
-drawn anyway. Of sweeps and cohorts the numbers are tested, not the pictures.
+drawn anyway. Those of sweeps are drawn from the tables beside them, of which some rows are walked.
 
 They are held to it by the version of matplotlib that has drawn them, which each of them names.
 """
@@ -19,21 +19,45 @@ from matplotlib.image import imread
 from PIL import Image
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
-from make_figures import DOCS, draw_results, drawn_by_this_matplotlib, same
+from make_figures import (
+    DOCS,
+    TABLES,
+    draw_results,
+    draw_sweeps,
+    drawn_by_this_matplotlib,
+    same,
+    swept,
+)
+
+from gait_entrainment_studies.sweep.row import sweep_row
 
 
 @pytest.fixture(scope="module")
 def drawn(tmp_path_factory):
-    solved = ("lock", "existence", "phase-response")
-    return draw_results(tmp_path_factory.mktemp("docs"), solved)
+    out = tmp_path_factory.mktemp("docs")
+    return draw_results(out, ("lock", "existence", "phase-response", "cohort")) | draw_sweeps(out)
 
 
 def test_pictures_are_what_the_code_draws(drawn):
-    assert len(drawn) == 3
+    assert len(drawn) == 7
     if not all(drawn_by_this_matplotlib(DOCS / place) for place in drawn):
         pytest.skip("the pictures were drawn by another version of matplotlib")
     old = [str(place) for place, picture in drawn.items() if not same(DOCS / place, picture)]
     assert old == [], "make figures"
+
+
+@pytest.mark.parametrize("table", TABLES, ids=lambda table: table.stem)
+def test_table_of_a_sweep_is_what_is_walked_now(table):
+    plan, rows = swept(table)
+    index = plan.torque_fractions.count // 3
+    row = sweep_row(plan, index)
+    cells = slice(index * len(row["torque"]), (index + 1) * len(row["torque"]))
+    for name, values in row.items():
+        kept = rows[name].to_numpy()[cells]
+        if values.dtype.kind == "f":
+            np.testing.assert_allclose(values, kept, rtol=1e-6, err_msg=name)
+        else:
+            assert values.tolist() == kept.tolist(), name
 
 
 def test_a_short_line_elsewhere_is_another_picture(drawn, tmp_path):

@@ -5,7 +5,7 @@
 entrain results: the page of results, made by the commands that it names.
 
 The page is `results.md` beside this module. Below each line with a command it gets the command's
-output, and it gets the figures that it shows.
+output, and it gets the figures that it shows; those of a sweep with the table they are drawn from.
 """
 
 import argparse
@@ -51,7 +51,9 @@ def run(options: argparse.Namespace) -> int:
                 raise EntrainmentError(f"entrain {command} failed")
             page += f"    entrain {command}\n\n{_shown(output.getvalue())}\n{text}"
             for drawn, name in FIGURE.findall(text):
-                shutil.copyfile(Path(folder) / f"{name}.png", figures / drawn)
+                for kind in (".png", ".parquet"):
+                    if (file := Path(folder) / f"{name}{kind}").exists():
+                        shutil.copyfile(file, (figures / drawn).with_suffix(kind))
     (options.out / "results.md").write_text(page, encoding="utf-8")
     print(f"written          {options.out / 'results.md'}")
     return 0

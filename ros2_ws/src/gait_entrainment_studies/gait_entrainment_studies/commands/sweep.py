@@ -19,7 +19,7 @@ from gait_entrainment_studies.commands import question
 from gait_entrainment_studies.sweep.engine import available_cores, rows_by_dask, rows_by_processes
 from gait_entrainment_studies.sweep.figures import draw_locked_lags, draw_tongue
 from gait_entrainment_studies.sweep.plan import Axis, SweepPlan
-from gait_entrainment_studies.sweep.row import exact_borders
+from gait_entrainment_studies.sweep.row import StableInterval, exact_borders
 from gait_entrainment_studies.sweep.store import SweepStore, read_sweep
 
 # The exact borders are drawn at this many torques or more: those of a coarse sweep are smooth too.
@@ -110,16 +110,27 @@ def _fill(plan: SweepPlan, store: SweepStore, jobs: int, scheduler: str | None) 
             bar.update(walks)
 
 
-def _report(plan: SweepPlan, store: SweepStore, options: argparse.Namespace) -> int:
-    table, _ = read_sweep(store.finish())
+def draw_sweep(
+    plan: SweepPlan, table: Any, borders: Sequence[StableInterval], folder: Path
+) -> list[Path]:
+    """Draw the pictures of a finished sweep; return their paths."""
+    return [*draw_tongue(plan, table, borders, folder), *draw_locked_lags(plan, table, folder)]
+
+
+def borders_of(plan: SweepPlan) -> list[StableInterval]:
+    """Solve for the borders at the torques of a sweep, or at more if they are few."""
     torques = plan.torque_fractions
     fractions = np.linspace(torques.least, torques.most, max(torques.count, _BORDER_TORQUES))
-    borders = exact_borders(plan.walker, fractions, plan.width)
+    return exact_borders(plan.walker, fractions, plan.width)
+
+
+def _report(plan: SweepPlan, store: SweepStore, options: argparse.Namespace) -> int:
+    table, _ = read_sweep(store.finish())
+    borders = borders_of(plan)
     counts = _counts(plan, {name: np.asarray(table[name]) for name in table.column_names})
 
     def draw(folder: Path) -> list[Path]:
-        tongue = draw_tongue(plan, table, borders, folder)
-        return [store.table_path, *tongue, *draw_locked_lags(plan, table, folder)]
+        return [store.table_path, *draw_sweep(plan, table, borders, folder)]
 
     outcome = {re.sub(r"\W", "_", name): count for name, count in counts.items()}
     return question.answer(
