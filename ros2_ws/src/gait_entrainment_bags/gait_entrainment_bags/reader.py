@@ -213,7 +213,8 @@ def bag_files(path: Path) -> list[Path]:
     if not path.is_dir():
         return [path]
     description = described_beside(path)
-    storage = description.get("storage_identifier", "mcap")
+    sqlite = any(path.glob("*.db3")) and not any(path.glob("*.mcap"))
+    storage = description.get("storage_identifier", "sqlite3" if sqlite else "mcap")
     if storage != "mcap":
         raise UnreadableBagError(
             f"{path}: stored as {storage}, not as MCAP; `ros2 bag convert -i {path} -o FILE` "
@@ -231,7 +232,9 @@ def bag_files(path: Path) -> list[Path]:
         return files
     files = sorted(path.glob("*.mcap"), key=_file_order)
     if not files:
-        raise UnreadableBagError(f"{path}: no MCAP file in this folder")
+        bags = sorted({file.parent.name for file in path.glob("*/*.mcap")})
+        within = f", but bags in it: {', '.join(bags[:5])}" if bags else ""
+        raise UnreadableBagError(f"{path}: no MCAP file in this folder{within}")
     return files
 
 

@@ -251,6 +251,13 @@ def no_bag(tmp_path: Path, kind: str) -> Path:
         (path / "metadata.yaml").write_text(
             "rosbag2_bagfile_information:\n  storage_identifier: sqlite3\n"
         )
+    elif kind == "sqlite alone":
+        path.mkdir()
+        (path / "a_0.db3").touch()
+    elif kind == "folder of bags":
+        for name in ("b", "a"):
+            (path / name).mkdir(parents=True)
+            (path / name / f"{name}_0.mcap").touch()
     elif kind == "file compressed":
         path.mkdir()
         (path / "metadata.yaml").write_text(
@@ -275,6 +282,8 @@ def no_bag(tmp_path: Path, kind: str) -> Path:
         ("pipe", "no such file"),
         ("empty folder", "no MCAP file"),
         ("sqlite", "stored as sqlite3"),
+        ("sqlite alone", "stored as sqlite3"),
+        ("folder of bags", "no MCAP file in this folder, but bags in it: a, b"),
         ("file compressed", "compressed as a whole"),
         ("file missing", "file missing/a_0.mcap: no such file"),
     ],

@@ -138,7 +138,7 @@ def summary(outcome: dict[str, Any]) -> str:
     lines = [f"strides          {len(strides)}, pulses placed in them: {len(pulses)}"]
     if plan and len(pulses) != plan["count"]:
         lines[0] += f" of {plan['count']}"
-        if not outcome["holes"]:
+        if strides and not outcome["holes"]:
             lines[0] += "; the train is longer than the run: add washout strides"
     if "blocks" in outcome:
         plans = parameters.get("blocks", [parameters])

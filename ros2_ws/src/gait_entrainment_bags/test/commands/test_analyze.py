@@ -160,6 +160,38 @@ def test_what_cannot_be_analyzed_is_one_line(capsys, tmp_path, name, expected, w
     assert words in err
 
 
+def with_numbers(data, place, value):
+    """Change four bytes behind the header of a message: its run at 0, then its own fields."""
+    begin = 20 + place
+    return data[:begin] + value.to_bytes(4, "little") + data[begin + 4 :]
+
+
+def test_a_second_run_in_a_bag_is_refused(capsys, tmp_path):
+    def begun_again(topic, number, data):
+        first = (topic, number) == ("/perturbation/torque_profile", 60)
+        return (with_numbers(data, 4, 0) if first else data) if topic in NEEDED else None
+
+    code, out, err = entrain(capsys, "analyze", copy(tmp_path / "two", begun_again))
+    assert (code, out) == (1, "")
+    assert "more than one run is in it (run 1, then run 1)" in err
+
+
+def test_what_the_analyzer_does_not_take_is_left_out_and_counted(capsys, tmp_path):
+    def strange(topic, number, data):
+        if (topic, number) == ("/gait_events", 100):
+            return with_numbers(data, 0, 7)  # of another run
+        if (topic, number) == ("/gait_events", 101):
+            return data[:24] + b"\7" + data[25:]  # of an unknown kind
+        return data if topic in NEEDED else None
+
+    # A protocol of no text is none.
+    bag = copy(tmp_path / "strange", strange, {"protocol": " "})
+    told = json.loads(entrain(capsys, "analyze", bag, "--json")[1])
+    assert (told["left_out"], told["gait_events"]["accepted"]) == (2, 322)
+    assert told["parameters"] is None
+    assert "2 left out" in entrain(capsys, "analyze", bag)[1]
+
+
 @pytest.mark.parametrize(
     "renamed",
     [

@@ -1,0 +1,238 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The messages of one run in a bag: events, promises, what the robot felt, published results."""
+
+import math
+import struct
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gait_entrainment.conventions import Side
+from gait_entrainment.gait import Analysis, GaitEvent, Stride
+from gait_entrainment.gait.analyzer import Result
+from gait_entrainment.robot import MeasuredOnsets, TorqueProfile
+from gait_entrainment_bags import messages, topic_names
+from gait_entrainment_bags.decoding import decoder_for
+from gait_entrainment_bags.errors import BagError
+from gait_entrainment_bags.holes import hole_before
+from gait_entrainment_bags.mcap_records import BagMessage
+from gait_entrainment_bags.reader import BagReader
+
+_TYPES = {
+    topic_names.GAIT_EVENTS: "GaitEvent",
+    topic_names.TRUE_EVENTS: "GaitEvent",
+    topic_names.TORQUE_PROFILE: "TorqueProfile",
+    topic_names.PULSES: "TorquePulse",
+    topic_names.ROBOT_STATE: "AnkleRobotState",
+    topic_names.ANKLE_TORQUE: "AnkleTorque",
+    topic_names.STRIDES: "Stride",
+    topic_names.PULSE_PHASES: "PulsePhase",
+    topic_names.ENTRAINMENT: "Entrainment",
+}
+# Fields that bags of earlier versions lack.
+_ADDED = {"reason", "stretch", "window", "spread", "scatter", "phase_lag_uncertainty"}
+_Value = TypeVar("_Value")
+
+
+@dataclass(frozen=True)
+class AnkleTorques:
+    """Sampled ankle torque of the perturbed leg, plantarflexion positive."""
+
+    stamps: NDArray[np.int64]  # [ns], shape (n,)
+    intrinsic: NDArray[np.float64]  # of the leg's own spring [N m], shape (n,)
+    delivered: NDArray[np.float64]  # by the robot, whatever the phase [N m], shape (n,)
+    effective: NDArray[np.float64]  # the part of it that acts on the walker [N m], shape (n,)
+
+
+class RunMessages:
+    """
+    Events, onsets and published results of a run, read in one pass.
+
+    Messages of another run are left out, as by the analyzer. Raises BagError if another begins.
+
+    The messages of a topic are taken in the order in which they were received, which is that of
+    the file: the analyzer met them in that order, and a stop voids only what was promised before.
+    """
+
+    def __init__(self, bag: BagReader) -> None:
+        self._bag = bag
+        self._names = {
+            relative: name for relative in _TYPES if (name := find_topic(bag, relative))
+        }
+        needed = (topic_names.GAIT_EVENTS, topic_names.TORQUE_PROFILE)
+        if missing := [relative for relative in needed if relative not in self._names]:
+            raise BagError(f"{bag.path}: lacks the topics {', '.join(missing)}")
+        self._torque = self._names.pop(topic_names.ANKLE_TORQUE, "")
+        self._messages: dict[str, list[BagMessage]] = {name: [] for name in self._names.values()}
+        self.real_time_factor = self._read()
+        self.left_out = 0  # of another run, or of an unknown kind or side
+        self._run: int | None = None  # its number
+        self.onsets: list[int] = []
+        self.unknown: list[tuple[int, int]] = []  # spans of which no torque profile is here [ns]
+        measured = MeasuredOnsets()
+        adjoins: float | None = None
+        promises = self._values(topic_names.TORQUE_PROFILE, lambda m: (m, _promise_of(m)))
+        for message, promise in promises:
+            if isinstance(promise, TorqueProfile):
+                if hole := hole_before(message, adjoins):
+                    self.unknown.append(hole)
+                adjoins = promise.valid_until
+                self.onsets += promise.onsets
+                measured.add_promise(promise.onsets, promise.valid_until)
+            else:
+                adjoins = math.inf
+                self.onsets = [onset for onset in self.onsets if onset < promise]
+                measured.stop(promise)
+        events = self._messages[self._names[topic_names.GAIT_EVENTS]]
+        self.events, self.true_events = (
+            list(filter(None, self._values(name, self._event_of)))
+            for name in (topic_names.GAIT_EVENTS, topic_names.TRUE_EVENTS)
+        )
+        # Whether the log times are the stamps, so that instants can be looked up.
+        self._stamped = [m.log_time for m in events] == [event.stamp for event in self.events]
+        for pulse in self._values(topic_names.PULSES, messages.pulse_of):
+            measured.add_pulse(*pulse)
+        for state in self._values(topic_names.ROBOT_STATE, messages.state_of):
+            measured.add_state(state)
+        measured.finish()
+        self.timings = measured.timings
+
+    def _read(self) -> float:
+        """Read the messages by topic; return walked over wall time by /clock, NaN without."""
+        clocks: list[BagMessage] = []  # the first and the last
+        clock = [topic_names.CLOCK] if topic_names.CLOCK in self._bag.topics else []
+        for message in self._bag.messages([*self._messages, *clock]):
+            if message.topic in self._messages:
+                self._messages[message.topic].append(message)
+            else:
+                clocks[1:] = [message]
+        for received in self._messages.values():
+            received.sort(key=lambda message: message.place)
+        if len(clocks) < 2 or clocks[1].publish_time <= clocks[0].publish_time:
+            return math.nan
+        # By what the clock said: other recorders log by the wall clock.
+        decode = decoder_for(self._bag.topics[topic_names.CLOCK])
+        begin, end = (messages.nanoseconds_of(decode(tick.data).clock) for tick in clocks)
+        return (end - begin) / (clocks[1].publish_time - clocks[0].publish_time)
+
+    def _values(self, relative: str, value_of: Callable[[Any], _Value]) -> Iterator[_Value]:
+        """Give the values of the messages of a topic, which are not kept."""
+        if relative in self._names:
+            name = self._names[relative]
+            decode = decoder_for(self._bag.topics[name])
+            with fields_expected(name):
+                for stored in self._messages.pop(name):
+                    if self._is_of_run(message := decode(stored.data)):
+                        yield value_of(message)
+
+    def _is_of_run(self, message: Any) -> bool:
+        """Whether a message is of the run of the first: of a torque profile, if there is one."""
+        if self._run is None:
+            self._run = message.run
+        elif not getattr(message, "revision", True):  # that counts the profiles of a run from 0
+            raise BagError(
+                f"{self._bag.path}: more than one run is in it (run {self._run}, then run "
+                f"{message.run}): record each into a bag of its own"
+            )
+        self.left_out += message.run != self._run
+        return bool(message.run == self._run)
+
+    def _event_of(self, message: Any) -> GaitEvent | None:
+        """Return the event of a message; None for one without meaning, as in the analyzer."""
+        try:
+            return messages.event_of(message)
+        except messages.MessageError:
+            self.left_out += 1
+            return None
+
+    def differences_from(self, analysis: Analysis, side: Side) -> tuple[str, ...] | None:
+        """Return how the published results differ from an analysis; None if there are none."""
+        results: dict[str, Sequence[Result]] = {
+            topic_names.STRIDES: analysis.strides,
+            topic_names.PULSE_PHASES: analysis.pulses,
+            topic_names.ENTRAINMENT: analysis.entrainments,
+        }
+        if results.keys().isdisjoint(self._names):
+            return None
+        differences = []
+        for relative in filter(self._names.get, results):
+            anew = [messages.result_values(result, side) for result in results[relative]]
+            with fields_expected(relative):
+                found = list(self._values(relative, lambda message: message))
+                differences.append(_difference(relative, found, anew))
+        return tuple(filter(None, differences))
+
+    def read_torques(self, side: Side, strides: Sequence[Stride]) -> AnkleTorques:
+        """Read the ankle torque of some strides; of all if the log times are not the stamps."""
+        stamps: list[int] = []
+        rows: list[tuple[float, float, float]] = []
+        spans: list[tuple[int, float]] = [(stride.start, stride.end) for stride in strides]
+        if strides and not self._stamped:
+            spans = [(0, math.inf)]
+        with fields_expected(self._torque):
+            for span in spans if self._torque else []:
+                for _, message in self._bag.decoded([self._torque], *span):
+                    torques = message.intrinsic, message.delivered, message.effective_perturbation
+                    stamps.append(messages.nanoseconds_of(message.header.stamp))
+                    rows.append(tuple(torque[side] for torque in torques))
+        return AnkleTorques(np.array(stamps, np.int64), *np.array(rows).reshape(-1, 3).T)
+
+
+def find_topic(bag: BagReader, relative: str) -> str | None:
+    """Return the topic of a bag with this relative name and its type, in whatever namespace."""
+    type_name = f"gait_entrainment_msgs/msg/{_TYPES[relative]}"
+    names = (name for name, topic in bag.topics.items() if topic.type == type_name)
+    # The shortest: /truth/gait_events holds what is to be compared with /gait_events.
+    return min((n for n in names if n.endswith(f"/{relative}")), key=len, default=None)
+
+
+def _promise_of(message: Any) -> TorqueProfile | int:
+    """Return what a TorqueProfile message promises, or the instant of the stop it reports."""
+    stop = messages.stop_of(message)
+    return messages.profile_of(message) if stop is None else stop
+
+
+@contextmanager
+def fields_expected(topic: str) -> Iterator[None]:
+    """Raise BagError for a message without a field or a meaning that this version knows."""
+    try:
+        yield
+    except AttributeError as error:
+        raise BagError(
+            f"{topic}: its messages have no field {error.name}: recorded by another version"
+        ) from None
+    except messages.MessageError as error:
+        raise BagError(f"{topic}: {error}") from None
+
+
+def _difference(topic: str, published: Sequence[Any], anew: Sequence[dict[str, Any]]) -> str:
+    """Say where published messages first differ from results; an empty text if nowhere."""
+    for number, (message, values) in enumerate(zip(published, anew, strict=False), start=1):
+        for name, value in values.items():
+            if name in _ADDED and not hasattr(message, name):
+                continue
+            found = _plain(getattr(message, name))
+            if _bits(found) != _bits(value):
+                return f"{topic}: {name} of message {number}: {found} recorded, {value} anew"
+    if len(published) != len(anew):
+        return f"{topic}: {len(published)} messages recorded, {len(anew)} anew"
+    return ""
+
+
+def _plain(value: Any) -> Any:
+    """Return a header or a time as nanoseconds, anything else as it is."""
+    value = getattr(value, "stamp", value)
+    return messages.nanoseconds_of(value) if hasattr(value, "nanosec") else value
+
+
+def _bits(value: Any) -> Any:
+    """Return a value in a form that is equal only if every bit of a float is, also of a NaN."""
+    if isinstance(value, float):
+        return struct.pack("<d", value)
+    return [_bits(item) for item in value] if isinstance(value, (list, tuple)) else int(value)
