@@ -7,13 +7,20 @@ Whether anything ends the torque without a cause: docs/safety.md.
     python tests/safety/false_stops.py --minutes 30 --busy 8
 
 One `entrain run --real-time` on an emulated motor, beside busy processes. Prints how long it went
-on, how many pulses the motor gave and, if it ended, what it said; then exits with 1.
+on, how many pulses the motor gave and, if it ended, what it said; then exits with 1. A bare loop
+of sleeps, by SCHED_FIFO above everything in the run if the system permits it, shows how late any
+process woke up on this machine meanwhile.
 """
 
 import argparse
+import contextlib
+import multiprocessing
+import os
 import subprocess
 import sys
 import tempfile
+import time
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
@@ -23,11 +30,41 @@ from time_to_zero import HEIGHT, MOTORS, WALK, busy, emulated_motor, rows_of
 sys.path.insert(0, str(Path(__file__).parents[1] / "system"))
 from harness import entrain_run
 
+LATENESS = 0.05  # at which the torque loop latches [s]
+
 
 def pulses(trace: Path) -> int:
     """Return how many pulses an emulated motor gave."""
     torques = [torque for _, _, torque in rows_of(trace)]
     return sum(before < 0.5 * HEIGHT <= after for before, after in pairwise(torques))
+
+
+@contextlib.contextmanager
+def bare_loop() -> Iterator[None]:
+    """Have a loop sleep from millisecond to millisecond; print its worst lateness at the end."""
+    worst, over = multiprocessing.Value("d", 0.0), multiprocessing.Value("i", 0)
+
+    def sleep() -> None:
+        with contextlib.suppress(PermissionError):
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(70))
+        due = time.monotonic()
+        while True:
+            due = max(due + 0.001, time.monotonic())
+            time.sleep(max(due - time.monotonic(), 0.0))
+            late = time.monotonic() - due
+            worst.value = max(worst.value, late)
+            over.value += late > LATENESS
+
+    process = multiprocessing.get_context("fork").Process(target=sleep, daemon=True)
+    process.start()
+    try:
+        yield
+    finally:
+        process.kill()
+        print(
+            f"a bare loop beside it: at worst {1e3 * worst.value:.1f} ms late, "
+            f"{over.value} times above {1e3 * LATENESS:g} ms"
+        )
 
 
 def main() -> int:
@@ -41,7 +78,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         trace = folder / "trace"
-        with emulated_motor(program, trace) as port, busy(options.busy):
+        with emulated_motor(program, trace) as port, busy(options.busy), bare_loop():
             words = f"{driver}:interface=udp_multicast,channel=239.74.163.2,port={port}"
             with entrain_run(folder / "bag", f"--driver={words}", *WALK) as run:
                 run.find_nodes()
