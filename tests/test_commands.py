@@ -86,6 +86,7 @@ EXIT_CODES = [
     (1, ["bag", "check", "README.md"]),
     (1, ["driver", "check", "magic"]),
     (1, ["report", "docs"]),
+    (1, ["analyze", BAG, "--figures=README.md/x"]),
     (2, ["simulate", "--width=-1"]),
     (2, ["simulate", "nowhere.yaml"]),
     (2, ["analyze", "nowhere"]),
@@ -117,6 +118,7 @@ def test_exit_codes(code, words, capsys, monkeypatch):
         prog = "entrain " + " ".join(str(word) for word in words[:2] if str(word).isalpha())
         assert err.splitlines()[-1].startswith((f"{prog}: ", f"entrain {words[0]}: ")), err
         assert "Traceback" not in err
+        assert "[Errno" not in err
 
 
 @pytest.mark.parametrize(("out", "code", "told"), [("full", 1, "No space left"), ("head", 0, "")])
