@@ -73,7 +73,7 @@ def test_a_run_is_told_from_its_soundness_to_its_origin(browser, pages):
         "verdict          entrained since stride 29",
         "Are the data sound?",
         "measured off commanded by 0.00 N m",
-        "anew, the same as live to the last bit",
+        "repeated: the same as live to the last bit",
         "Protocol as run",
         "period_offset: -0.05",
         "Stride period",

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-A linter for bags: which of rosbag2's rules a bag breaks, and who stumbles over that.
+A linter for bags: which of rosbag2's rules a bag breaks, and which readers that affects.
 
 The rules are those of rosbag2's Jazzy branch, of the MCAP specification and registry, and of the
 readers that are in use; docs/bags.md lists them.
@@ -73,14 +73,14 @@ _CONSEQUENCES = {
     "message-index": "readers fall back to the order of the file, or miss messages",
     "statistics": "numbers and times that readers show or seek by are wrong",
     "rosbag2-record": "custom data and QoS are lost with metadata.yaml",
-    "metadata-file": "rosbag2 does not open the folder; `ros2 bag reindex` makes it anew",
+    "metadata-file": "rosbag2 does not open the folder; `ros2 bag reindex` writes a new one",
     "metadata-key": "rosbag2 throws when it opens the folder",
     "metadata-version": "rosbag2 of Jazzy does not read it",
     "metadata-qos": "rosbag2 throws when it opens the folder",
     "metadata-files": "rosbag2 does not open the bag, or leaves a file out",
     "metadata-topics": "rosbag2 does not play the topic, or shows wrong numbers",
     "metadata-times": "`ros2 bag info` shows wrong times, start offsets go astray",
-    "record": "an analysis goes no further than the hole, and begins anew after it",
+    "record": "an analysis stops at the hole, and starts again after it",
 }
 _MINOR = {
     "record",
@@ -112,7 +112,7 @@ class Finding:
 
 
 class _Report:
-    """Gathers where rules are broken."""
+    """Collects the places where rules are broken."""
 
     def __init__(self) -> None:
         self._places: dict[str, list[str]] = {}
@@ -137,7 +137,7 @@ class _Report:
 
 def check(path: Path | str) -> list[Finding]:
     """
-    Hold a bag, a folder or an ``.mcap`` file, against rosbag2's rules.
+    Check a bag, a folder or an ``.mcap`` file, against rosbag2's rules.
 
     Never raises for what is wrong with the bag: that is what the findings are for. A rule that
     is broken many times gives one finding, with the first place and the number of places. Bags
@@ -237,7 +237,7 @@ class _FileCheck:
             self._add("schema-text", str(error))
 
     def _check_index(self, chunk: Chunk, listed: Chunk | None, messages: list[BagMessage]) -> None:
-        """Hold a chunk and its messages as found against the chunk that the summary lists."""
+        """Compare a chunk and its messages as found with the chunk that the summary lists."""
         where = f"at byte {chunk.offset}"
         if listed is None:
             self._add("chunk-index", f"{where}: messages that no chunk index lists")
@@ -290,7 +290,7 @@ class _FileCheck:
                 self._add("type-hash", f"{name}: no topic_type_hash RIHS01_ and 64 hex digits")
 
     def _check_qos(self, channel: Channel, version: Any) -> None:
-        """Hold the offered QoS against its form, and its spelling against the file's version."""
+        """Check the form of the offered QoS, and that its spelling fits the file's version."""
         where = f"{self._file.path}: {channel.topic}: offered_qos_profiles"
         qos = channel.metadata.get("offered_qos_profiles")
         if qos is None:
@@ -310,7 +310,7 @@ class _FileCheck:
 
 
 def _check_metadata_file(folder: Path, stocks: dict[str, Contents], report: _Report) -> None:
-    """Hold ``metadata.yaml`` against its own version and against what the files hold."""
+    """Check ``metadata.yaml`` by the rules of its version and against what the files hold."""
     file = folder / METADATA_FILE
     said = read_metadata_file(folder)
     missing = list(missing_keys(said))

@@ -11,7 +11,7 @@ from gait_entrainment.errors import EntrainmentError
 
 
 class BagError(EntrainmentError):
-    """Whatever about a bag prevents what was asked for."""
+    """Something about a bag prevents what was asked for."""
 
 
 class BagExistsError(BagError):

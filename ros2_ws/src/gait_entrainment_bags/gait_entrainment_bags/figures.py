@@ -159,7 +159,7 @@ def _phase_lag(run: RecordedRun) -> Any:
 
 
 def _shade_holes(axes: Any, run: RecordedRun) -> None:
-    """Shade the strides of which the record lacks something."""
+    """Shade the strides whose record has holes."""
     strides = run.analysis.strides
     for place, hole in enumerate(holes_of(run)):
         before = max((s.number for s in strides if s.end <= hole.start), default=0)
@@ -169,7 +169,7 @@ def _shade_holes(axes: Any, run: RecordedRun) -> None:
 
 
 def _pulse_timing(run: RecordedRun) -> Any:
-    """Draw which share of the pulses was sent, and was measured, by how late at most."""
+    """Draw the share of pulses that were sent, and measured, at most so late."""
     title = f"Timing of {len(run.timings)} pulses"
     figure, axes = _new_figure(run, title, _HEIGHT + 0.7, top=1.1)
     for kind, colour, style in (("sent", ORANGE, "--"), ("measured", BLUE, "-")):

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the record of a run lacks: counts, revisions and places of the gait tell."""
+"""What is missing from the record of a run, by counts, revisions and step numbers."""
 
 from collections import Counter
 from typing import Any
@@ -19,7 +19,7 @@ _NAMES = {_PROFILE: "torque profiles", _EVENT: "gait events"}
 
 class RunRecord:
     """
-    Follows the messages of a bag; knows nothing of a bag without a run.
+    Follows the messages of a bag; one without a run has no holes.
 
     Every node says at the end how many messages it has published; torque profiles count their
     revisions from 0 and say which is the last; gait events are numbered by steps, so that what a
@@ -33,7 +33,7 @@ class RunRecord:
         self._ended: set[tuple[TopicInfo, int]] = set()
 
     def add(self, topic: TopicInfo, data: bytes) -> None:
-        """Take a message; one that cannot be decoded says nothing."""
+        """Take a message; one that cannot be decoded is ignored."""
         self._recorded[topic.name] += 1
         if topic.type not in (_COUNTS, *_NAMES):
             return
@@ -53,7 +53,7 @@ class RunRecord:
             return
 
     def holes(self) -> list[str]:
-        """Return a line for each topic, or topic and run, of which something is missing."""
+        """Return a line for each topic, or topic and run, with something missing."""
         holes = [
             f"{topic}: {count - self._recorded[topic]} of {count} messages"
             for topic, count in self._published.items()

@@ -4,7 +4,7 @@
 """
 Playing a bag: which message is due when. Nothing here looks at a clock or sends anything.
 
-Every call says what time it is, so that a node paces by absolute deadlines and a test by numbers.
+Every call is given the time, so that a node paces by absolute deadlines and a test by numbers.
 """
 
 import queue
@@ -137,7 +137,7 @@ class Playback:
         self._go_to(instant)
 
     def stop(self) -> None:
-        """Play no more; `seek` begins anew."""
+        """Stop playing; `seek` starts again."""
         self.ended = True
         self._moments.close()
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-One recorded run, read from its bag and analyzed anew, without ROS.
+One recorded run, read from its bag and analyzed again, without ROS.
 
 Only what is needed is read, through the index of the bag: of an hour of samples the events, what
 the robot promised and felt, and what the analyzer published. Ankle torque is read only where a
@@ -59,7 +59,7 @@ class RecordedRun(Run):
     toe_off_bias: float = 0.0  # [s] by which the toe-offs of the events are late
     detector_errors: dict[str, Any] | None = None  # None if nobody knows the exact events
     ended_early: str = ""  # why the recording ended before the run did
-    # How what the analyzer published live differs from an analysis anew of the same onsets, a
+    # How what the analyzer published live differs from another analysis of the same onsets, a
     # line per topic; () if they are equal to the last bit, None if nothing was recorded.
     differences: tuple[str, ...] | None = None
 
@@ -74,7 +74,7 @@ def read_run(
     side: Side | None = None,
 ) -> RecordedRun:
     """
-    Read a bag, a folder or an ``.mcap`` file, and analyze it anew, whoever recorded it.
+    Read a bag, a folder or an ``.mcap`` file of any recorder, and analyze it again.
 
     ``settings`` are the numbers in the verdict. ``torques`` reads the ankle torque of the strides
     in figures. A pulse begins at its "commanded" or "measured" ``onset``, by default that of the
@@ -133,9 +133,9 @@ def protocol_and_side(
     """
     Return the protocol of a recorded run, if anybody tells it, and the perturbed leg.
 
-    A ``protocol`` that is given stands for the one in the bag, and a ``side`` for the protocol's.
+    A given ``protocol`` replaces the one in the bag, and a given ``side`` the protocol's.
     A recorder of another project keeps no protocol: the leg is then that on which the robot sat.
-    Raises BagError if the bag's protocol cannot be read, or nothing tells the leg.
+    Raises BagError if the bag's protocol cannot be read, or the leg is not known.
     """
     if protocol is None and (text := bag.custom_data.get("protocol", "").strip()):
         try:
@@ -150,7 +150,7 @@ def protocol_and_side(
     side = _side_in(bag, topic_names.TORQUE_PROFILE) if side is None else side
     if side is None:
         raise BagError(
-            f"{bag.path}: holds no run, or one of which nothing tells the perturbed leg: "
+            f"{bag.path}: holds no run, or does not say which leg is perturbed: "
             "give --side or --protocol"
         )
     return None, side
@@ -201,7 +201,7 @@ def _toe_off_bias(bag: BagReader) -> float:
 
 
 def _lost(bag: BagReader) -> int | None:
-    """Return how many messages of what was published are not here; None if nothing tells."""
+    """Return how many published messages are missing here; None if that is not known."""
     published: dict[str, int] = {}
     names = [n for n, topic in bag.topics.items() if topic.type.endswith("/PublishedCounts")]
     for _, message in bag.decoded(names) if names else ():

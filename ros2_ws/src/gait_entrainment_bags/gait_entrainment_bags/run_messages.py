@@ -162,10 +162,10 @@ class RunMessages:
             return None
         differences = []
         for relative in filter(self._names.get, results):
-            anew = [messages.result_values(result, side) for result in results[relative]]
+            current = [messages.result_values(result, side) for result in results[relative]]
             with fields_expected(relative):
                 found = list(self._values(relative, lambda message: message))
-                differences.append(_difference(relative, found, anew))
+                differences.append(_difference(relative, found, current))
         return tuple(filter(None, differences))
 
     def read_torques(self, side: Side, strides: Sequence[Stride]) -> AnkleTorques:
@@ -211,17 +211,17 @@ def fields_expected(topic: str) -> Iterator[None]:
         raise BagError(f"{topic}: {error}") from None
 
 
-def _difference(topic: str, published: Sequence[Any], anew: Sequence[dict[str, Any]]) -> str:
+def _difference(topic: str, published: Sequence[Any], current: Sequence[dict[str, Any]]) -> str:
     """Say where published messages first differ from results; an empty text if nowhere."""
-    for number, (message, values) in enumerate(zip(published, anew, strict=False), start=1):
+    for number, (message, values) in enumerate(zip(published, current, strict=False), start=1):
         for name, value in values.items():
             if name in _ADDED and not hasattr(message, name):
                 continue
             found = _plain(getattr(message, name))
             if _bits(found) != _bits(value):
-                return f"{topic}: {name} of message {number}: {found} recorded, {value} anew"
-    if len(published) != len(anew):
-        return f"{topic}: {len(published)} messages recorded, {len(anew)} anew"
+                return f"{topic}: {name} of message {number}: {found} recorded, {value} now"
+    if len(published) != len(current):
+        return f"{topic}: {len(published)} messages recorded, {len(current)} now"
     return ""
 
 

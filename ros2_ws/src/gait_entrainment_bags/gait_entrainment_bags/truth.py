@@ -22,7 +22,7 @@ WINDOW = 0.25
 
 
 def without_bias(events: Iterable[GaitEvent], bias: float) -> list[GaitEvent]:
-    """Return events whose toe-offs are known to be late by a bias [s] as they were."""
+    """Return events with a known bias [s] taken off their toe-offs."""
     late = nanoseconds(bias)
     return [
         replace(e, stamp=e.stamp - late) if late and e.kind is EventKind.TOE_OFF else e
@@ -98,7 +98,7 @@ def _errors_line(errors: dict[str, Any]) -> str:
 
 
 def detection_lines(outcome: dict[str, Any]) -> list[str]:
-    """Return lines for people on what detected the events; none where they are exact."""
+    """Return lines for people about what detected the events; [] if they are exact."""
     lines = []
     if bias := outcome.get("toe_off_bias"):
         lines.append(f"toe-off bias     {1e3 * bias:+.1f} ms, taken off every toe-off")

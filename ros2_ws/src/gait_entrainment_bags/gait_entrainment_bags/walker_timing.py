@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How well the walker of a recorded run kept time, as it said itself."""
+"""How well the walker of a recorded run kept time, as it reported."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from gait_entrainment_bags.topic_names import WALKER_TIMING
 
 
 def walker_timing(bag: Path) -> dict[str, dict[str, float]]:
-    """Return what the outcome says of it, from the walker's last word; {} of a bag without."""
+    """Return what the outcome says about it, by the walker's last report; {} without one."""
     with BagReader(bag) as reader:
         names = [name for name in reader.topics if name.endswith(f"/{WALKER_TIMING}")]
         told = [message for _, message in reader.decoded(names)][-1:]

@@ -30,7 +30,7 @@ from gait_entrainment_bags.metadata import (
 )
 
 ENDED_EARLY = "ended_early"
-"""Entry of the custom data of a bag whose recording ended before its time; says why."""
+"""Entry of the custom data of a bag whose recording ended early: why it did."""
 _COMPRESSIONS = {kind.name.lower(): kind for kind in CompressionType}  # none, lz4, zstd
 _MEBIBYTE = 2**20
 _DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
@@ -172,8 +172,8 @@ class BagWriter(AbstractContextManager["BagWriter"]):
         """
         Bring all that was written to the file, so that a crash of this process loses none of it.
 
-        A thread of its own then brings it to the disk, so that a loss of power loses only what
-        came after; the caller does not wait for that. Without new messages it costs nothing.
+        A separate thread then syncs it to the disk, so that a power failure loses only what came
+        after; the caller does not wait for that. Without new messages it costs nothing.
         """
         self._require_open()
         if self._flush_at is None:

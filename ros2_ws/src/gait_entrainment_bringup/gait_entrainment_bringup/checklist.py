@@ -64,7 +64,7 @@ def points(
         with driver.make(protocol.side, protocol.limits, protocol.seed) as robot:
             robot.configure()
             robot.activate()
-            yield Point("device", True, robot.identity or "answers; it does not say what it is")
+            yield Point("device", True, robot.identity or "answers, but does not say what it is")
             yield _loop(robot)
             yield _stop(robot, timeout)
     except DeviceError as error:
@@ -179,7 +179,7 @@ def _stop(robot: GuardedRobot, timeout: float) -> Point:
 
 
 def _watch(robot: GuardedRobot, over: Callable[[], bool], longest: float) -> float:
-    """Read a robot until something is so, or for a time [s]; return the torque measured last."""
+    """Read a robot until a condition holds, or for a time [s]; return the last torque measured."""
     give_up, measured = time.monotonic() + longest, math.nan
     while time.monotonic() < give_up and not over():
         time.sleep(0.01)

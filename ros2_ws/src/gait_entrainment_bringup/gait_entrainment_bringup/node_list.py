@@ -83,7 +83,7 @@ MOVED = (
 )
 # Nodes of a replay; if it is recorded, the recorder comes last.
 REPLAY_NODES = ("bag_player", "gait_analyzer")
-# Made anew in a replay, or of the processes that were recorded.
+# Published again in a replay, or about the processes that were recorded.
 NOT_REPLAYED = (
     "*/gait/strides",
     "*/gait/pulse_phases",

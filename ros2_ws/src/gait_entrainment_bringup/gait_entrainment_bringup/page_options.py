@@ -23,14 +23,14 @@ def add_page_options(parser: argparse.ArgumentParser) -> None:
         "--host", default="127.0.0.1", help="serve it at this address; another asks for a token"
     )
     group.add_argument("--port", default="8080", help="at this port (8080); 0: a free one")
-    group.add_argument("--token", default="", help="who brings it may act; default: one is made")
+    group.add_argument("--token", default="", help="whoever has it may act; default: a new one")
     group.add_argument(
         "--heartbeat",
         action="store_true",
         help="the page is the operator's sign of life, not a terminal: closed, it ends torque",
     )
     group.add_argument(
-        "--blinded", action="store_true", help="do not show what would tell the condition"
+        "--blinded", action="store_true", help="hide what would reveal the condition"
     )
     group.add_argument(
         "--foxglove", metavar="PORT", default="0", help="offer the same data to Foxglove there"

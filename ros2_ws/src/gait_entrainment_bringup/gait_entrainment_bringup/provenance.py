@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a bag keeps of how it came about: protocol, mode, versions, commit."""
+"""What a bag keeps about its origin: protocol, mode, versions, commit."""
 
 import json
 import subprocess
@@ -12,7 +12,7 @@ from gait_entrainment.protocol import Protocol, write_protocol
 
 
 def provenance(protocol: Protocol, *, real_time: bool, onset: str) -> dict[str, str]:
-    """Return what the bag keeps of how it came about."""
+    """Return what the bag keeps about its origin."""
     packages = ("gait_entrainment", "numpy", "mcap")
     return {
         "protocol": write_protocol(protocol),

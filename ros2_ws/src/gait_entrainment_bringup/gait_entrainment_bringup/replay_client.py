@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The client of a replay: starts the player, hears the analyzer out."""
+"""The client of a replay: starts the player, and collects what the analyzer publishes."""
 
 from std_srvs.srv import Trigger
 from tqdm import tqdm
@@ -26,7 +26,7 @@ NODES = ("gait_analyzer", "bag_player")
 
 class ReplayClient(Client):
     """
-    Lets a bag be played to a gait analyzer, and takes what the analyzer makes of it.
+    Has a bag played to a gait analyzer, and collects what the analyzer makes of it.
 
     ``namespace`` is that of the replay, without a slash at its end; ``recorded`` says whether a
     recorder listens, too. ``results`` are serialized messages by relative topic name, in the order

@@ -42,8 +42,7 @@ def conduct(
     Conduct a protocol through the experiment node to its end, and watch the processes meanwhile.
 
     ``on_start`` is called once the experiment has accepted it. In ``real_time`` this process comes
-    before others. Nodes that nobody else watches may
-    be silent for ``silence`` [s].
+    before others. Nodes that nobody else watches may be silent for ``silence`` [s].
 
     Raises
     ------

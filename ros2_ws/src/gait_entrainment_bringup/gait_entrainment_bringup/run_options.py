@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The options from which the parameters of the nodes follow, checked before anything starts."""
+"""The options that decide the parameters of the nodes, checked before anything starts."""
 
 import argparse
 import itertools
@@ -59,7 +59,7 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
 
 
 def add_conduct_options(parser: argparse.ArgumentParser, out: str) -> None:
-    """Add how whatever protocol is conducted, and what ``--out`` names."""
+    """Add the options of how a protocol is conducted, and ``--out`` with its meaning."""
     for option, text in _SWITCHES.items():
         parser.add_argument(option, action="store_true", help=text)
     for name, told in _NUMBERS.items():
@@ -106,7 +106,7 @@ def checked_run(
 
 
 def check_walker(walker: str, detector: str, *, real_time: bool) -> None:
-    """Raise UsageError if nobody could walk so, or nobody finds the events."""
+    """Raise UsageError if nobody would walk like this, or nothing would find the events."""
     if walker == "person" and not real_time:
         raise UsageError("--walker: a person walks in real time only; add --real-time")
     if walker != "simulated":
@@ -116,7 +116,7 @@ def check_walker(walker: str, detector: str, *, real_time: bool) -> None:
 
 
 def check_numbers(options: argparse.Namespace) -> None:
-    """Turn the options that are numbers into such; raises SettingError."""
+    """Convert the options that are numbers; raises SettingError."""
     for name, told in _NUMBERS.items():
         if (text := getattr(options, name)) is not None:
             setattr(options, name, told.parse(_option(name), text))
@@ -160,7 +160,7 @@ def check_output(bag: Path, option: str = "--out", *, exactly: bool = True) -> N
 @contextmanager
 def claimed_folder(bag: Path, *, exactly: bool) -> Iterator[Path]:
     """
-    Make the folder of a bag, which is this run's from then on; take away what stays empty.
+    Make the folder of a bag, which is this run's from then on; remove it if it stays empty.
 
     Unless it has to be ``exactly`` this one, a number is appended while another run has it.
     Raises UsageError if it is there already.

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A session as it goes: block after block, each in a process of its own, with rests between."""
+"""Conducting a session: block after block, each in its own process, with rests between."""
 
 import argparse
 import math
@@ -140,7 +140,7 @@ class SessionRun:
 
     def _in_a_process(self, protocol: Protocol, bag: Path, about: dict[str, str]) -> str:
         """
-        Conduct a block where no ROS was before; return why it failed, an empty text if it did not.
+        Conduct a block in a fresh process; return why it failed, an empty text if it did not.
 
         A run forks its nodes, which a process can do only before it has had a ROS context.
         """
@@ -202,7 +202,7 @@ def _delivered(bag: Path, protocol: Protocol) -> list[tuple[float, float]]:
     """
     Return height [N m] and width [s] of the pulses of a bag.
 
-    If it cannot be read, as after a crash, all that this protocol plans may have come.
+    If it cannot be read, as after a crash, every pulse of this protocol counts as delivered.
     """
     if not any(bag.iterdir()):  # nothing had begun
         return []

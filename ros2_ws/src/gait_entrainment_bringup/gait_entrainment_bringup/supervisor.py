@@ -4,7 +4,7 @@
 """
 The processes of a run: started together, watched, and stopped together, torque first.
 
-Each process writes a log of its own. If one ends before its time or falls silent, the error names
+Each process writes a log of its own. If one ends early or falls silent, the error names
 it and quotes the end of its log; the others are stopped within five seconds.
 """
 
@@ -46,7 +46,7 @@ class Supervisor:
         self._onlookers: set[str] = set()
 
     def start(self, node: str, arguments: Sequence[str], onlooker_of: str = "") -> None:
-        """Start a node of the package, or one of another that only looks on: it may end."""
+        """Start a node of the package, or an onlooker of another package, which may end."""
         module = f"{onlooker_of or f'{PACKAGE}.nodes'}.{node}"
         if onlooker_of:
             self._onlookers.add(node)

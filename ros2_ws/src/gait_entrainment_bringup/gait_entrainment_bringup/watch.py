@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""While a client waits: who has ended before its time, who has fallen silent."""
+"""While a client waits: which nodes have ended early, and which have fallen silent."""
 
 import time
 from collections.abc import Collection

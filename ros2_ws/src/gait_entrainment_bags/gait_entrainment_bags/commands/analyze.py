@@ -24,7 +24,7 @@ from gait_entrainment_commands.outcome import outcome_of, summary, timing_summar
 from gait_entrainment_commands.outcome_options import add_outcome_options
 from gait_entrainment_sensors.offline import read_events, read_onsets
 
-DESCRIPTION = "Analyze a bag anew, and hold the result against what was published live."
+DESCRIPTION = "Analyze a bag again, and compare the result with what was published live."
 EXAMPLES = """examples:
   entrain analyze bags/paper_example            outcome of a recorded run
   entrain analyze bags/paper_example --json     one JSON object, as of entrain simulate

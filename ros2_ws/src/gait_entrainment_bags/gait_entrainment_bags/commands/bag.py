@@ -16,10 +16,10 @@ from gait_entrainment_bags.reader import info, require_bag
 from gait_entrainment_bags.recovery import recover
 from gait_entrainment_bags.tables import FORMATS, ExportError, export
 
-DESCRIPTION = "Look into bags, check them, rescue them, make tables of them."
+DESCRIPTION = "Inspect, check, rescue and export bags."
 EXAMPLES = """examples:
   entrain bag info bags/paper_example
-  entrain bag check bags/*/                      this project's bags or anybody's
+  entrain bag check bags/*/                      this project's bags or any others
   entrain bag recover bags/broken bags/rescued   after a crash
   entrain bag export bags/paper_example tables --format parquet
 """
@@ -140,7 +140,7 @@ def _recover(options: argparse.Namespace) -> int:
         return code
     print(f"{count} messages rescued into {options.out}")
     if recovery.last:
-        print(f"the last one is of {_date(recovery.last)}")
+        print(f"the last one is from {_date(recovery.last)}")
     for loss in recovery.losses:
         print(f"missing: {loss}")
     if not recovery.losses:

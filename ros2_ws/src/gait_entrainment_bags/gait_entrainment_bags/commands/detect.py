@@ -49,14 +49,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--rate", type=float, metavar="HZ", help="instead of a column time [s]")
     for word, meaning in (
-        ("column", "column of the file that is meant by a name"),
-        ("marker", f"marker that is one of {', '.join(MARKERS)}"),
+        ("column", "which column of the file a name means"),
+        ("marker", f"which marker of the file is one of {', '.join(MARKERS)}"),
     ):
         parser.add_argument(
             f"--{word}", action="append", default=[], metavar="NAME=NAME_IN_FILE", help=meaning
         )
     parser.add_argument(
-        "--plates", metavar="SIDE,SIDE", help="whose foot each plate carries (two belts)"
+        "--plates", metavar="SIDE,SIDE", help="which foot is on each plate (two belts)"
     )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Options that tell of a recorded run what its bag, by whatever recorder, may not hold."""
+"""Options for what the bag of a recorded run lacks if another recorder made it."""
 
 import argparse
 from pathlib import Path
@@ -12,7 +12,7 @@ from gait_entrainment.protocol import read_protocol
 
 
 def add_record_options(parser: argparse.ArgumentParser, *, needed: bool = True) -> None:
-    """Add the bag, and the protocol and the perturbed leg that stand for those in it."""
+    """Add the bag, and options that replace its protocol and perturbed leg."""
     nargs = None if needed else "?"
     parser.add_argument("bag", nargs=nargs, type=Path, metavar="BAG", help="folder or .mcap file")
     parser.add_argument(
@@ -29,7 +29,7 @@ def add_record_options(parser: argparse.ArgumentParser, *, needed: bool = True) 
 
 
 def told_of_record(options: argparse.Namespace) -> dict[str, Any]:
-    """Return protocol and side as the options tell them, None where they do not."""
+    """Return protocol and side as given, None for what is not."""
     return {
         "protocol": options.protocol and read_protocol(options.protocol),
         "side": None if options.side is None else Side[options.side.upper()],

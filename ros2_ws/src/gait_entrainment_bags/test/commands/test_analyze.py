@@ -136,7 +136,7 @@ def test_the_bag_follows_every_rule_and_opens_without_ros_and_message_packages()
     ("name", "expected", "words"),
     [
         ("nowhere", 2, "no such file"),
-        ("foreign", 1, "nothing tells the perturbed leg"),
+        ("foreign", 1, "does not say which leg is perturbed"),
         ("text", 1, "not an MCAP"),
         ("protocol=\0", 1, "its protocol cannot be read"),
         ("onset=sideways", 1, "'sideways'; allowed: commanded, measured"),

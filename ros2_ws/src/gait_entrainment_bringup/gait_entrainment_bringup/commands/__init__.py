@@ -4,7 +4,7 @@
 """The commands that this package adds to `entrain`, one module each: name, and what it is for."""
 
 COMMANDS = {
-    "node": "one node of an experiment, where others run on other hosts or in other containers",
+    "node": "one node of an experiment whose others run on other hosts or in containers",
     "page": "what a run does, in a browser, with a stop that works",
     "preflight": "the checklist before a session with a real ankle robot",
     "replay": "a bag played to the gait analyzer over ROS 2",

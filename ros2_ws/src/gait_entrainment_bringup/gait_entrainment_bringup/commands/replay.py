@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""entrain replay: a bag played to the gait analyzer, its results held against those recorded."""
+"""entrain replay: a bag played to the gait analyzer, its results compared with the recorded."""
 
 import argparse
 import json

@@ -178,7 +178,7 @@ def load_report(figures: bool) -> None:
 
 def kept(bag: Path) -> str:
     """
-    Say what is left of a run that failed, having made it readable.
+    Make what is left of a failed run readable, and say where it is.
 
     A recorder that was killed could not close the bag; what reached the file is rescued.
     """

@@ -211,7 +211,7 @@ class Run:
         self._answer()
 
     def _latest_stamp(self) -> float:
-        """Return the latest stamp [ns since 1970] that can be over, by the time since the start."""
+        """Return the latest stamp [ns since 1970] that can be over, counted from the start."""
         if self._began is None:
             return math.inf
         return self._began + round(self._clock() * NANOSECONDS_PER_SECOND) + STAMP_TOLERANCE

@@ -72,7 +72,7 @@ class GaitAnalyzerNode(Participant):
 
     def run_of(self, message: Any) -> Run | None:
         """
-        Return the run of a message if it is analyzed; a newer run begins anew.
+        Return the run of a message if it is analyzed; a newer run replaces it.
 
         While a run goes on, only the first torque profile of another one begins that: a message
         with a wrong number must not end the analysis.

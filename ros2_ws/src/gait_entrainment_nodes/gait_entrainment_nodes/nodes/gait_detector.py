@@ -165,7 +165,9 @@ class GaitDetector(Participant):
 
     def _on_start(self, request: StartRun.Request, response: StartRun.Response) -> Any:
         if self.run is not None or (self._walked and not self.real_time):
-            response.message = "a run is in progress, or a lock-step run is over: start anew"
+            response.message = (
+                "a run is in progress, or a lock-step run is over: restart this node"
+            )
         elif waiting := self.not_ready():
             response.message = f"gait_detector waits for {waiting}"
         else:

@@ -144,7 +144,9 @@ class WalkerSim(Participant):
             response.message = f"run {self.run.number} is in progress"
         elif self._walked is not None and not self.settings.real_time:
             # Simulated time would go back to the fixed start, which /clock must never do.
-            response.message = "a lock-step run cannot be repeated in one process; start anew"
+            response.message = (
+                "a lock-step run cannot be repeated in one process; restart this node"
+            )
         else:
             self._walked, response.success = None, True
         return response

@@ -163,7 +163,7 @@ def _analysis(run: RecordedRun) -> Check:
         return Check("analysis", DOUBTFUL, "none was published live to compare with")
     if run.differences:
         return Check("analysis", BAD, f"differs from the live one: {'; '.join(run.differences)}")
-    return Check("analysis", GOOD, "anew, the same as live to the last bit")
+    return Check("analysis", GOOD, "repeated: the same as live to the last bit")
 
 
 def _topic(reader: BagReader, relative: str) -> str | None:

@@ -8,6 +8,6 @@ COMMANDS = {
     "lock": "all phase-locked gaits, stable or not, and the borders of the basin, solved",
     "paper": "every published number and figure beside ours",
     "phase-response": "response to single pulses, and the lock that it predicts",
-    "results": "write the page of results anew",
+    "results": "write the page of results",
     "sweep": "Arnold tongue: pulse period x torque x initial phase",
 }
