@@ -18,7 +18,7 @@ from gait_entrainment_bags.errors import (
 from gait_entrainment_bags.mcap_records import BagMessage
 from gait_entrainment_bags.metadata import INFINITE, QosProfile, TopicInfo
 from gait_entrainment_bags.playback import FASTEST, Moment, Playback, choose_topics
-from gait_entrainment_bags.reader import BagInfo, BagReader, info
+from gait_entrainment_bags.reader import BagReader
 from gait_entrainment_bags.recovery import Recovery, recover
 from gait_entrainment_bags.tables import ExportError, export
 from gait_entrainment_bags.writer import ENDED_EARLY, BagWriter

@@ -63,6 +63,11 @@ class BagReader(AbstractContextManager["BagReader"]):
         return self.end - self.start
 
     @property
+    def files(self) -> list[Path]:
+        """Files of the bag."""
+        return [file.path for file, _ in self._files]
+
+    @property
     def message_count(self) -> int:
         """Messages in the bag."""
         return sum(self.counts.values())
@@ -154,38 +159,6 @@ class BagReader(AbstractContextManager["BagReader"]):
         decoders = {name: decoder_for(self.topics[name]) for name in names}
         for message in self.messages(topics, start, end):
             yield message, decoders[message.topic](message.data)
-
-
-@dataclass(frozen=True)
-class BagInfo:
-    """What is in a bag; times in nanoseconds."""
-
-    path: str
-    files: tuple[str, ...]
-    size: int
-    start: int
-    duration: int
-    message_count: int
-    topics: tuple[tuple[str, str, int], ...]  # name, type, messages
-    custom_data: dict[str, str]
-    ros_distro: str
-
-
-def info(path: Path | str) -> BagInfo:
-    """Say what is in a bag, from its index alone; raises UnreadableBagError as BagReader does."""
-    with BagReader(path) as reader:
-        names = sorted(reader.topics)
-        return BagInfo(
-            path=str(reader.path),
-            files=tuple(str(file.path) for file, _ in reader._files),
-            size=reader.size,
-            start=reader.start,
-            duration=reader.duration,
-            message_count=reader.message_count,
-            topics=tuple((name, reader.topics[name].type, reader.counts[name]) for name in names),
-            custom_data=reader.custom_data,
-            ros_distro=reader.ros_distro,
-        )
 
 
 def differing_types(one: TopicInfo, other: TopicInfo) -> str:

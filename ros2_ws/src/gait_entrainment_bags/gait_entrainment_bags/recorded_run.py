@@ -93,10 +93,10 @@ def read_run(
         events = without_bias(record.events, bias)
         told = settings_for(protocol.sequence if protocol else (), settings)
         live = analyze(events, onsets[live_onset], live_side, told, record.unknown)
-        blocks = _conducted(protocol, record.events) if protocol else ()
+        blocks = conducted(protocol, record.events)
         begun = onsets[onset or live_onset]
         analysis, judged = analyze_blocks(blocks, events, begun, side, settings, record.unknown)
-        measured_period, pulse_period = _periods(blocks, analysis)
+        measured_period, pulse_period = periods_of(blocks, analysis)
         run = RecordedRun(
             protocol=protocol,
             name=Path(path).stem if protocol is None else protocol.name,
@@ -165,8 +165,10 @@ def _side_in(bag: BagReader, relative: str) -> Side | None:
     return None
 
 
-def _conducted(protocol: Protocol, events: Sequence[GaitEvent]) -> Sequence[BlockRun]:
-    """Return the blocks of a protocol, as they were planned on a walk."""
+def conducted(protocol: Protocol | None, events: Sequence[GaitEvent]) -> Sequence[BlockRun]:
+    """Return the blocks of a protocol, if there is one, as they were planned on a walk."""
+    if protocol is None:
+        return ()
     conductor = Conductor(protocol)
     try:
         for event in events:
@@ -176,15 +178,8 @@ def _conducted(protocol: Protocol, events: Sequence[GaitEvent]) -> Sequence[Bloc
     return conductor.blocks
 
 
-def periods_of(
-    protocol: Protocol | None, events: Sequence[GaitEvent], analysis: Analysis
-) -> tuple[float, float]:
-    """Return unperturbed and pulse period [s]: as a protocol plans them, else as analyzed."""
-    return _periods(_conducted(protocol, events) if protocol else (), analysis)
-
-
-def _periods(blocks: Sequence[BlockRun], analysis: Analysis) -> tuple[float, float]:
-    """Return unperturbed and pulse period [s]: as a protocol plans them, else as analyzed."""
+def periods_of(blocks: Sequence[BlockRun], analysis: Analysis) -> tuple[float, float]:
+    """Return unperturbed and pulse period [s]: as they were planned, else as analyzed."""
     if blocks:
         return blocks[-1].measured_period, blocks[-1].pulse_period
     last = analysis.entrainments[-1] if analysis.entrainments else None

@@ -19,7 +19,6 @@ from gait_entrainment_bags import (
     TopicInfo,
     UnreadableBagError,
     check,
-    info,
     recover,
 )
 from gait_entrainment_bags.decoding import decoder_for
@@ -168,16 +167,20 @@ def test_decodes_by_the_text_in_the_bag(
             next(found)
 
 
-def test_info_says_what_is_in_the_bag(small_bag: Path) -> None:
-    found = info(small_bag)
-    assert found.topics == (("/a", "p/msg/C", 3), ("/b", "p/msg/C", 1))
-    assert (found.start, found.duration, found.message_count) == (1, 3, 4)
-    assert found.custom_data == {"key": "value"}
-    assert found.ros_distro == "jazzy"
-    assert found.size == (small_bag / "small_0.mcap").stat().st_size
+def test_a_reader_knows_what_is_in_the_bag(small_bag: Path) -> None:
+    with BagReader(small_bag) as bag:
+        assert {name: topic.type for name, topic in bag.topics.items()} == {
+            "/a": "p/msg/C",
+            "/b": "p/msg/C",
+        }
+        assert bag.counts == {"/a": 3, "/b": 1}
+        assert (bag.start, bag.end, bag.message_count) == (1, 4, 4)
+        assert bag.custom_data == {"key": "value"}
+        assert bag.ros_distro == "jazzy"
+        assert bag.size == (small_bag / "small_0.mcap").stat().st_size
 
 
-def test_info_and_single_topics_read_the_index_only(
+def test_counts_and_single_topics_read_the_index_only(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with BagWriter(tmp_path / "walk", ros_distro="jazzy", chunk_size=1000) as writer:
@@ -195,9 +198,9 @@ def test_info_and_single_topics_read_the_index_only(
         return read_chunk(file, chunk)  # type: ignore[arg-type]
 
     monkeypatch.setattr(McapFile, "chunk_data", count)
-    assert info(tmp_path / "walk").message_count == 1001
-    assert opened == []
     with BagReader(tmp_path / "walk") as reader:
+        assert reader.message_count == 1001
+        assert opened == []
         assert [message.data for message in reader.messages(["/d"])] == [b"rare"]
     assert len(opened) == 1
 
@@ -340,7 +343,7 @@ def test_broken_metadata_file_does_not_keep_from_reading(small_bag: Path, tmp_pa
     (folder / "metadata.yaml").write_text(": [")
     with BagReader(folder) as reader:
         assert reader.message_count == 12
-        assert [path.name for path in map(Path, info(folder).files)] == [
+        assert [path.name for path in reader.files] == [
             "bag_0.mcap",
             "bag_2.mcap",
             "bag_10.mcap",

@@ -13,6 +13,7 @@ from gait_entrainment.run import Run
 from gait_entrainment_bags.commands.record_options import add_record_options, told_of_record
 from gait_entrainment_bags.figures import draw_figures
 from gait_entrainment_bags.recorded_run import (
+    conducted,
     messages_line,
     periods_of,
     read_run,
@@ -106,7 +107,7 @@ def _of_tables(options: argparse.Namespace) -> int:
     bias = float(TOE_OFF_BIAS.parse("--toe-off-bias", options.toe_off_bias or "0"))
     events, onsets = read_events(options.events), read_onsets(options.pulses)
     analysis = analyze(without_bias(events, bias), onsets, told["side"])
-    periods = periods_of(told["protocol"], events, analysis)
+    periods = periods_of(conducted(told["protocol"], events), analysis)
     run = Run(told["protocol"], tuple(events), tuple(onsets), (), *periods, analysis, ())
     outcome = outcome_of(run) | ({"toe_off_bias": bias} if bias else {})
     lines = [summary(outcome), *detection_lines(outcome)]

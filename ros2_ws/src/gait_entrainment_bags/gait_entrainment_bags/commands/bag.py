@@ -12,7 +12,7 @@ from pathlib import Path
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment_bags.checks import Severity, check
-from gait_entrainment_bags.reader import info, require_bag
+from gait_entrainment_bags.reader import BagReader, require_bag
 from gait_entrainment_bags.recovery import recover
 from gait_entrainment_bags.tables import FORMATS, ExportError, export
 
@@ -86,26 +86,36 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _info(options: argparse.Namespace) -> int:
-    found = info(options.bag)
+    with BagReader(options.bag) as bag:
+        duration = bag.end - bag.start
+        topics = [(name, bag.topics[name].type, bag.counts[name]) for name in sorted(bag.topics)]
     if options.json:
-        topics = [
-            {"name": name, "type": type_name, "messages": count}
-            for name, type_name, count in found.topics
-        ]
-        print(json.dumps(asdict(found) | {"topics": topics}))
+        columns = ("name", "type", "messages")
+        told = {
+            "path": str(bag.path),
+            "files": [*map(str, bag.files)],
+            "size": bag.size,
+            "start": bag.start,
+            "duration": duration,
+            "message_count": bag.message_count,
+            "topics": [dict(zip(columns, topic, strict=True)) for topic in topics],
+            "custom_data": bag.custom_data,
+            "ros_distro": bag.ros_distro,
+        }
+        print(json.dumps(told))
         return 0
-    print(f"files      {len(found.files)}, {found.size / 1e6:.1f} MB")
-    for file in found.files:
+    print(f"files      {len(bag.files)}, {bag.size / 1e6:.1f} MB")
+    for file in bag.files:
         print(f"           {file}")
-    if found.message_count:
-        print(f"start      {_date(found.start)}")
-        print(f"duration   {found.duration / NANOSECONDS_PER_SECOND:.3f} s")
-    print(f"recorded   with ROS 2 {found.ros_distro or 'of unknown distribution'}")
-    print(f"messages   {found.message_count}")
-    width = max((len(name) for name, _, _ in found.topics), default=0)
-    for name, type_name, count in found.topics:
+    if bag.message_count:
+        print(f"start      {_date(bag.start)}")
+        print(f"duration   {duration / NANOSECONDS_PER_SECOND:.3f} s")
+    print(f"recorded   with ROS 2 {bag.ros_distro or 'of unknown distribution'}")
+    print(f"messages   {bag.message_count}")
+    width = max((len(name) for name in bag.topics), default=0)
+    for name, type_name, count in topics:
         print(f"{count:>10} {name:<{width}} {type_name}")
-    for key, value in found.custom_data.items():
+    for key, value in bag.custom_data.items():
         lines = value.strip().splitlines() or [""]
         print(f"{key}: {lines[0]}" if len(lines) == 1 else f"{key}:")
         for line in lines if len(lines) > 1 else []:

@@ -9,6 +9,7 @@ from typing import Any
 from rosidl_parser.definition import AbstractNestedType, NamespacedType
 
 from gait_entrainment_bags.decoding import decoder_for
+from gait_entrainment_bags.definitions import SEPARATOR, fields_of
 from gait_entrainment_bags.metadata import TopicInfo
 from gait_entrainment_nodes.messaging.raw_messages import message_class, serialize
 
@@ -24,10 +25,11 @@ def converter_of(topic: TopicInfo) -> Callable[[bytes], bytes] | None:
     if not topic.type.startswith(_OWN):
         return None
     installed = message_class(topic.type)
-    recorded = topic.schema_text.partition("=" * 80)[0].splitlines()
-    declared = [line.partition("#")[0].split() for line in recorded]
-    names = {words[1] for words in declared if len(words) == 2 and "=" not in words[1]}
-    if not names <= installed.get_fields_and_field_types().keys():
+    recorded = topic.schema_text.partition(SEPARATOR)[0]
+    if (
+        not {field.name for field in fields_of(recorded, _OWN)}
+        <= installed.get_fields_and_field_types().keys()
+    ):
         return None
     decode = decoder_for(topic)
     return lambda data: serialize(_filled(installed(), decode(data)))
