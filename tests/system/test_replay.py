@@ -156,7 +156,7 @@ def test_a_run_in_a_namespace_is_replayed_and_recorded_there(live: Path, tmp_pat
 
 
 def test_an_analyzer_that_hangs_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(replay_client, "PATIENCE", 3.0)
+    monkeypatch.setattr(replay_client, "TIMEOUT", 3.0)
     monkeypatch.setattr(supervisor, "METHOD", "spawn")  # other tests have left threads here
     call = replay_client.ReplayClient.call
 

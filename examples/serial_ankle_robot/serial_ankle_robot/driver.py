@@ -105,11 +105,11 @@ class SerialDevice(TorqueDevice):
         at_zero = abs(torque) <= 0.05 * self.capabilities.peak_torque
         self._require(at_zero, f"shows {torque:g} N m at zero command: is the joint free?")
 
-    def exchange(self, torque: float, patience: float) -> Reading | None:
+    def exchange(self, torque: float, timeout: float) -> Reading | None:
         """Send a torque; return the reply to it."""
         ratio = self._options.ratio
         self._send(TORQUE, torque / ratio)
-        reply = self._reply(patience)
+        reply = self._reply(timeout)
         if reply is None:
             return None
         faults = tuple(fault for bit, fault in _FAULTS.items() if reply.status & bit)
@@ -164,10 +164,10 @@ class SerialDevice(TorqueDevice):
         command = Command(self._number, mode, min(max(torque, -peak), peak))
         self._line.write(command.pack())
 
-    def _reply(self, patience: float) -> Reply | None:
+    def _reply(self, timeout: float) -> Reply | None:
         """Return the reply to the last command; None if it does not come in time [s]."""
         assert self._line is not None
-        give_up = time.monotonic() + patience
+        give_up = time.monotonic() + timeout
         while (left := give_up - time.monotonic()) > 0:
             select.select([self._line], [], [], left)
             self._received += self._line.read(self._line.in_waiting)

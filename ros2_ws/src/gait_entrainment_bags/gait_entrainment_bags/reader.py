@@ -7,7 +7,6 @@ import math
 from bisect import bisect_left
 from collections.abc import Collection, Iterator
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import Any
 

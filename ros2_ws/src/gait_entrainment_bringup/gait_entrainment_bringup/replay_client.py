@@ -10,7 +10,7 @@ from gait_entrainment_bringup.supervisor import Supervisor
 from gait_entrainment_bringup.watch import Watch
 from gait_entrainment_msgs.msg import PublishedCounts
 from gait_entrainment_msgs.srv import Ready
-from gait_entrainment_nodes.messaging.client import PATIENCE, Client
+from gait_entrainment_nodes.messaging.client import TIMEOUT, Client
 from gait_entrainment_nodes.messaging.errors import SilenceError
 from gait_entrainment_nodes.messaging.player_services import srv
 from gait_entrainment_nodes.messaging.topics import (
@@ -43,7 +43,7 @@ class ReplayClient(Client):
         self.subscribe(PUBLISHED_COUNTS, self._on_counts)
         # Player and recorder end by themselves once everything was played and recorded.
         may_end = ("bag_player", "bag_recorder")
-        self.each_round = Watch(self, supervisor, may_end=may_end, asked=NODES, silence=PATIENCE)
+        self.each_round = Watch(self, supervisor, may_end=may_end, asked=NODES, silence=TIMEOUT)
 
     def play(self, *, quiet: bool) -> None:
         """Play the bag, wait for all that the analyzer makes of it; NodeError if a node fails."""
@@ -59,8 +59,8 @@ class ReplayClient(Client):
         with bar:
             self.wait(played)
         self.call(Trigger, "gait_analyzer/finish")
-        if not self.wait(self._complete, PATIENCE):
-            raise SilenceError("gait_analyzer/finish", PATIENCE)
+        if not self.wait(self._complete, TIMEOUT):
+            raise SilenceError("gait_analyzer/finish", TIMEOUT)
 
     def _all_listen(self, answer: Ready.Response) -> bool:
         """Whether a node is ready and everyone will hear it: this client, a recorder if any."""

@@ -23,7 +23,7 @@ from gait_entrainment_nodes.messaging.environment import PACKAGE, set_environmen
 from gait_entrainment_nodes.messaging.errors import NodeError
 
 # How long a process may take to stop by itself [s]; all together take less than five seconds.
-PATIENCE = 1.5
+TIMEOUT = 1.5
 # How long the recorder may take to close the bag after the experiment or replay has ended [s].
 CLOSING_TIMEOUT = 15.0
 LOG_LINES = 8
@@ -103,7 +103,7 @@ class Supervisor:
         with undisturbed():
             for group in (running[:1], running[1:-1], running[1:][-1:]):
                 self.request_stop(group)
-                deadline = time.monotonic() + PATIENCE
+                deadline = time.monotonic() + TIMEOUT
                 for node in group:
                     if self.wait(node, max(deadline - time.monotonic(), 0)) is None:
                         self._processes[node].kill()

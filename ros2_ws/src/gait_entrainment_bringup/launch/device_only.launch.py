@@ -50,7 +50,7 @@ def bring_up(perturbator: str, client: Client) -> None:
     client.wait_to_be_known(perturbator, math.inf)
     for name, number in TRANSITIONS.items():
         request = ChangeState.Request(transition=Transition(id=number))
-        answer = client.call(ChangeState, service, request, period=math.inf, patience=math.inf)
+        answer = client.call(ChangeState, service, request, period=math.inf, timeout=math.inf)
         if not answer.success:
             raise shared.LaunchError(f"perturbator refused to {name}; its log says why")
 

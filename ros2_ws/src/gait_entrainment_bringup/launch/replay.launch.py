@@ -35,7 +35,7 @@ def nodes(context: LaunchContext) -> list[Action]:
 
     def finish(client: Client) -> None:
         """Let the analyzer publish its last word, then end the launch."""
-        client.call(Trigger, f"{namespace}/gait_analyzer/finish", patience=math.inf)
+        client.call(Trigger, f"{namespace}/gait_analyzer/finish", timeout=math.inf)
         over = Shutdown(reason="the bag is played and analyzed")
         context.asyncio_loop.call_soon_threadsafe(context.emit_event_sync, over)
 

@@ -61,11 +61,11 @@ class AkMotorOnCan(CanMotor):
         self._ask(lambda: self._tell(ak_mit.ENTER), self._reply)
         self._require_zero_torque(f"is it {self._options.motor}?")
 
-    def exchange(self, torque: float, patience: float) -> Reading | None:
+    def exchange(self, torque: float, timeout: float) -> Reading | None:
         """Send a torque; return the newest reply."""
         ratio = self._options.ratio
         self._command(torque / ratio)
-        reply = self._answer(self._reply, time.monotonic() + patience)
+        reply = self._answer(self._reply, time.monotonic() + timeout)
         if reply is None:
             return None
         measured = reply.torque * ratio

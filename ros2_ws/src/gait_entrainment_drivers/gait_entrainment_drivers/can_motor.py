@@ -133,8 +133,8 @@ class CanMotor(TorqueDevice):
         After that time no frame is read: they may come faster than they are read.
         """
         newest = None
-        while (patience := give_up - time.monotonic()) >= 0:
-            message = self._bus.recv(patience if newest is None else 0.0)
+        while (left := give_up - time.monotonic()) >= 0:
+            message = self._bus.recv(left if newest is None else 0.0)
             if message is None:
                 break
             if message.is_error_frame or message.is_remote_frame or message.is_extended_id:

@@ -37,7 +37,7 @@ class TorqueDevice(ABC):
     open       connect, and see that the right device answers           DeviceError
     enable     enable the device at zero torque                         DeviceError
     exchange   send a torque, return the answer or None if none came    anything: the loop counts
-               in time; return within ``patience``                      it as silence, goes on
+               in time; return within ``timeout``                      it as silence, goes on
                                                                         sending zero and reports
                                                                         the text
     forget     drop answers that have come and were not read: the loop  as exchange
@@ -72,7 +72,7 @@ class TorqueDevice(ABC):
         """Enable the device at zero torque."""
 
     @abstractmethod
-    def exchange(self, torque: float, patience: float) -> Reading | None:
+    def exchange(self, torque: float, timeout: float) -> Reading | None:
         """Send a torque [N m]; return the answer, or None if none comes in time [s]."""
 
     @abstractmethod

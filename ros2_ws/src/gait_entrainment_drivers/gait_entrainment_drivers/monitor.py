@@ -74,7 +74,7 @@ class Monitor:
         self._settings = settings
         self.band = settings.torque_band * peak_torque
         self._lag = 1 / (2 * math.pi * bandwidth)
-        self._patience = settings.torque_time + 2 * self._lag
+        self._tolerated = settings.torque_time + 2 * self._lag
         self._command = 0.0  # held since the last reading [N m]
         self._expected = 0.0  # the command behind the lag [N m]
         self._at = -math.inf  # instant of the last command [s]
@@ -102,6 +102,6 @@ class Monitor:
         possible = (self._expected, self._before, self._command)
         outside = max(min(possible) - reading.torque, reading.torque - max(possible)) > self.band
         self._outside_since = min(self._outside_since, now) if outside else math.inf
-        if now - self._outside_since > self._patience:
+        if now - self._outside_since > self._tolerated:
             found.append(NOT_FOLLOWED)
         return tuple(found)

@@ -76,7 +76,7 @@ class OdriveAxis(CanMotor):
         self._errors, self._old_reason = 0, None
         self._require_zero_torque("is it calibrated?")
 
-    def exchange(self, torque: float, patience: float) -> Reading | None:
+    def exchange(self, torque: float, timeout: float) -> Reading | None:
         """Ask for torque, position, velocity and errors, then send a torque."""
         ratio, peak = self._options.ratio, self._options.motor_torque
         if time.monotonic() - self._beat_at > HEARTBEAT_PERIOD:
@@ -84,7 +84,7 @@ class OdriveAxis(CanMotor):
         for question in (odrive.TORQUES, next(self._questions)):
             self._command(question, remote=True)
         self._command(odrive.SET_TORQUE, odrive.pack_torque(torque / ratio, peak))
-        measured = self._answer(self._torque, time.monotonic() + patience)
+        measured = self._answer(self._torque, time.monotonic() + timeout)
         if measured is None:
             return None
         faults = odrive.faults_of(self._heartbeat.error | self._errors)

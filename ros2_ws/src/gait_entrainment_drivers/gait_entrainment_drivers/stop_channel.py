@@ -95,12 +95,12 @@ def listening() -> list[str]:
     return sorted(name.removeprefix(marker) for name in names if name.startswith(marker))
 
 
-def stop_all(patience: float = 0.5) -> dict[str, StopAnswer | None]:
+def stop_all(timeout: float = 0.5) -> dict[str, StopAnswer | None]:
     """
     Ask every robot of this machine to bring its torque to zero.
 
     The script ``entrain`` has asked already; then its socket is taken over, and the answers read.
-    Returns the answers by name; None for a robot that did not answer within ``patience`` [s].
+    Returns the answers by name; None for a robot that did not answer within ``timeout`` [s].
     """
     if asked := os.environ.pop(_ASKED, ""):
         descriptor, *names = asked.split()
@@ -112,7 +112,7 @@ def stop_all(patience: float = 0.5) -> dict[str, StopAnswer | None]:
         names = [name for name in listening() if _ask(asker, name)]
     with asker:
         answers: dict[str, StopAnswer | None] = dict.fromkeys(names)
-        give_up = time.monotonic() + patience
+        give_up = time.monotonic() + timeout
         while None in answers.values() and (left := give_up - time.monotonic()) > 0:
             if select.select([asker], [], [], left)[0]:
                 data, address = asker.recvfrom(_LARGEST_ANSWER)

@@ -27,8 +27,8 @@ def emulator(*arguments, trace=None, program="ak_motor_emulator", driver="ak_mit
     try:
         assert "ready" in process.stdout.readline()
         # Patience for a machine that others share; the limits themselves are tested one by one.
-        patience = "rate=250,silence=0.3,lateness=0.5,host_silence=3"
-        yield f"{driver}:interface=udp_multicast,channel={CHANNEL},port={port},{patience}"
+        generous = "rate=250,silence=0.3,lateness=0.5,host_silence=3"
+        yield f"{driver}:interface=udp_multicast,channel={CHANNEL},port={port},{generous}"
     finally:
         process.terminate()
         process.wait(10)
@@ -42,9 +42,9 @@ def read_trace(path):
     return [(int(time_ns), float(command), float(torque)) for time_ns, command, torque in rows]
 
 
-def until(condition, patience=10.0):
+def until(condition, timeout=10.0):
     """Wait for a condition, with an end."""
-    give_up = time.monotonic() + patience
+    give_up = time.monotonic() + timeout
     while not condition():
         assert time.monotonic() < give_up, "it did not happen in time"
         time.sleep(0.005)

@@ -66,7 +66,7 @@ class MisbehavingDevice(TorqueDevice):
     def shut(self) -> None:
         """Nothing to release."""
 
-    def exchange(self, torque: float, patience: float) -> Reading | None:
+    def exchange(self, torque: float, timeout: float) -> Reading | None:
         """Follow the command, or do what goes wrong."""
         now = time.monotonic()
         if torque and math.isinf(self._first):
@@ -80,7 +80,7 @@ class MisbehavingDevice(TorqueDevice):
             time.sleep(0.2)
         reading = Reading(self._follow(torque, now), 0.1, 0.0, 30.0)
         if does == "answer no more":
-            time.sleep(patience)
+            time.sleep(timeout)
             return None
         return {
             "push 12 N m": Reading(12.0, 0.1),

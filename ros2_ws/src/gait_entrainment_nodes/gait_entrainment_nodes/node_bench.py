@@ -39,7 +39,7 @@ from gait_entrainment_nodes.messaging.stamps import header, to_time
 from gait_entrainment_nodes.messaging.topics import HORIZON, PULSES, ROBOT_STATE, TORQUE_PROFILE
 
 # How long an answer may take, and how long to wait for one that must not come [s].
-PATIENCE = 5.0
+TIMEOUT = 5.0
 SILENCE = 0.3
 # How far horizons lead in real time [ns].
 LEAD = 200_000_000
@@ -77,7 +77,7 @@ class _NodeRobot:
         self._train = f"{name}/deliver_pulse_train"
         ready.append(self.client.action(DeliverPulseTrain, self._train).server_is_ready)
         ready.append(self._horizons.get_subscription_count)
-        if not self.client.wait(lambda: all(known() for known in ready), PATIENCE):
+        if not self.client.wait(lambda: all(known() for known in ready), TIMEOUT):
             self.client.close()
             raise DeviceError(
                 f"no node {name} with {', '.join(kinds)}, deliver_pulse_train and a subscription "
@@ -104,7 +104,7 @@ class _NodeRobot:
 
     def schedule(self, train: PulseTrain) -> None:
         goal = goal_of(self.run, self.key, train)
-        handle = self.client.send_goal(DeliverPulseTrain, self._train, goal, patience=PATIENCE)
+        handle = self.client.send_goal(DeliverPulseTrain, self._train, goal, timeout=TIMEOUT)
         if not handle.accepted:
             unarmed = not (self.capabilities.simulated or self._arm)
             raise LimitError(f"rejected{'; a real robot must be armed: --arm' if unarmed else ''}")
@@ -114,15 +114,15 @@ class _NodeRobot:
         """Send a horizon; return what is promised once that reaches an instant [ns]."""
         simulated = self.capabilities.simulated
         horizon = until if simulated else until + LEAD
-        run, patience = (self.run, PATIENCE) if self._active else (self.run + 1, SILENCE)
+        run, timeout = (self.run, TIMEOUT) if self._active else (self.run + 1, SILENCE)
         pieces: list[tuple[int, int, float]] = []
         onsets: list[int] = []
         if self._promised_until < until:  # a horizon without length would end the run
             begin, end = header(self._promised_until), to_time(horizon)
             self._horizons.publish(Horizon(header=begin, run=run, until=end, seal=SEAL))
         while self._promised_until < until:
-            if not self.client.wait(lambda: self._profiles, patience):
-                raise DeviceError(f"A horizon was not answered within {patience:g} s.")
+            if not self.client.wait(lambda: self._profiles, timeout):
+                raise DeviceError(f"A horizon was not answered within {timeout:g} s.")
             message = self._profiles.pop(0)
             require(message.run == run, f"A profile has run {message.run} instead of {run}.")
             profile = profile_of(message)
@@ -144,7 +144,7 @@ class _NodeRobot:
 
     def cancel(self) -> None:
         answer = self._end(self.goal.cancel_goal_async)
-        require(self.client.wait(answer.done, PATIENCE), "Cancelling was not answered.")
+        require(self.client.wait(answer.done, TIMEOUT), "Cancelling was not answered.")
 
     def stop(self) -> None:
         _require(self._end(lambda: self._call(Trigger, "stop")), "stopped")
@@ -170,7 +170,7 @@ class _NodeRobot:
     def _end(self, call: Callable[[], Any]) -> Any:
         """Call what ends the torque; if there may be any, the walker must get a stop."""
         stops, answer = self._stops, call()
-        stopped = not self.goal or self.client.wait(lambda: self._stops > stops, PATIENCE)
+        stopped = not self.goal or self.client.wait(lambda: self._stops > stops, TIMEOUT)
         require(stopped, "No profile with the stop flag was published.")
         self.goal = None
         return answer
@@ -181,7 +181,7 @@ class _NodeRobot:
 
     def _call(self, service: Any, name: str, request: Any = None) -> Any:
         path = f"{self._name}/{name}"
-        return self.client.call(service, path, request, period=math.inf, patience=PATIENCE)
+        return self.client.call(service, path, request, period=math.inf, timeout=TIMEOUT)
 
     def _hear_profile(self, message: Any) -> None:
         if message.run == self.run:
@@ -237,7 +237,7 @@ class NodeBench(Bench):
             self.states.extend(self.robot.read())
             return condition()
 
-        return bool(self.robot.client.wait(shown, PATIENCE))
+        return bool(self.robot.client.wait(shown, TIMEOUT))
 
     def require_delivered(self, train: PulseTrain) -> None:
         """See that every pulse is reported and announced once, and the goal ends as delivered."""
@@ -245,7 +245,7 @@ class NodeBench(Bench):
         announced, onsets = self.robot.announced, self.onsets
         self.wait_for(lambda: len(announced) >= len(onsets))
         require(announced == onsets, f"Pulses at {announced} were announced for {onsets} ns.")
-        ended = self.robot.client.result(self.robot.goal, PATIENCE)
+        ended = self.robot.client.result(self.robot.goal, TIMEOUT)
         require(ended, "A delivered train did not end.")
         outcome, delivered = ended.result.outcome, ended.result.delivered
         require(

@@ -160,10 +160,10 @@ class EffortJoint(TorqueDevice):
             self._switch(activate=True)
         self._publish(0.0)
 
-    def exchange(self, torque: float, patience: float) -> Reading | None:
+    def exchange(self, torque: float, timeout: float) -> Reading | None:
         """Publish a torque; return the joint's state if a new one has come or comes meanwhile."""
         self._publish(torque / self._options.ratio)
-        self._spin(lambda: self._state is not None, patience)
+        self._spin(lambda: self._state is not None, timeout)
         state, self._state = self._state, None
         return None if state is None else self._reading(state)
 
@@ -218,9 +218,9 @@ class EffortJoint(TorqueDevice):
         command[self._options.joint_index] = effort
         self._commands.publish(Float64MultiArray(data=command))
 
-    def _spin(self, until: Callable[[], bool], patience: float) -> bool:
+    def _spin(self, until: Callable[[], bool], timeout: float) -> bool:
         """Take what comes until something is so; return whether it is."""
-        give_up = time.monotonic() + patience
+        give_up = time.monotonic() + timeout
         while not (so := until()) and (left := give_up - time.monotonic()) > 0:
             self._executor.spin_once(timeout_sec=left)
         return so

@@ -58,7 +58,7 @@ def test_a_question_keeps_the_latest_answer(client, asked):
 
 
 def test_waits_to_be_known_without_asking_for_more(client, asked):
-    client.wait_to_be_known("answers", patience=10)
+    client.wait_to_be_known("answers", timeout=10)
     before = len(asked)
     assert client.call(Ready, "answers/ready", period=float("inf")).waiting_for
     assert len(asked) == before + 1
@@ -66,7 +66,7 @@ def test_waits_to_be_known_without_asking_for_more(client, asked):
 
 def test_silence_is_told_by_name(client):
     with pytest.raises(SilenceError, match=r"nobody/ready within 0\.1 s") as error:
-        client.call(Ready, "nobody/ready", patience=0.1)
+        client.call(Ready, "nobody/ready", timeout=0.1)
     assert error.value.node == "nobody"
     assert error.value.exit_code == 1
 

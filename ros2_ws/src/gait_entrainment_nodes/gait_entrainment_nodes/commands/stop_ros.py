@@ -15,7 +15,7 @@ from gait_entrainment_nodes.messaging.environment import require_usable_environm
 # How long to look for perturbators [s]; in a domain that a run has claimed, until one is found and
 # all have answered, but no longer than this.
 DISCOVERY = 2.0
-PATIENCE = 6.0
+TIMEOUT = 6.0
 # The domain of nodes that were started one by one, without a run that claims a domain.
 DEFAULT_DOMAIN = 0
 # A stop service belongs to a perturbator if the same node takes pulse trains.
@@ -37,10 +37,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Stop everything; 1 if nothing was found, or a stop was not confirmed."""
     require_usable_environment()
-    domains = {DEFAULT_DOMAIN: DISCOVERY, **dict.fromkeys(domains_in_use(), PATIENCE)}
+    domains = {DEFAULT_DOMAIN: DISCOVERY, **dict.fromkeys(domains_in_use(), TIMEOUT)}
     try:
         if (wanted := wanted_domain()) is not None:
-            domains = {wanted: PATIENCE}
+            domains = {wanted: TIMEOUT}
     except DomainError as error:
         print(f"entrain stop-ros: {error}; stopping every run", file=sys.stderr)
     answers: dict[str, str | None] = {}
@@ -61,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
     return 0 if answers and not silent else 1
 
 
-def stop_all(domain: int, patience: float) -> dict[str, str | None]:
+def stop_all(domain: int, timeout: float) -> dict[str, str | None]:
     """Call every stop service in a domain; return the answers, None if no stop is confirmed."""
     # Not at the top: they load ROS, which is to find an environment that it can start in.
     from std_srvs.srv import Trigger
@@ -81,6 +81,6 @@ def stop_all(domain: int, patience: float) -> dict[str, str | None]:
             done = all_answered(calls.values()) and time.monotonic() > look_until
             return bool(calls) and done
 
-        client.wait(all_stopped, patience)
+        client.wait(all_stopped, timeout)
     answers = {f"domain {domain} {name}": call.accepted for name, call in calls.items()}
     return {name: a.message if a and a.success else None for name, a in answers.items()}

@@ -29,7 +29,7 @@ from gait_entrainment_nodes.messaging.errors import SilenceError
 from gait_entrainment_nodes.messaging.topics import Topic
 
 # How long to wait for a node before it counts as silent [s].
-PATIENCE = 60.0
+TIMEOUT = 60.0
 # When to ask again [s].
 ASKING_PERIOD = 0.1
 # How long to listen before a condition is looked at again, even if nothing arrives [s].
@@ -124,9 +124,9 @@ class Client:
         """Hear a topic; ``raw`` gives the callback serialized messages."""
         self.node.create_subscription(topic.type, topic.name, callback, topic.qos, raw=raw)
 
-    def wait(self, condition: Callable[[], Any], patience: float = math.inf) -> Any:
-        """Serve ROS until a condition holds, at most ``patience`` [s]; return its last value."""
-        give_up = time.monotonic() + patience
+    def wait(self, condition: Callable[[], Any], timeout: float = math.inf) -> Any:
+        """Serve ROS until a condition holds, at most ``timeout`` [s]; return its last value."""
+        give_up = time.monotonic() + timeout
         while not (value := condition()) and time.monotonic() < give_up:
             self._executor.spin_once(timeout_sec=ROUND)
             self.each_round()
@@ -166,22 +166,22 @@ class Client:
         name: str,
         request: Any = None,
         *,
-        patience: float = PATIENCE,
+        timeout: float = TIMEOUT,
         **asking: Any,
     ) -> Any:
-        """Ask as ``ask`` does and return the answer; SilenceError after ``patience`` [s]."""
+        """Ask as ``ask`` does and return the answer; SilenceError after ``timeout`` [s]."""
         question = self.ask(service_type, name, request, **asking)
-        return self._expect(question.answer, name, patience)
+        return self._expect(question.answer, name, timeout)
 
-    def wait_to_be_known(self, node: str, patience: float = PATIENCE) -> None:
+    def wait_to_be_known(self, node: str, timeout: float = TIMEOUT) -> None:
         """
         Wait until a node of this project knows everything that this client has made so far.
 
-        SilenceError if it does not answer within ``patience`` [s].
+        SilenceError if it does not answer within ``timeout`` [s].
         """
         name = f"{node}/ready"
         self._services.pop(name, None)  # to be made anew, behind everything else
-        self._expect(self.ask(Ready, name).answer, name, patience)
+        self._expect(self.ask(Ready, name).answer, name, timeout)
 
     def send_goal(
         self,
@@ -190,21 +190,21 @@ class Client:
         goal: Any,
         *,
         on_feedback: Callable[[Any], object] | None = None,
-        patience: float = PATIENCE,
+        timeout: float = TIMEOUT,
     ) -> Any:
-        """Return the handle of a goal, accepted or not; SilenceError after ``patience`` [s]."""
+        """Return the handle of a goal, accepted or not; SilenceError after ``timeout`` [s]."""
         action = self.action(action_type, name)
-        self._expect(action.server_is_ready, name, patience)
+        self._expect(action.server_is_ready, name, timeout)
         answer = action.send_goal_async(goal, feedback_callback=on_feedback)
-        self._expect(answer.done, name, patience)
+        self._expect(answer.done, name, timeout)
         return answer.result()
 
-    def result(self, handle: Any, patience: float = math.inf) -> Any:
+    def result(self, handle: Any, timeout: float = math.inf) -> Any:
         """Wait for status and result of an accepted goal; None if they do not come in time."""
         answer = handle.get_result_async()
-        return answer.result() if self.wait(answer.done, patience) else None
+        return answer.result() if self.wait(answer.done, timeout) else None
 
-    def _expect(self, condition: Callable[[], Any], name: str, patience: float) -> Any:
-        if not (value := self.wait(condition, patience)):
-            raise SilenceError(name, patience)
+    def _expect(self, condition: Callable[[], Any], name: str, timeout: float) -> Any:
+        if not (value := self.wait(condition, timeout)):
+            raise SilenceError(name, timeout)
         return value

@@ -17,5 +17,5 @@ class NodeError(EntrainmentError):
 class SilenceError(NodeError):
     """A node did not answer a service or an action, ``name``, in time [s]."""
 
-    def __init__(self, name: str, patience: float) -> None:
-        super().__init__(f"no answer from {name} within {patience:g} s", name.rpartition("/")[0])
+    def __init__(self, name: str, timeout: float) -> None:
+        super().__init__(f"no answer from {name} within {timeout:g} s", name.rpartition("/")[0])

@@ -22,7 +22,7 @@ from gait_entrainment_nodes.messaging.topics import (
 # While the slowest reader catches up, a full writer is tried again this often [s].
 RETRY_PERIOD = 0.002
 # How long to wait at a time [s] before looking whether the node is to stop.
-PATIENCE = 0.1
+TIMEOUT = 0.1
 # A writer that waits for a reader says so in the log this often [s].
 LAG_REPORT_PERIOD = 1.0
 
@@ -93,13 +93,13 @@ class CountedPublisher:
         """Wait up to a time [s]; return whether every reader has received what was published."""
         return bool(self._publisher.wait_for_all_acked(Duration(seconds=timeout)))
 
-    def wait_for_readers(self, patience: float = math.inf) -> bool:
+    def wait_for_readers(self, timeout: float = math.inf) -> bool:
         """
         Wait as ``wait_until_received`` does, and report a reader that does not keep up.
 
         Raises StopRequestedError if the node is to stop meanwhile.
         """
-        return self._repeat(lambda: self.wait_until_received(PATIENCE), patience)
+        return self._repeat(lambda: self.wait_until_received(TIMEOUT), timeout)
 
     def _published(self, data: bytes) -> bool:
         try:
@@ -109,9 +109,9 @@ class CountedPublisher:
             return False
         return True
 
-    def _repeat(self, attempt: Callable[[], bool], patience: float = math.inf) -> bool:
+    def _repeat(self, attempt: Callable[[], bool], timeout: float = math.inf) -> bool:
         """Repeat an attempt until it succeeds; False if it does not within a time [s]."""
-        give_up = time.monotonic() + patience
+        give_up = time.monotonic() + timeout
         report_at = time.monotonic() + LAG_REPORT_PERIOD
         while not attempt():
             if self._node.stopping or not rclpy.ok():

@@ -220,8 +220,8 @@ class BagPlayer(Participant):
             self._playback.begin(now)
             self._playback.set_rate(self._rate, now)
         elif time.monotonic() > self._give_up_at:
-            patience = f"{self.settings.expect_timeout:g} s"
-            self.failure = f"no {waiting} within {patience}; nothing was played"
+            timeout = f"{self.settings.expect_timeout:g} s"
+            self.failure = f"no {waiting} within {timeout}; nothing was played"
 
     # Pacing
 
