@@ -134,6 +134,30 @@ class BagReader(AbstractContextManager["BagReader"]):
             raise BagError(f"{self.path}: no topic {', '.join(missing)} in the bag")
         return topics
 
+    def find_topic(
+        self, relative: str, type_name: str = "", *, filled: bool = False
+    ) -> str | None:
+        """
+        Return the topic with this relative name in whatever namespace; None if there is none.
+
+        Of several it is the shortest, as /truth/gait_events lies beside /gait_events; of a type,
+        or ``filled`` with messages, if that is asked for.
+        """
+        names = [
+            name
+            for name, topic in self.topics.items()
+            if f"/{name}".endswith(f"/{relative}")
+            and type_name in ("", topic.type)
+            and (self.counts[name] or not filled)
+        ]
+        return min(names, key=len, default=None)
+
+    def messages_of(self, relative: str) -> Iterator[Any]:
+        """Give the decoded messages of the topic with this relative name; none without it."""
+        name = self.find_topic(relative)
+        for _, message in self.decoded([name] if name else []):
+            yield message
+
     def _plan(
         self, wanted: set[str], start: int, end: float
     ) -> list[tuple[int, McapFile, Chunk, dict[int, str]]]:

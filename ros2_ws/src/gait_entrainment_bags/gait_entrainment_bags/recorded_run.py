@@ -32,7 +32,6 @@ from gait_entrainment_bags.run_messages import (
     AnkleTorques,
     RunMessages,
     fields_expected,
-    find_topic,
 )
 from gait_entrainment_bags.truth import TOE_OFF_BIAS, detector_errors, lag_shift, without_bias
 from gait_entrainment_bags.writer import ENDED_EARLY
@@ -158,11 +157,8 @@ def protocol_and_side(
 
 def _side_in(bag: BagReader, relative: str) -> Side | None:
     """Return the side that the first message of a topic names; None if there is none."""
-    if name := find_topic(bag, relative):
-        with fields_expected(name):
-            for _, message in bag.decoded([name]):
-                return messages.side_of(message)
-    return None
+    with fields_expected(relative):
+        return next(map(messages.side_of, bag.messages_of(relative)), None)
 
 
 def conducted(protocol: Protocol | None, events: Sequence[GaitEvent]) -> Sequence[BlockRun]:
@@ -199,7 +195,7 @@ def _lost(bag: BagReader) -> int | None:
     """Return how many published messages are missing here; None if that is not known."""
     published: dict[str, int] = {}
     names = [n for n, topic in bag.topics.items() if topic.type.endswith("/PublishedCounts")]
-    for _, message in bag.decoded(names) if names else ():
+    for _, message in bag.decoded(names):
         published |= dict(zip(message.topics, message.counts, strict=True))
     lost = sum(max(n - bag.counts.get(name, n), 0) for name, n in published.items())
     told = bag.custom_data.get("messages_lost")

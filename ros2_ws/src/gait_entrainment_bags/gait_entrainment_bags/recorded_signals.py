@@ -37,18 +37,12 @@ def read_signals(path: Path, detector: str | None = None) -> tuple[str, list[Str
             found = {
                 side: full
                 for side, topic in zip(Side, topics, strict=True)
-                if (full := _shortest(bag, topic))
+                if (full := bag.find_topic(topic, filled=True))
             }
             if found:
                 return name, [_stream(bag, side, full, fields) for side, full in found.items()]
     lacking = ", ".join(topic for topics, _ in wanted.values() for topic in topics)
     raise BagError(f"{path}: lacks topics of sensors: {lacking or f'none is for {detector}'}")
-
-
-def _shortest(bag: BagReader, topic: str) -> str | None:
-    """Return the full name of a topic in a bag; None if it is not there, or holds nothing."""
-    names = [name for name in bag.topics if f"/{name}".endswith(f"/{topic}")]
-    return min((name for name in names if bag.counts.get(name)), key=len, default=None)
 
 
 def _stream(bag: BagReader, side: Side, topic: str, fields: tuple[str, ...]) -> Stream:

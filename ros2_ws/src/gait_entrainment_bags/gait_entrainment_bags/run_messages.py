@@ -24,6 +24,7 @@ from gait_entrainment_bags.holes import hole_before
 from gait_entrainment_bags.mcap_records import BagMessage
 from gait_entrainment_bags.reader import BagReader
 
+_OWN = "gait_entrainment_msgs/msg/"
 _TYPES = {
     topic_names.GAIT_EVENTS: "GaitEvent",
     topic_names.TRUE_EVENTS: "GaitEvent",
@@ -62,9 +63,8 @@ class RunMessages:
 
     def __init__(self, bag: BagReader) -> None:
         self._bag = bag
-        self._names = {
-            relative: name for relative in _TYPES if (name := find_topic(bag, relative))
-        }
+        found = {name: bag.find_topic(name, f"{_OWN}{kind}") for name, kind in _TYPES.items()}
+        self._names = {relative: name for relative, name in found.items() if name}
         needed = (topic_names.GAIT_EVENTS, topic_names.TORQUE_PROFILE)
         if missing := [relative for relative in needed if relative not in self._names]:
             raise BagError(f"{bag.path}: lacks the topics {', '.join(missing)}")
@@ -182,14 +182,6 @@ class RunMessages:
                     stamps.append(messages.nanoseconds_of(message.header.stamp))
                     rows.append(tuple(torque[side] for torque in torques))
         return AnkleTorques(np.array(stamps, np.int64), *np.array(rows).reshape(-1, 3).T)
-
-
-def find_topic(bag: BagReader, relative: str) -> str | None:
-    """Return the topic of a bag with this relative name and its type, in whatever namespace."""
-    type_name = f"gait_entrainment_msgs/msg/{_TYPES[relative]}"
-    names = (name for name, topic in bag.topics.items() if topic.type == type_name)
-    # The shortest: /truth/gait_events holds what is to be compared with /gait_events.
-    return min((n for n in names if n.endswith(f"/{relative}")), key=len, default=None)
 
 
 def _promise_of(message: Any) -> TorqueProfile | int:

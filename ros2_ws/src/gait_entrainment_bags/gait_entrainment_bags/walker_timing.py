@@ -12,8 +12,7 @@ from gait_entrainment_bags.topic_names import WALKER_TIMING
 def walker_timing(bag: Path) -> dict[str, dict[str, float]]:
     """Return what the outcome says about it, by the walker's last report; {} without one."""
     with BagReader(bag) as reader:
-        names = [name for name in reader.topics if name.endswith(f"/{WALKER_TIMING}")]
-        told = [message for _, message in reader.decoded(names)][-1:]
+        told = list(reader.messages_of(WALKER_TIMING))[-1:]
     timing = {}
     for walker in told:
         if walker.samples:

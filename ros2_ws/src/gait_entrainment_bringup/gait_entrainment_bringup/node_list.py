@@ -266,9 +266,7 @@ def replay_parameters(
     """
     with BagReader(path) as bag:
         topics = list(bag.topics)
-        # The shortest: /truth/gait_events lies beside the detected ones.
-        named = (name for name in topics if name.endswith("/gait_events"))
-        recorded = min(named, key=len, default=None)
+        recorded = bag.find_topic("gait_events")
         if recorded is None:
             raise BagError(f"{path}: not a run of this project: no gait events")
         protocol, side = protocol_and_side(bag, protocol, side)

@@ -208,9 +208,7 @@ def _delivered(bag: Path, protocol: Protocol) -> list[tuple[float, float]]:
         return []
     try:
         with BagReader(bag) as reader:
-            topics = [name for name in reader.topics if name.endswith(f"/{PULSES}")]
-            found = reader.decoded(topics) if topics else ()
-            return [(pulse.torque, pulse.duration) for _, pulse in found]
+            return [(pulse.torque, pulse.duration) for pulse in reader.messages_of(PULSES)]
     except BagError:
         return [(protocol.pulse_torque, protocol.planned.duration)] * protocol.planned.count
 

@@ -39,7 +39,7 @@ class BagSource:
     def __init__(self, path: Path) -> None:
         self._bag = BagReader(path)
         self._lock = threading.Lock()
-        recorded = next((n for n in self._bag.topics if n.endswith(f"/{names.GAIT_EVENTS}")), None)
+        recorded = self._bag.find_topic(names.GAIT_EVENTS)
         if recorded is None:
             raise BagError(f"{path}: not a run of this project: no gait events")
         self.path, self._namespace = path, recorded.removesuffix(names.GAIT_EVENTS)

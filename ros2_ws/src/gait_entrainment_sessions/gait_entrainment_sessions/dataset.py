@@ -111,8 +111,7 @@ def _joint_angles(bag: Path, start: int) -> tuple[list[tuple[float, ...]], list[
     """Return seconds and joint angles [rad] of each sample, and the names of the joints."""
     rows, names = [], list[str]()
     with BagReader(bag) as reader:
-        topics = [name for name in reader.topics if name.endswith(f"/{JOINT_STATES}")]
-        for _, message in reader.decoded(topics) if topics else ():
+        for message in reader.messages_of(JOINT_STATES):
             names = list(message.name)
             stamp = nanoseconds_of(message.header.stamp) - start
             rows.append((stamp / NANOSECONDS_PER_SECOND, *message.position))

@@ -116,11 +116,11 @@ def differences(path: Path, results: dict[str, list[bytes]]) -> dict[str, str]:
     differing = {}
     with BagReader(path) as bag:
         for topic, again in results.items():
-            names = [name for name in bag.topics if name.endswith(f"/{topic}")]
-            if not names:
+            name = bag.find_topic(topic)
+            if name is None:
                 continue
-            found = sorted(bag.messages(names[:1]), key=lambda message: message.place)
-            recorded = bag.topics[names[0]]
+            found = sorted(bag.messages([name]), key=lambda message: message.place)
+            recorded = bag.topics[name]
             convert = None
             if recorded.type_hash != find_definition(recorded.type).type_hash:
                 convert = converter_of(recorded)  # by an earlier version

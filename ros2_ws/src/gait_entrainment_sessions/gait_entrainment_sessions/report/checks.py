@@ -103,7 +103,7 @@ def _timing(run: RecordedRun) -> Iterator[Check]:
 
 def _torque(run: RecordedRun, reader: BagReader) -> Check:
     """Hold measured against commanded torque, over pulses evenly spread."""
-    topic = _topic(reader, ROBOT_STATE)
+    topic = reader.find_topic(ROBOT_STATE)
     if topic is None or run.protocol is None or not run.onsets:
         return Check("torque", DOUBTFUL, "nothing to compare")
     width = run.protocol.planned.duration
@@ -140,8 +140,7 @@ def _clocks(reader: BagReader, timing: dict[str, dict[str, float]]) -> Check:
 
 
 def _limits(reader: BagReader) -> Check:
-    topic = _topic(reader, ROBOT_SETUP)
-    setups = [m for _, m in reader.decoded([topic])] if topic else []
+    setups = list(reader.messages_of(ROBOT_SETUP))
     if not setups:
         return Check("limits", DOUBTFUL, "the robot did not tell them")
     last = setups[-1]
@@ -153,8 +152,7 @@ def _limits(reader: BagReader) -> Check:
 
 
 def _faults(reader: BagReader) -> Check:
-    topic = _topic(reader, TROUBLE)
-    told = [m.message or m.fault for _, m in reader.decoded([topic])] if topic else []
+    told = [trouble.message or trouble.fault for trouble in reader.messages_of(TROUBLE)]
     return Check("faults", BAD if told else GOOD, "; ".join(dict.fromkeys(told)) or "none")
 
 
@@ -164,10 +162,6 @@ def _analysis(run: RecordedRun) -> Check:
     if run.differences:
         return Check("analysis", BAD, f"differs from the live one: {'; '.join(run.differences)}")
     return Check("analysis", GOOD, "repeated: the same as live to the last bit")
-
-
-def _topic(reader: BagReader, relative: str) -> str | None:
-    return next((name for name in reader.topics if name.endswith(f"/{relative}")), None)
 
 
 def origin_of(bag: Path) -> dict[str, str]:
