@@ -7,7 +7,8 @@ What the driver sees of a robot under ros2_control: an effort controller, a stat
     python emulated_controller.py DOMAIN [--timeout S] [--namespace NAME] ...
 
 The torque follows the command by a lag of 30 Hz. Without a timeout the last command is held, as
-ros2_control's effort controllers do. Prints a line when it is there.
+ros2_control's effort controllers do. With --manager NAME=STATE a controller_manager answers a
+strict switch as that of Jazzy does, by services of its types. Prints a line when it is there.
 """
 
 import argparse
@@ -33,13 +34,44 @@ class Controller(Node):
         self.command = self.torque = 0.0
         self.heard_at = self.now = time.monotonic()
         self.states = self.create_publisher(JointState, options.joint_states, 1)
+        self.name, _, self.state = options.manager.partition("=")
+        if options.manager:
+            self.manage()
         if not options.deaf:
             topic = "effort_controller/commands"
             self.create_subscription(Float64MultiArray, topic, self.obey, 1)
 
+    def manage(self):
+        from controller_manager_msgs.srv import ListControllers, SwitchController
+
+        self.create_service(ListControllers, "~/list_controllers", self.list)
+        if not self.options.silent:
+            self.create_service(SwitchController, "~/switch_controller", self.switch)
+
+    def list(self, _, response):
+        from controller_manager_msgs.msg import ControllerState
+
+        response.controller = [ControllerState(name=self.name, state=self.state)]
+        return response
+
+    def switch(self, request, response):
+        assert request.strictness == request.STRICT
+        (name,) = [*request.activate_controllers, *request.deactivate_controllers]
+        before = "inactive" if request.activate_controllers else "active"
+        response.ok = (name, self.state) == (self.name, before)
+        if response.ok:
+            self.state = "active" if request.activate_controllers else "inactive"
+        else:
+            response.message = f"Controller with name '{name}' is in '{self.state}' state.\n"
+        self.command = 0.0
+        with self.options.trace.open("a") as trace:
+            trace.write(f"{self.state}\n")
+        return response
+
     def obey(self, message):
         self.advance()
-        (self.command,) = message.data
+        (command,) = message.data
+        self.command = command if self.state in ("", "active") else 0.0
         self.heard_at = self.now
 
     def advance(self):
@@ -67,6 +99,11 @@ def main():
     parser.add_argument("--namespace", default="")
     parser.add_argument("--joint-states", default="joint_states")
     parser.add_argument("--behind", type=float, default=0.0, help="of its clock [s]")
+    parser.add_argument("--manager", default="", metavar="NAME=STATE", help="of its controller")
+    parser.add_argument(
+        "--trace", type=Path, default=os.devnull, help="file for the states that it switches to"
+    )
+    parser.add_argument("--silent", action="store_true", help="a manager that switches nothing")
     parser.add_argument("--deaf", action="store_true", help="no controller")
     parser.add_argument("--no-effort", action="store_true", help="nothing is measured")
     options = parser.parse_args()

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -24,6 +25,10 @@ from gait_entrainment_nodes import ros2_control
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 
 EMULATED = Path(__file__).with_name("emulated_controller.py")
+MANAGED = pytest.mark.skipif(
+    find_spec("controller_manager_msgs") is None,
+    reason="controller_manager is asked by types of its own: install controller_manager_msgs",
+)
 # A machine that others share wakes processes up late: the limits have their own tests.
 PATIENT = Tolerances(
     onset=0.25, zero_within=1.0, watchdog=1.6, call=0.1, slowest_call=2.0, impulse=0.6
@@ -142,6 +147,46 @@ def test_what_is_missing_is_told_in_one_line(options, driver, words, monkeypatch
         with pytest.raises(DeviceError, match=words) as error:
             device.open()
         device.shut()
+    assert "\n" not in str(error.value)
+
+
+@MANAGED
+@pytest.mark.parametrize("state", ["inactive", "active"])
+def test_controller_manager_activates_the_controller_and_deactivates_it(state, tmp_path):
+    trace = tmp_path / "trace"
+    options = (f"--manager=effort_controller={state}", f"--trace={trace}")
+    with controller("--timeout=0.2", *options) as text, robot_on(text) as robot:
+        pushed(robot, 6.0)
+        robot.deactivate()
+        robot.activate()
+        assert not robot.faults
+    first = [] if state == "active" else ["active"]
+    assert trace.read_text().split() == [*first, "inactive", "active", "inactive"]
+
+
+@MANAGED
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (
+            ["--manager=effort_controller=unconfigured"],
+            "does not make effort_controller active, it is unconfigured: Controller with name",
+        ),
+        (
+            ["--manager=other_controller=active"],
+            "controller_manager has no effort_controller: load it; has: other_controller",
+        ),
+        (
+            ["--manager=effort_controller=inactive", "--silent"],
+            "controller_manager does not answer: see whether it runs",
+        ),
+    ],
+)
+def test_what_controller_manager_refuses_is_told_in_one_line(options, words):
+    with controller("--timeout=0.2", *options) as text, robot_on(text) as robot:
+        robot.configure()
+        with pytest.raises(DeviceError, match=words) as error:
+            robot.activate()
     assert "\n" not in str(error.value)
 
 

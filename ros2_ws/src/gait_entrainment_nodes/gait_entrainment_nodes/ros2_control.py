@@ -39,8 +39,8 @@ from gait_entrainment_drivers.monitor import SECOND_MASTER
 
 # How long the robot may take to show its joint and its controller [s].
 _DISCOVERY_TIMEOUT = 5.0
-# The robot's process waits 2 s for the device to be enabled.
-_SERVICE_TIMEOUT = 1.0
+# The robot's process waits 2 s for the device to be enabled: two questions.
+_SERVICE_TIMEOUT = 0.8
 # After the loop was held up, for so long a state is waited for before the next command [s].
 _FRESH_STATE_TIMEOUT = 0.02
 # Only the latest state counts.
@@ -99,6 +99,7 @@ class EffortJoint(TorqueDevice):
             torque_bandwidth=options.bandwidth,
         )
         self._node: Any = None
+        self._manager: tuple[Any, Any] | None = None  # clients of controller_manager
         self._state: JointState | None = None  # not read yet
         self._age = math.inf  # of the joint's last state when it came [s]
         self._place = 0  # of the joint in it
@@ -128,6 +129,7 @@ class EffortJoint(TorqueDevice):
         self._commands = self._node.create_publisher(
             Float64MultiArray, f"{options.controller}/commands", _COMMANDS
         )
+        self._manager = self._clients_of_manager() if options.manage else None
         self._wait(
             lambda: self._age < math.inf,
             lambda: f"no {options.joint_states} tell of it: start its joint state broadcaster",
@@ -156,8 +158,7 @@ class EffortJoint(TorqueDevice):
                 " that"
             )
         self._publish(0.0)
-        if self._options.manage:
-            self._switch(activate=True)
+        self._switch("active")
         self._publish(0.0)
 
     def exchange(self, torque: float, timeout: float) -> Reading | None:
@@ -178,8 +179,7 @@ class EffortJoint(TorqueDevice):
     def disable(self) -> None:
         """Send zero and deactivate the controller."""
         self._publish(0.0)
-        if self._options.manage:
-            self._switch(activate=False)
+        self._switch("inactive")
 
     def shut(self) -> None:
         """Leave the robot's domain."""
@@ -229,30 +229,51 @@ class EffortJoint(TorqueDevice):
         if not self._spin(until, _DISCOVERY_TIMEOUT):
             raise DeviceError(f"{self.name} of {self.address}: {lacking()}")
 
-    def _switch(self, *, activate: bool) -> None:
-        """Activate or deactivate the controller, if controller_manager can be asked."""
+    def _clients_of_manager(self) -> tuple[Any, Any] | None:
+        """Return clients that list and switch controllers; None if their types are not here."""
         try:
-            from controller_manager_msgs.srv import SwitchController  # of a full installation
-        except ImportError:
+            from controller_manager_msgs.srv import ListControllers, SwitchController
+        except ImportError:  # of a full installation
+            return None
+        kinds = {"list_controllers": ListControllers, "switch_controller": SwitchController}
+        listing, switching = (
+            self._node.create_client(kind, f"controller_manager/{name}")
+            for name, kind in kinds.items()
+        )
+        return listing, switching
+
+    def _switch(self, wanted: str) -> None:
+        """Make the controller active or inactive, if controller_manager can be asked."""
+        if self._manager is None or not self._spin(self._manager[0].service_is_ready, 0.2):
             return
-        client = self._node.create_client(SwitchController, "controller_manager/switch_controller")
-        if not client.wait_for_service(timeout_sec=0.2):
+        listing, switching = self._manager
+        name = self._options.controller
+        listed = self._answer(listing, listing.srv_type.Request()).controller
+        states = {controller.name: controller.state for controller in listed}
+        if name not in states:
+            others = ", ".join(states) or "none"
+            raise DeviceError(f"controller_manager has no {name}: load it; has: {others}")
+        if states[name] == wanted:
             return
-        # One that is active already, or inactive, is left as it is.
-        request = SwitchController.Request(strictness=SwitchController.Request.BEST_EFFORT)
-        wanted = [self._options.controller]
-        if activate:
-            request.activate_controllers = wanted
+        # One that cannot be switched is no error but in a strict switch.
+        request = switching.srv_type.Request(strictness=switching.srv_type.Request.STRICT)
+        request.timeout.nanosec = NANOSECONDS_PER_SECOND // 2  # it is to answer that it gave up
+        if wanted == "active":
+            request.activate_controllers = [name]
         else:
-            request.deactivate_controllers = wanted
+            request.deactivate_controllers = [name]
+        answer = self._answer(switching, request)
+        if not answer.ok:
+            raise DeviceError(
+                f"controller_manager does not make {name} {wanted}, it is {states[name]}: "
+                f"{' '.join(answer.message.split()) or 'is it configured, and its joint free?'}"
+            )
+
+    def _answer(self, client: Any, request: Any) -> Any:
         future = client.call_async(request)
         if not self._spin(future.done, _SERVICE_TIMEOUT):
             raise DeviceError("controller_manager does not answer: see whether it runs")
-        if activate and not future.result().ok:
-            raise DeviceError(
-                f"controller_manager does not activate {self._options.controller}: is it loaded, "
-                "and is its joint free?"
-            )
+        return future.result()
 
 
 def _stamp(message: JointState) -> int:
