@@ -100,9 +100,7 @@ def main():
     parser.add_argument("--joint-states", default="joint_states")
     parser.add_argument("--behind", type=float, default=0.0, help="of its clock [s]")
     parser.add_argument("--manager", default="", metavar="NAME=STATE", help="of its controller")
-    parser.add_argument(
-        "--trace", type=Path, default=os.devnull, help="file for the states that it switches to"
-    )
+    parser.add_argument("--trace", type=Path, default=os.devnull, help="of what it switches to")
     parser.add_argument("--silent", action="store_true", help="a manager that switches nothing")
     parser.add_argument("--deaf", action="store_true", help="no controller")
     parser.add_argument("--no-effort", action="store_true", help="nothing is measured")
