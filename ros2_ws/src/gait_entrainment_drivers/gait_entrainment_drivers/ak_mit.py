@@ -18,7 +18,8 @@ weighing: a motor asked for a torque must show it at a lever on a scale.
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import astuple, dataclass
 
 from gait_entrainment.robot.faults import Fault
 
@@ -28,6 +29,8 @@ DAMPING = 5.0  # kd, upper bound
 ENTER = bytes.fromhex("fffffffffffffffc")
 EXIT = bytes.fromhex("fffffffffffffffd")
 SET_ZERO = bytes.fromhex("fffffffffffffffe")
+
+_Fields = tuple[tuple[float, float, int], ...]  # least and largest value of each, and its bits
 
 
 @dataclass(frozen=True)
@@ -81,31 +84,17 @@ class Reply:
 
 def pack_command(command: Command, motor: AkMotor) -> bytes:
     """Return the 8 bytes of a command; values out of range are clamped, NaN is refused."""
-    bits = _encode(command.position, -POSITION, POSITION, 16)
-    bits = bits << 12 | _encode(command.velocity, -motor.velocity, motor.velocity, 12)
-    bits = bits << 12 | _encode(command.stiffness, 0.0, STIFFNESS, 12)
-    bits = bits << 12 | _encode(command.damping, 0.0, DAMPING, 12)
-    bits = bits << 12 | _encode(command.torque, -motor.torque, motor.torque, 12)
-    return bits.to_bytes(8, "big")
+    return _encode(astuple(command), _of_command(motor)).to_bytes(8, "big")
 
 
 def unpack_command(data: bytes, motor: AkMotor) -> Command:
     """Return what a command of 8 bytes means to the motor."""
-    bits = int.from_bytes(data, "big")
-    return Command(
-        position=_decode(bits >> 48, -POSITION, POSITION, 16),
-        velocity=_decode(bits >> 36, -motor.velocity, motor.velocity, 12),
-        stiffness=_decode(bits >> 24, 0.0, STIFFNESS, 12),
-        damping=_decode(bits >> 12, 0.0, DAMPING, 12),
-        torque=_decode(bits, -motor.torque, motor.torque, 12),
-    )
+    return Command(*_decode(int.from_bytes(data, "big"), _of_command(motor)))
 
 
 def pack_reply(reply: Reply, motor: AkMotor, length: int, temperature: int = 65) -> bytes:
     """Return the 6 or 8 bytes of a reply; the temperature byte counts from -40 degrees."""
-    bits = _encode(reply.position, -POSITION, POSITION, 16)
-    bits = bits << 12 | _encode(reply.velocity, -motor.velocity, motor.velocity, 12)
-    bits = bits << 12 | _encode(reply.torque, -motor.torque, motor.torque, 12)
+    bits = _encode((reply.position, reply.velocity, reply.torque), _of_reply(motor))
     data = bytes([reply.motor_id]) + bits.to_bytes(5, "big")
     return data if length == 6 else data + bytes([temperature, reply.error])
 
@@ -114,15 +103,9 @@ def unpack_reply(data: bytes, motor: AkMotor) -> Reply | None:
     """Return a reply of 6 or 8 bytes; None for any other length, which is no reply."""
     if len(data) not in (6, 8):
         return None
-    bits = int.from_bytes(data[1:6], "big")
-    return Reply(
-        motor_id=data[0],
-        position=_decode(bits >> 24, -POSITION, POSITION, 16),
-        velocity=_decode(bits >> 12, -motor.velocity, motor.velocity, 12),
-        torque=_decode(bits, -motor.torque, motor.torque, 12),
-        error=data[7] if len(data) == 8 else 0,
-        temperature=float(data[6] - 40) if len(data) == 8 else math.nan,
-    )
+    position, velocity, torque = _decode(int.from_bytes(data[1:6], "big"), _of_reply(motor))
+    error, temperature = (data[7], float(data[6] - 40)) if len(data) == 8 else (0, math.nan)
+    return Reply(data[0], position, velocity, torque, error, temperature)
 
 
 def resolution(motor: AkMotor) -> float:
@@ -130,14 +113,34 @@ def resolution(motor: AkMotor) -> float:
     return 2 * motor.torque / 0xFFF
 
 
-def _encode(value: float, low: float, high: float, bits: int) -> int:
-    if value != value:
-        raise ValueError("NaN cannot be sent to a motor")
-    clamped = min(max(value, low), high)
-    # The small term keeps a value that was decoded from a code on that code, despite rounding.
-    return int((clamped - low) / (high - low) * ((1 << bits) - 1) + 1e-6)
+def _of_command(motor: AkMotor) -> _Fields:
+    gains = (0.0, STIFFNESS, 12), (0.0, DAMPING, 12)
+    position, velocity, torque = _of_reply(motor)
+    return position, velocity, *gains, torque
 
 
-def _decode(code: int, low: float, high: float, bits: int) -> float:
-    largest = (1 << bits) - 1
-    return low + (code & largest) * (high - low) / largest
+def _of_reply(motor: AkMotor) -> _Fields:
+    return tuple(
+        (-most, most, bits)
+        for most, bits in ((POSITION, 16), (motor.velocity, 12), (motor.torque, 12))
+    )
+
+
+def _encode(values: Iterable[float], fields: _Fields) -> int:
+    code = 0
+    for value, (low, high, bits) in zip(values, fields, strict=True):
+        if value != value:
+            raise ValueError("NaN cannot be sent to a motor")
+        share = (min(max(value, low), high) - low) / (high - low)
+        # The small term keeps a value that was decoded from a code on that code, despite rounding.
+        code = code << bits | int(share * ((1 << bits) - 1) + 1e-6)
+    return code
+
+
+def _decode(code: int, fields: _Fields) -> list[float]:
+    values = []
+    for low, high, bits in reversed(fields):
+        largest = (1 << bits) - 1
+        values.append(low + (code & largest) * (high - low) / largest)
+        code >>= bits
+    return values[::-1]

@@ -13,14 +13,17 @@ motor is another robot. The files are in ``gait_entrainment`` in the user's stat
 
 import json
 import os
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from datetime import datetime, timezone
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from gait_entrainment.robot.drivers import join_options, split_options
 from gait_entrainment.robot.faults import DeviceError
+
+_T = TypeVar("_T")
 
 _PROOFS, _PREFLIGHTS = "proofs.json", "preflights.json"
 
@@ -44,10 +47,7 @@ class Preflight:
 
 def proof_of(driver: str) -> Proof | None:
     """Return what was proved of the driver that a text names; None if nothing can be read."""
-    try:
-        return Proof(**_known(_PROOFS)[_key(driver)])
-    except (LookupError, TypeError):
-        return None
+    return _shown(Proof, _PROOFS, driver)
 
 
 def require_proof(driver: str, *, unproved: bool) -> None:
@@ -74,15 +74,19 @@ def keep_proof(driver: str, within: float | None) -> None:
 
 def preflight_of(driver: str) -> Preflight | None:
     """Return the latest checklist of the driver that a text names; None if there is none."""
-    try:
-        return Preflight(**_known(_PREFLIGHTS)[_key(driver)])
-    except (LookupError, TypeError):
-        return None
+    return _shown(Preflight, _PREFLIGHTS, driver)
 
 
 def keep_preflight(driver: str, failed: str) -> None:
     """Remember a checklist, and the points that failed; DeviceError if it cannot be written."""
     _keep(_PREFLIGHTS, driver, Preflight(failed, _now()))
+
+
+def _shown(kind: Callable[..., _T], name: str, driver: str) -> _T | None:
+    try:
+        return kind(**_known(name)[_key(driver)])
+    except (LookupError, TypeError):
+        return None
 
 
 def _keep(name: str, driver: str, shown: Proof | Preflight | None) -> None:

@@ -18,7 +18,7 @@ from typing import Any, ClassVar
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.errors import UsageError
 from gait_entrainment.robot.drivers import read_options
-from gait_entrainment.settings import check_settings, setting
+from gait_entrainment.settings import Checked, setting
 
 ENTRY_POINTS = "gait_entrainment.detectors"
 # A walk of this length has shown what the signal reaches [s].
@@ -39,7 +39,7 @@ class Detection:
 
 
 @dataclass(frozen=True)
-class DetectorSettings:
+class DetectorSettings(Checked):
     """What every detector can be told."""
 
     longest_gap: float = setting(0.1, "longest time between two samples", "s", (1e-3, 1.0))
@@ -50,10 +50,6 @@ class DetectorSettings:
     toe_off_bias: float = setting(
         0.0, "measured against a reference, taken off each toe-off", "s", (-0.2, 0.2)
     )
-
-    def __post_init__(self) -> None:
-        """Check every field."""
-        check_settings(self)
 
 
 @dataclass(slots=True)

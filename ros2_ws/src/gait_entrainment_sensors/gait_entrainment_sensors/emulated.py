@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
 from gait_entrainment.gait import GaitEvent
-from gait_entrainment.settings import check_settings, setting
+from gait_entrainment.settings import Checked, setting
 from gait_entrainment.walker import Samples
 
 Floats = NDArray[np.float64]
@@ -45,7 +45,7 @@ _NEVER: Final = -(10**15)  # [ns]
 
 
 @dataclass(frozen=True)
-class EmulatedSettings:
+class EmulatedSettings(Checked):
     """How good a sensor is; noise, bias, drift, resolution and range in the unit of its signal."""
 
     rate: float = setting(200.0, "samples per second", "Hz", (10.0, 5000.0))
@@ -65,10 +65,6 @@ class EmulatedSettings:
     slap_time: float = setting(0.1, "from heel strike to foot flat", "s", (1e-3, 0.5))
     release_time: float = setting(0.015, "time constant of the foot after toe-off", "s", (0, 0.1))
     bounce: float = setting(0.004, "time for which a switch bounces", "s", (0.0, 0.1))
-
-    def __post_init__(self) -> None:
-        """Check every field."""
-        check_settings(self)
 
 
 # Kinds of sensors: the detector's signals, and what is usual. Force: an instrumented treadmill

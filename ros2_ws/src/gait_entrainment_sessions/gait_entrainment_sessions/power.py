@@ -17,7 +17,7 @@ import numpy as np
 from gait_entrainment.conventions import EventKind, Side, nanoseconds
 from gait_entrainment.errors import UsageError
 from gait_entrainment.gait import GaitEvent, Verdict, analyze
-from gait_entrainment.settings import check_settings, setting
+from gait_entrainment.settings import Checked, setting
 from gait_entrainment_sessions.statistics import Estimate, Floats, share
 from gait_entrainment_studies.cohort.population import step_noise
 
@@ -27,7 +27,7 @@ COUNTS = (10, 20, 25, 30, 40, 50, 60, 80)
 
 
 @dataclass(frozen=True)
-class PowerPlan:
+class PowerPlan(Checked):
     """What is known, or presumed, before a session."""
 
     variation: float = setting(
@@ -44,10 +44,6 @@ class PowerPlan:
     limit: float = setting(0.08, "the same, at most, as a share of the stride", "1", (0.001, 1.0))
     trials: int = setting(100, "walks of each kind", "1", (20, 100_000))
     seed: int = setting(0, "seed", "1", (0, 2**63 - 1))
-
-    def __post_init__(self) -> None:
-        """Check every field; raises SettingError."""
-        check_settings(self)
 
 
 @dataclass(frozen=True)

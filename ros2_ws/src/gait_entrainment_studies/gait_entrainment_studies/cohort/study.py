@@ -18,7 +18,7 @@ import numpy as np
 from gait_entrainment.conventions import EventKind, Side, nanoseconds
 from gait_entrainment.errors import UsageError
 from gait_entrainment.gait import GaitEvent, Verdict, analyze
-from gait_entrainment.settings import check_settings, setting
+from gait_entrainment.settings import Checked, setting
 from gait_entrainment.walker.variation import step_noise
 from gait_entrainment_studies.cohort.population import (
     Population,
@@ -41,7 +41,7 @@ _LOCKED_WITHIN = 0.05
 
 
 @dataclass(frozen=True)
-class StudyPlan:
+class StudyPlan(Checked):
     """The experiment, the same for every subject."""
 
     torque: float = setting(10.0, "height of the pulses", "N m")
@@ -58,10 +58,6 @@ class StudyPlan:
     hurst: float = setting(0.75, "correlation of the noise: 0.5 white, to below 1")
     slope: float = setting(0.0, "rise of the ground, uphill positive", "rad")
     asymmetry: float = setting(0.0, "excess of the perturbed leg's stiffness, -1 to 1")
-
-    def __post_init__(self) -> None:
-        """Check the settings; raises SettingError."""
-        check_settings(self)
 
     @property
     def solvable(self) -> bool:
