@@ -3,7 +3,6 @@
 
 """Ankle robot on a serial line to which the host streams torque."""
 
-import math
 import os
 import select
 import time
@@ -11,7 +10,7 @@ from dataclasses import dataclass
 
 import serial
 
-from gait_entrainment.robot import Capabilities, DeviceError, Fault, LimitError
+from gait_entrainment.robot import DeviceError, Fault, LimitError
 from gait_entrainment.settings import setting
 from gait_entrainment_drivers.device import Reading, TorqueDevice
 from gait_entrainment_drivers.host_timed import HostTimedRobot, LoopOptions
@@ -68,14 +67,7 @@ class SerialDevice(TorqueDevice):
         self.name = f"robot on {options.port}"
         # Under /dev/serial/by-id there are other names of the same line.
         self.address = f"serial line {os.path.realpath(options.port)}"
-        self.capabilities = Capabilities(
-            peak_torque=options.motor_torque * abs(options.ratio),
-            torque_rate=math.inf,
-            measures_torque=True,
-            simulated=False,
-            state_rate=options.rate,
-            torque_bandwidth=options.bandwidth,
-        )
+        self.capabilities = options.capabilities(options.motor_torque * abs(options.ratio))
         self._line: serial.Serial | None = None
         self._received = bytearray()
         self._number = 0  # of the last command

@@ -12,7 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
 
-from gait_entrainment.robot.contract import Capabilities
 from gait_entrainment.robot.faults import DeviceError, Fault, LimitError
 from gait_entrainment.settings import setting
 from gait_entrainment_drivers.can_bus import open_bus, send
@@ -78,14 +77,7 @@ class CanMotor(TorqueDevice):
         self._others: set[int] = set()  # ids of other motors that were heard
         self._sent: deque[tuple[int, bytes]] = deque(maxlen=_REMEMBERED)
         self._second_master = False  # somebody else has sent a command to this motor
-        self.capabilities = Capabilities(
-            peak_torque=motor_torque * abs(options.ratio),
-            torque_rate=math.inf,
-            measures_torque=True,
-            simulated=False,
-            state_rate=options.rate,
-            torque_bandwidth=options.bandwidth,
-        )
+        self.capabilities = options.capabilities(motor_torque * abs(options.ratio))
 
     def _open_bus(self) -> None:
         options = self._options

@@ -24,7 +24,7 @@ from itertools import pairwise
 from typing import Any, ClassVar
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
-from gait_entrainment.robot.contract import AnkleRobot, LoopTiming, RobotState
+from gait_entrainment.robot.contract import AnkleRobot, Capabilities, LoopTiming, RobotState
 from gait_entrainment.robot.faults import DeviceError, Fault, LimitError
 from gait_entrainment.robot.profile import TorqueProfile
 from gait_entrainment.robot.pulse_train import PulseTrain
@@ -63,6 +63,17 @@ class LoopOptions(MonitorSettings):
         "Hz",
         (1.0, 500.0),
     )
+
+    def capabilities(self, peak_torque: float) -> Capabilities:
+        """Return those of a device that measures its torque, of a peak [N m]."""
+        return Capabilities(
+            peak_torque,
+            torque_rate=math.inf,
+            measures_torque=True,
+            simulated=False,
+            state_rate=self.rate,
+            torque_bandwidth=self.bandwidth,
+        )
 
 
 class HostTimedRobot(AnkleRobot):

@@ -9,7 +9,6 @@ from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
 
-from gait_entrainment.robot.contract import Capabilities
 from gait_entrainment.robot.faults import Fault
 from gait_entrainment.settings import setting
 from gait_entrainment_drivers.device import Reading, TorqueDevice
@@ -36,14 +35,7 @@ class MisbehavingDevice(TorqueDevice):
     def __init__(self, options: MisbehavingOptions) -> None:
         self._options = options
         self.address = f"bench device with trace {options.trace}"
-        self.capabilities = Capabilities(
-            peak_torque=PEAK,
-            torque_rate=math.inf,
-            measures_torque=True,
-            simulated=False,
-            state_rate=options.rate,
-            torque_bandwidth=options.bandwidth,
-        )
+        self.capabilities = options.capabilities(PEAK)
         self._torque = self._command = 0.0
         self._at = self._first = math.inf
         self._frozen: Reading | None = None

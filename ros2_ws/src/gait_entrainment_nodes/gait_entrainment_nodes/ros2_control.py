@@ -30,12 +30,16 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
-from gait_entrainment.robot.contract import Capabilities
 from gait_entrainment.robot.faults import DeviceError, Fault, LimitError
 from gait_entrainment.settings import setting
 from gait_entrainment_drivers.device import Reading, TorqueDevice
 from gait_entrainment_drivers.host_timed import HostTimedRobot, LoopOptions
 from gait_entrainment_drivers.monitor import SECOND_MASTER
+
+try:
+    from controller_manager_msgs.srv import ListControllers, SwitchController
+except ImportError:  # of a full installation
+    ListControllers = SwitchController = None
 
 # How long the robot may take to show its joint and its controller [s].
 _DISCOVERY_TIMEOUT = 5.0
@@ -90,16 +94,9 @@ class EffortJoint(TorqueDevice):
         under = f" under {options.namespace.strip('/')}" if options.namespace else ""
         self.address = f"{options.controller}{under} in ROS domain {options.domain}"
         self._options = options
-        self.capabilities = Capabilities(
-            peak_torque=options.peak_torque,
-            torque_rate=math.inf,
-            measures_torque=True,
-            simulated=False,
-            state_rate=options.rate,
-            torque_bandwidth=options.bandwidth,
-        )
+        self.capabilities = options.capabilities(options.peak_torque)
         self._node: Any = None
-        self._manager: tuple[Any, Any] | None = None  # clients of controller_manager
+        self._manager: list[Any] = []  # clients of controller_manager: to list, to switch
         self._state: JointState | None = None  # not read yet
         self._age = math.inf  # of the joint's last state when it came [s]
         self._place = 0  # of the joint in it
@@ -129,7 +126,11 @@ class EffortJoint(TorqueDevice):
         self._commands = self._node.create_publisher(
             Float64MultiArray, f"{options.controller}/commands", _COMMANDS
         )
-        self._manager = self._clients_of_manager() if options.manage else None
+        if options.manage and ListControllers is not None:
+            self._manager = [
+                self._node.create_client(ListControllers, "controller_manager/list_controllers"),
+                self._node.create_client(SwitchController, "controller_manager/switch_controller"),
+            ]
         self._wait(
             lambda: self._age < math.inf,
             lambda: f"no {options.joint_states} tell of it: start its joint state broadcaster",
@@ -229,26 +230,13 @@ class EffortJoint(TorqueDevice):
         if not self._spin(until, _DISCOVERY_TIMEOUT):
             raise DeviceError(f"{self.name} of {self.address}: {lacking()}")
 
-    def _clients_of_manager(self) -> tuple[Any, Any] | None:
-        """Return clients that list and switch controllers; None if their types are not here."""
-        try:
-            from controller_manager_msgs.srv import ListControllers, SwitchController
-        except ImportError:  # of a full installation
-            return None
-        kinds = {"list_controllers": ListControllers, "switch_controller": SwitchController}
-        listing, switching = (
-            self._node.create_client(kind, f"controller_manager/{name}")
-            for name, kind in kinds.items()
-        )
-        return listing, switching
-
     def _switch(self, wanted: str) -> None:
         """Make the controller active or inactive, if controller_manager can be asked."""
-        if self._manager is None or not self._spin(self._manager[0].service_is_ready, 0.2):
+        if not self._manager or not self._spin(self._manager[0].service_is_ready, 0.2):
             return
         listing, switching = self._manager
         name = self._options.controller
-        listed = self._answer(listing, listing.srv_type.Request()).controller
+        listed = self._answer(listing, ListControllers.Request()).controller
         states = {controller.name: controller.state for controller in listed}
         if name not in states:
             others = ", ".join(states) or "none"
@@ -256,7 +244,7 @@ class EffortJoint(TorqueDevice):
         if states[name] == wanted:
             return
         # One that cannot be switched is no error but in a strict switch.
-        request = switching.srv_type.Request(strictness=switching.srv_type.Request.STRICT)
+        request = SwitchController.Request(strictness=SwitchController.Request.STRICT)
         request.timeout.nanosec = NANOSECONDS_PER_SECOND // 2  # it is to answer that it gave up
         if wanted == "active":
             request.activate_controllers = [name]
