@@ -17,7 +17,7 @@ from functools import cached_property
 from typing import Any
 
 from gait_entrainment import geometry
-from gait_entrainment.settings import Checked, SettingError, check_settings, setting
+from gait_entrainment.settings import Checked, SettingError, setting
 
 
 class ParameterError(SettingError):
@@ -52,7 +52,7 @@ def _positive(default: float, meaning: str, unit: str, most: float) -> Any:
 
 
 @dataclass(frozen=True)
-class WalkerParameters:
+class WalkerParameters(Checked):
     """
     The walker of Table 1: point mass, two massless legs with feet, a spring at the trailing ankle.
 
@@ -75,7 +75,7 @@ class WalkerParameters:
     def __post_init__(self) -> None:
         """Check every field, the linkage, and that the period-one gait exists."""
         try:
-            check_settings(self)
+            super().__post_init__()
             self._check_linkage()
             self._check_gait()
         except SettingError as error:

@@ -139,15 +139,10 @@ def settings_of(dataclass_type: Any) -> dict[str, Setting]:
     }
 
 
-def check_settings(instance: Any) -> None:
-    """Check every setting of a dataclass, as its ``__post_init__``; floats become floats."""
-    for name, rule in settings_of(type(instance)).items():
-        object.__setattr__(instance, name, rule.check(name, getattr(instance, name)))
-
-
 class Checked:
-    """A frozen dataclass of settings that is checked when it is made; raises SettingError."""
+    """A frozen dataclass of settings that are checked when it is made; raises SettingError."""
 
     def __post_init__(self) -> None:
-        """Check every field."""
-        check_settings(self)
+        """Check every setting; whole numbers for real ones become such."""
+        for name, rule in settings_of(type(self)).items():
+            object.__setattr__(self, name, rule.check(name, getattr(self, name)))

@@ -11,16 +11,16 @@ import pytest
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.settings import (
+    Checked,
     Setting,
     SettingError,
-    check_settings,
     setting,
     settings_of,
 )
 
 
 @dataclass(frozen=True)
-class Example:
+class Example(Checked):
     width: float = setting(0.1, "duration", "s", (0, 10), least_excluded=True)
     count: int = setting(5, "number of pulses", within=(1, 1_000_000))
     phase: float = setting(0.0, "place in the stride", "1", (0, 1), most_excluded=True)
@@ -30,9 +30,6 @@ class Example:
     name: str = setting("x", "name", plain=True)
     armed: bool = setting(False, "whether torque may come")
     other: tuple = ()
-
-    def __post_init__(self) -> None:
-        check_settings(self)
 
 
 def test_settings_are_the_fields_that_can_be_set():

@@ -34,7 +34,7 @@ from gait_entrainment.robot.contract import Capabilities, RobotState
 from gait_entrainment.robot.faults import LimitError
 from gait_entrainment.robot.pulse_train import PulseTrain
 from gait_entrainment.robot.simulated import SimulatedRobot
-from gait_entrainment.settings import check_settings, setting
+from gait_entrainment.settings import Checked, setting
 
 _TICK = 1_000_000  # of the device's torque loop [ns]
 # Bounds of random numbers drawn ahead at a time: a generator call per tick would be slow.
@@ -42,7 +42,7 @@ _BLOCK = 1024
 
 
 @dataclass(frozen=True)
-class EmulatedOptions:
+class EmulatedOptions(Checked):
     """
     Flaws of the emulated robot.
 
@@ -63,7 +63,7 @@ class EmulatedOptions:
 
     def __post_init__(self) -> None:
         """Check every field, and that the states fall on ticks of the torque loop."""
-        check_settings(self)
+        super().__post_init__()
         if 1000 % self.state_rate:
             raise LimitError(f"state_rate: {self.state_rate:g} Hz; allowed: a divisor of 1000")
 

@@ -17,7 +17,7 @@ from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, nanoseconds
 from gait_entrainment.errors import UsageError
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.robot import LimitError, Pulse, Shape
-from gait_entrainment.settings import Checked, check_settings, setting
+from gait_entrainment.settings import Checked, setting
 
 # A million strides are three weeks of walking: no run is longer.
 _MOST = 1_000_000
@@ -184,7 +184,7 @@ def _numbers(name: str, text: str, kind: Any) -> list[Any]:
 
 
 @dataclass(frozen=True)
-class Block:
+class Block(Checked):
     """
     Baseline, pulses and washout, conducted one after the other.
 
@@ -209,7 +209,7 @@ class Block:
 
     def __post_init__(self) -> None:
         """Check every field, and what concerns more than one."""
-        check_settings(self)
+        super().__post_init__()
         plan = self.pulses
         plan.check()
         measured = plan.period is None and plan.count > 0

@@ -14,7 +14,7 @@ import numpy as np
 
 from gait_entrainment.errors import EntrainmentError, UsageError
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment.settings import check_settings, setting
+from gait_entrainment.settings import Checked, setting
 from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
 from gait_entrainment_studies.locking.roots import Floats
 
@@ -40,7 +40,7 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class SweepPlan:
+class SweepPlan(Checked):
     """
     A sweep over pulse period, torque and initial phase: torques x offsets x phases walks.
 
@@ -58,7 +58,7 @@ class SweepPlan:
 
     def __post_init__(self) -> None:
         """Check each field."""
-        check_settings(self)
+        super().__post_init__()
         for name in ("period_offsets", "torque_fractions"):
             axis = getattr(self, name)
             if not axis.least <= axis.most:
