@@ -11,9 +11,7 @@ from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.client import Client
 from gait_entrainment_nodes.messaging.errors import NodeError
 from gait_entrainment_nodes.messaging.readers import who_hangs
-
-# A pause between two looks of this share of the silence says that this process was held up itself.
-HELD_UP = 1 / 3
+from gait_entrainment_nodes.nodes.waiting import HELD_UP
 
 
 class Watch:

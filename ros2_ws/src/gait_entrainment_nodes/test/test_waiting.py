@@ -7,6 +7,8 @@ import pytest
 
 from gait_entrainment_nodes.nodes.waiting import HELD_UP, TICK, Waiting
 
+SILENCE = 3.0
+
 
 class Bench:
     """A loop as a node's, on a clock of its own."""
@@ -20,7 +22,7 @@ class Bench:
         while self.now < until:
             self.now += step
             if self.now >= self.waiting.deadline:
-                self.waiting.look_after()
+                self.waiting.look_after(SILENCE)
 
 
 @pytest.fixture
@@ -41,7 +43,7 @@ def test_coroutine_goes_on_once_its_condition_holds(bench):
     assert bench.happened == []
     answer.append("here")
     assert bench.waiting.deadline <= bench.now  # at once, not at the next tick
-    bench.waiting.look_after()
+    bench.waiting.look_after(SILENCE)
     assert bench.happened == ["here"]
     assert not bench.waiting.busy
     assert bench.waiting.deadline > bench.now
@@ -70,7 +72,7 @@ def test_nobody_is_to_blame_while_this_process_was_held_up(bench):
     bench.waiting.begin(wait())
     bench.run(101.0)
     bench.now += 10.0  # the loop did not come by
-    assert bench.waiting.look_after()
+    assert bench.waiting.look_after(SILENCE)
     bench.run(bench.now + 1.5)
     assert bench.waiting.busy
     with pytest.raises(TimeoutError):
@@ -78,6 +80,6 @@ def test_nobody_is_to_blame_while_this_process_was_held_up(bench):
 
 
 def test_tick_that_is_a_little_late_is_none(bench):
-    bench.waiting.look_after()
-    bench.now += HELD_UP
-    assert not bench.waiting.look_after()
+    bench.waiting.look_after(SILENCE)
+    bench.now += HELD_UP * SILENCE
+    assert not bench.waiting.look_after(SILENCE)

@@ -327,7 +327,7 @@ class Experiment(Participant):
 
     def on_deadline(self) -> None:
         """Look after everything that is waited for."""
-        held_up = self._waiting.look_after()
+        held_up = self._waiting.look_after(self.settings.silence_timeout)
         run = self.run
         if run is None:
             return

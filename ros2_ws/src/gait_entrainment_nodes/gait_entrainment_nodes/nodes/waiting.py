@@ -16,8 +16,9 @@ from typing import Any
 
 # How often waiting is looked after [s].
 TICK = 0.02
-# A tick that is this late [s] shows that this process was held up: nobody else is to blame for it.
-HELD_UP = 1.0
+# A tick that is late by this share of the longest silence shows that this process was held up:
+# nobody else is to blame for it.
+HELD_UP = 1 / 3
 
 
 class Waiting:
@@ -69,16 +70,16 @@ class Waiting:
         """Wait until the node's loop comes by again."""
         yield
 
-    def look_after(self) -> bool:
+    def look_after(self, silence: float) -> bool:
         """
-        Go on with what is due.
+        Go on with what is due, when others may be silent for a time [s].
 
         Returns whether this process was held up: then all waiting begins anew, since what arrived
         meanwhile has not been heard yet.
         """
         now = self._clock()
         late, self._tick_at = now - self._tick_at, now + TICK
-        held_up = late > HELD_UP
+        held_up = late > HELD_UP * silence
         if held_up:
             self._give_up += late
         if self._coroutine is not None:
