@@ -27,7 +27,7 @@ def add_page_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--heartbeat",
         action="store_true",
-        help="the page is the operator's sign of life, not a terminal: closed, it ends torque",
+        help="the page, too, is the operator's sign of life: closed, it ends torque",
     )
     group.add_argument(
         "--blinded", action="store_true", help="hide what would reveal the condition"

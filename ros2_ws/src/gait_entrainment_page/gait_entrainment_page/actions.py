@@ -74,7 +74,7 @@ class Command:
     ``entrain run`` or ``entrain preflight`` with the options of the page, one at a time.
 
     It is a process of its own: a run outlives the page that started it. ``words`` are the options;
-    without any, there is nothing to start. A run whose ``heartbeat`` is the page has none itself.
+    without any, there is nothing to start. A run of which the page is a ``heartbeat`` is told so.
     """
 
     def __init__(self, words: Sequence[str], *, heartbeat: bool = False) -> None:
