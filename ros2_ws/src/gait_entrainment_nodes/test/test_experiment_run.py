@@ -191,7 +191,8 @@ def test_in_real_time_each_owes_what_it_does_by_itself():
 
 
 @pytest.mark.parametrize(("ahead", "believed"), [(0.09, True), (0.11, False), (3600.0, False)])
-def test_in_real_time_what_is_stamped_ahead_has_not_happened(ahead, believed):
+def test_in_real_time_what_is_stamped_ahead_has_not_happened(monkeypatch, ahead, believed):
+    monkeypatch.setattr("time.time_ns", lambda: 9 * SECOND)  # the walk begins later
     bench = Bench(real_time=True)
     bench.begin()
     bench.promise()
@@ -208,6 +209,15 @@ def test_in_real_time_what_is_stamped_ahead_has_not_happened(ahead, believed):
             f"walker_sim reports what is {ahead - 0.1:.3g} s ahead of what can be over by now"
         )
         assert blamed(bench.run.failure) == (expected, "walker_sim")
+
+
+def test_a_source_may_count_from_before_it_was_asked(monkeypatch):
+    monkeypatch.setattr("time.time_ns", lambda: 20 * SECOND)
+    bench = Bench(real_time=True)
+    bench.begin()
+    bench.promise()
+    bench.report(20 * SECOND)
+    assert bench.run.failure is None
 
 
 def test_silence_counts_anew_after_this_process_was_held_up(bench):

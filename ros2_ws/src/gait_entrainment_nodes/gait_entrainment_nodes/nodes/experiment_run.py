@@ -84,7 +84,7 @@ class Run:
         self._grant = self._recorded_grant = -1
         self._covered_until = 0  # by profiles [ns since 1970]
         self._planning = False  # pulses were requested, and there is no answer yet
-        self._began: int | None = None  # start of the walk, by the walker, minus steady time [ns]
+        self._began: int | None = None  # start of the walk minus steady time [ns]; in real time
         self._shown: tuple[Part, int] | None = None
         self.forgive()
 
@@ -101,10 +101,11 @@ class Run:
         else:
             self._promise(conductor, start)
             # In real time the walk begins a little later than the walker's answer.
-            later = max(start - time.time_ns(), 0) / NANOSECONDS_PER_SECOND
+            now = time.time_ns()
+            later = max(start - now, 0) / NANOSECONDS_PER_SECOND
             self._progress_at = self._clock() + later
-            if self._real_time:
-                self._began = start - round(self._clock() * NANOSECONDS_PER_SECOND)
+            if self._real_time:  # a source may count from an instant before it was asked
+                self._began = max(start, now) - round(self._clock() * NANOSECONDS_PER_SECOND)
 
     def fail(self, error: ExperimentError) -> None:
         """End the run, if it is not over."""
