@@ -12,7 +12,7 @@ if [ -z "${BASH_VERSION:-}" ]; then
 fi
 
 _gait_entrainment_source() {
-    local root
+    local root package
     root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" > /dev/null && pwd -P) || return 1
     source "$root/scripts/underlay.bash" || return 1
     if [ ! -f "$root/ros2_ws/install/complete" ]; then
@@ -27,7 +27,9 @@ _gait_entrainment_source() {
     [ -z "$nounset" ] || set -u
     _gait_entrainment_prepend PATH "$root/ros2_ws/install/gait_entrainment_drivers/bin"
     _gait_entrainment_prepend PATH "$root/ros2_ws/install/gait_entrainment_commands/bin"
-    _gait_entrainment_prepend PATH "$root/ros2_ws/install/gait_entrainment_nodes/lib/gait_entrainment_nodes"
+    for package in gait_entrainment_page gait_entrainment_nodes; do
+        _gait_entrainment_prepend PATH "$root/ros2_ws/install/$package/lib/$package"
+    done
 
     # Nobody else on the network hears a run, and the other way round, unless the user says so.
     export ROS_AUTOMATIC_DISCOVERY_RANGE=${ROS_AUTOMATIC_DISCOVERY_RANGE:-LOCALHOST}

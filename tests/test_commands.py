@@ -102,6 +102,13 @@ EXIT_CODES = [
     (2, ["session", "nowhere.yaml"]),
     (2, ["session", "unblind", "docs"]),
     (2, ["session", "export", BAG]),
+    (1, ["page", "--bag=docs"]),
+    (2, ["page", "--session"]),
+    (2, ["page", "--session", "nowhere.yaml"]),
+    (2, ["page", "--foxglove=8765", "--blinded"]),
+    (2, ["page", "--host=192.0.2.1"]),
+    (2, ["page", "--token=short"]),
+    (2, ["preflight", "--session", "examples/sessions/blinded_sham.yaml"]),
     (2, ["report", BAG, "--out=nowhere/page.html"]),
     (2, ["cohort", "nowhere.yaml"]),
 ]

@@ -6,42 +6,56 @@ The pictures of docs/page.md: a real run with an emulated motor, as a browser sh
 
     python tests/page/make_pictures.py        page_desktop.png and page_tablet.png in docs/figures
 
-The walk is that of the paper, in real time: it takes two minutes.
+The walk is that of the paper, in real time: it takes two minutes. It needs root, as the pictures
+are to name no operator and no computer but operator@lab.
 """
 
+import ctypes
 import os
+import socket
 import sys
 import tempfile
+from contextlib import ExitStack
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 sys.path[:0] = [str(ROOT / "tests" / name) for name in ("page", ".", "system")]
+_CLONE_NEWUTS = 0x04000000  # a host name of one's own
+os.environ["LOGNAME"] = "operator"
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
-from browser import DESKTOP, TABLET, chromium  # noqa: E402
+from browser import TABLET, chromium  # noqa: E402
 from harness import entrain_run  # noqa: E402
 from pages import Look, free_port, until_served  # noqa: E402
 from test_drivers import emulated_motor  # noqa: E402
 
+from gait_entrainment_drivers.proof import keep_proof  # noqa: E402
+
 FIGURES = ROOT / "docs/figures"
 # A picture is taken in this stride, once the gait has locked and a pulse has come.
 SHOWN = 48
+DESKTOP = (1440, 900)
 
 
 def main() -> None:
     """Take the pictures."""
+    if ctypes.CDLL(None).unshare(_CLONE_NEWUTS):
+        sys.exit("make_pictures: needs root")
+    socket.sethostname("lab")
     port = free_port()
-    walk = ("--real-time", "--arm", "--unproved", "--baseline=10", "--pulses=60", "--washout=10")
+    walk = ("--real-time", "--arm", "--baseline=10", "--pulses=60", "--washout=10")
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
+        os.environ["XDG_STATE_HOME"] = folder
         with (
             emulated_motor(place) as (driver, _),
-            entrain_run(
-                place / "bag", f"--driver={driver}", *walk, "--page", f"--port={port}"
-            ) as run,
             chromium(DESKTOP) as desktop,
             chromium(TABLET) as tablet,
+            ExitStack() as running,
         ):
+            keep_proof(driver, 0.1)
+            options = (f"--driver={driver}", *walk, "--page", f"--port={port}")
+            run = running.enter_context(entrain_run(place / "bag", *options))
             until_served(port, run)
             shown = {"desktop": Look(desktop, port), "tablet": Look(tablet, port)}
             shown["desktop"].note("harness fitted, treadmill at 1.1 m/s")

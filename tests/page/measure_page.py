@@ -30,6 +30,7 @@ from gait_entrainment_bringup.node_list import PAGE  # noqa: E402
 
 WATCHED = 12.0  # [s]
 BROWSERS = 10
+PAIRS = 12
 
 
 def share(process: int) -> str:
@@ -57,19 +58,24 @@ def cpu(folder: Path) -> None:
 
 
 def speed(folder: Path) -> None:
-    """Tell how fast a lock-step run is with a page beside it, by pairs."""
-    ratios = []
-    with page(folder, ROS_DOMAIN_ID="55"):
-        for pair in range(6):
-            speeds = []
-            for domain in ("56", "55"):
-                bag = folder / f"{domain}_{pair}"
-                walk = ("--pulses=100", "--json")
-                with entrain_run(bag, *walk, ROS_DOMAIN_ID=domain) as run:
-                    speeds.append(run.outcome()["real_time_factor"])
-            ratios.append(speeds[1] / speeds[0])
-            print("lock-step without, with:", [f"{s:.1f}" for s in speeds], flush=True)
-    print(f"ratio, median: {statistics.median(ratios):.3f}")
+    """Tell how fast a lock-step run is with a page that looks on, by pairs in either order."""
+    ratios, shares = [], []
+    with page(folder, ROS_DOMAIN_ID="55") as served:
+        for pair in range(PAIRS):
+            speeds = {}
+            for domain in ("55", "56") if pair % 2 else ("56", "55"):
+                walk = ("--pulses=200", "--json")
+                used, begin = cpu_seconds(served.process.pid), time.monotonic()
+                with entrain_run(folder / f"{domain}_{pair}", *walk, ROS_DOMAIN_ID=domain) as run:
+                    speeds[domain] = run.outcome()["real_time_factor"]
+                if domain == "55":
+                    used = cpu_seconds(served.process.pid) - used
+                    shares.append(100 * used / (time.monotonic() - begin))
+            ratios.append(speeds["55"] / speeds["56"])
+            print(f"lock-step without {speeds['56']:.1f}, with {speeds['55']:.1f}", flush=True)
+    low, middle, high = statistics.quantiles(ratios, n=4)
+    print(f"ratio: median {middle:.3f}, quartiles {low:.3f} and {high:.3f}; the page used")
+    print(f"{statistics.median(shares):.1f} % of a core from the start to the end of the command")
 
 
 def lateness(folder: Path) -> None:

@@ -101,8 +101,11 @@ class Look:
             time.sleep(0.05)
         found[0].click()
 
+    def type(self, words: str) -> None:
+        """Type a note or a reason."""
+        self.browser.find_element(By.CSS_SELECTOR, "input[maxlength='500']").send_keys(words)
+
     def note(self, words: str) -> None:
         """Type a note and send it."""
-        field = self.browser.find_element(By.CSS_SELECTOR, "input[maxlength='500']")
-        field.send_keys(words)
+        self.type(words)
         self.click("Note it")

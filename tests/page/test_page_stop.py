@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""STOP on the page, clicked in a real browser: it reaches every robot of this machine."""
+"""STOP on the page, and its heartbeat, in a real browser: both end the torque of a motor."""
 
 import os
 import re
@@ -49,3 +49,23 @@ def test_a_page_that_dies_harms_no_run_and_stop_on_the_next_one_ends_the_torque(
     assert max(command for at, command, _ in rows if at > since + GOES_ON * 10**6) < HEIGHT / 2
     # What is told is what the loop measured when it answered.
     assert re.search(r"motor\S*: torque .*\([-+]\d+\.\d\d N m measured\)", told), told
+
+
+def test_leaving_the_page_that_is_the_heartbeat_ends_the_torque_and_the_run_says_so(
+    tmp_path, browser
+):
+    with emulated_motor(tmp_path) as (driver, trace):
+        options = (f"--driver={driver}", *WALK, "--pulses=300", "--heartbeat")
+        with page(tmp_path, *options, f"--out={tmp_path / 'bag'}") as served:
+            look = Look(browser, served.port)
+            look.until("closing, hiding or leaving it ends the robot's torque")
+            look.click("Start")
+            look.until("pulses", "ak_mit_can")
+            assert wait_for_pulse(served, trace, 1), look.text
+            browser.switch_to.new_window("tab")  # in front of it
+            since = time.time_ns()
+            look = Look(browser, served.port)
+            told = look.until("entrain run has ended with exit code 1")
+    assert "operator" in told.partition("Operator")[0]
+    late = [torque for at, _, torque in rows_of(trace) if at > since + GOES_ON * 10**6]
+    assert max(map(abs, late)) < GONE

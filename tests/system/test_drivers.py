@@ -142,8 +142,14 @@ def test_emulated_robot_walks_as_in_the_simulation_and_twice_the_same(tmp_path):
 def test_motor_on_a_bus_delivers_the_experiment_in_real_time(tmp_path, motor):
     driver, trace = motor
     bag = tmp_path / "bag"
-    with entrain_run(bag, f"--driver={driver}", *ARMED, "--json", *SHORT) as run:
+    walk = ("--real-time", "--arm-later", "--unproved", "--json", *SHORT)
+    with entrain_run(bag, f"--driver={driver}", *walk) as run:
+        with probe(run.domain()) as listener:
+            armed = listener.client.call(
+                Trigger, "perturbator/arm", accept=lambda answer: answer.success
+            )
         outcome = run.outcome()
+    assert "torque is possible from now on" in armed.message
     assert len(outcome["pulses"]) == 3
     assert outcome["pulse_timing"]["measured"]["pulses"] == 3
     assert outcome["pulse_timing"]["sent"]["median_ms"] > 0
@@ -151,10 +157,10 @@ def test_motor_on_a_bus_delivers_the_experiment_in_real_time(tmp_path, motor):
     assert max(torques_of(trace)) == pytest.approx(3 / 6 * 13.35, abs=0.2)
     with BagReader(bag) as reader:
         pulses = [message.torque for _, message in reader.decoded(["/perturbation/pulses"])]
-        ((_, setup),) = reader.decoded(["/perturbator/setup"])
+        *_, (_, setup) = reader.decoded(["/perturbator/setup"])
     assert pulses == pytest.approx([13.35 / 6, 13.35 / 3, 13.35 / 2], abs=0.01)
     assert setup.driver == driver
-    assert setup.armed_by.endswith("by the parameter armed")
+    assert setup.armed_by.endswith("by the service ~/arm")
     limits = dict(zip(setup.limit_names, setup.limits, strict=True))
     assert (limits["rate"], limits["rising"]) == (pytest.approx(1334.6, abs=0.1), 5.0)
     assert torques_of(trace)[-1] == pytest.approx(0.0, abs=0.1)

@@ -116,7 +116,10 @@ def test_experiment_ends_the_launch_with_success(tmp_path):
 
 def test_somebody_else_may_record_a_run_that_begins_later(tmp_path):
     file = short_protocol(tmp_path, "theirs", 4)
-    arguments = (f"protocol:={file}", "recorder:=none", "start_delay:=3")
+    free = tmp_path / "free.yaml"
+    free.write_text("/**/operator_page: {ros__parameters: {port: 0}}")
+    shown = ("page:=true", f"params_file:={free}")
+    arguments = (f"protocol:={file}", "recorder:=none", "start_delay:=3", *shown)
     others = [name for name in NODES if name != "bag_recorder"]
     with (
         claimed_domain() as domain,
@@ -130,6 +133,7 @@ def test_somebody_else_may_record_a_run_that_begins_later(tmp_path):
         launch.find_nodes(others)
         assert launch.wait() == 0, launch.text
     assert "\nbag  " not in launch.text
+    assert "page: http://127.0.0.1:" in launch.text
     assert events[0].step == 0
 
 

@@ -81,6 +81,8 @@ def test_the_folder_is_a_valid_bids_data_set(conducted):
 
 def test_a_sealed_session_is_unblinded_once_it_is_asked_for(conducted):
     assert "block 2" in (conducted.path / "strides.tsv").read_text()
+    for name in ("pulses", "blocks"):  # lags and verdicts
+        assert len((conducted.path / f"{name}.tsv").read_text().splitlines()) == 1
     code, out, err = ended(entrain("session", "unblind", conducted.path))
     assert (code, err) == (0, "")
     names = [line.split()[-1] for line in out.splitlines() if line.startswith("block ")]

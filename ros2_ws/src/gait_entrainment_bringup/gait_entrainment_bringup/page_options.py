@@ -53,12 +53,14 @@ def checked_page(options: argparse.Namespace, protocol: Protocol | None) -> dict
     access = Access.of(options.host, options.token)
     port = _PORT.parse("--port", options.port)
     foxglove = _PORT.parse("--foxglove", options.foxglove)
+    if foxglove and options.blinded:
+        raise UsageError("--foxglove: offers what a blinded session hides; leave it out")
     if foxglove:
         try:
             import foxglove as _  # noqa: F401, to see that it is there
         except ImportError:
             raise UsageError("--foxglove: needs its SDK: pip install foxglove-sdk") from None
-        listen(options.host, foxglove).close()
+        listen(options.host, foxglove, "--foxglove").close()
     with listen(options.host, port) as listener:
         port = listener.getsockname()[1]
     os.environ.update(access.environment)

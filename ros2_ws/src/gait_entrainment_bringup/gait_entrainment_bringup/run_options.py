@@ -27,14 +27,17 @@ from gait_entrainment_bringup.node_list import (
 from gait_entrainment_commands.outcome_options import add_onset_option
 from gait_entrainment_commands.protocol_options import add_protocol_options, chosen_protocol
 from gait_entrainment_drivers.proof import require_proof
+from gait_entrainment_sessions.session_file import Session, read_session
 
 _SWITCHES = {
     "--real-time": "at the pace of the wall clock, not in lock-step",
     "--arm": "let a real ankle robot deliver torque (docs/safety.md)",
+    "--arm-later": "start unarmed: Arm on the page, or perturbator/arm, before the first pulse",
     "--unproved": "arm it although its own watchdog was not proved here; the bag says so",
     "--require-record": "end the run if nothing more can be recorded, as on a full disk",
     "--no-ground-reaction": "leave out the ground reaction forces",
 }
+SESSION_FILE = "the file is one of a session"
 _NUMBERS = {
     "lead_time": Setting(
         f"real time: lead of promised torque (default {LEAD_TIME:g}); more for a slow network",
@@ -97,12 +100,32 @@ def checked_run(
     protocol.check_limits()
     check_walker(options.walker, options.detector, real_time=options.real_time)
     if drives:
-        switches = {"armed": options.arm, "unproved": options.unproved}
-        check_robot(protocol, real_time=options.real_time, **switches)
+        _check_arming(protocol, options)
     bag = options.out or bag_folder(protocol)
     if records:
         check_output(bag, exactly=options.out is not None)
     return protocol, bag
+
+
+def checked_session(file: Path | str | None, options: argparse.Namespace) -> Session:
+    """
+    Return the session of a file; checks all that the options say.
+
+    Raises SessionError, UsageError, LimitError or DeviceError.
+    """
+    if not file:
+        raise UsageError("--session: which one is missing; allowed: a session file")
+    session = read_session(Path(file))
+    check_numbers(options)
+    check_walker(options.walker, options.detector, real_time=options.real_time)
+    for block in session.blocks:
+        _check_arming(block.protocol, options)
+    return session
+
+
+def _check_arming(protocol: Protocol, options: argparse.Namespace) -> None:
+    armed = options.arm or options.arm_later
+    check_robot(protocol, real_time=options.real_time, armed=armed, unproved=options.unproved)
 
 
 def check_walker(walker: str, detector: str, *, real_time: bool) -> None:
@@ -131,7 +154,8 @@ def check_robot(protocol: Protocol, *, real_time: bool, armed: bool, unproved: b
         raise LimitError(f"driver: {driver.name} runs in real time only; add --real-time")
     if not armed:
         raise LimitError(
-            f"driver: {driver.name} applies real torque: see that all is well, then add --arm"
+            f"driver: {driver.name} applies real torque: see that all is well, then add --arm, or "
+            "--arm-later to arm it once the walk has begun"
         )
     require_proof(protocol.driver, unproved=unproved)
 

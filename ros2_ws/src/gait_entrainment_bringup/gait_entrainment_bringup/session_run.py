@@ -25,9 +25,11 @@ from gait_entrainment_bringup.commands.run import run_experiment
 from gait_entrainment_bringup.node_process import end_with
 from gait_entrainment_drivers.proof import preflight_of
 from gait_entrainment_drivers.signals import end_once, undisturbed
-from gait_entrainment_nodes.messaging.domain import claimed_domain
 from gait_entrainment_sessions.folder import KEY_HASH, SessionFolder
 from gait_entrainment_sessions.session_file import Session, SessionError
+
+# How often a paused session looks whether it may go on [s].
+_LOOKED = 0.1
 
 
 class BlockFailedError(EntrainmentError):
@@ -38,7 +40,8 @@ class SessionRun:
     """
     Conducts what is left of a session.
 
-    ``ask`` gets a question and returns the operator's answer; without a terminal nobody is asked.
+    Its blocks take place in a ROS ``domain``. ``ask`` gets a question and returns the operator's
+    answer; nobody is asked without a terminal, or where a page is shown instead.
     """
 
     def __init__(
@@ -46,10 +49,12 @@ class SessionRun:
         session: Session,
         folder: SessionFolder,
         options: argparse.Namespace,
+        domain: int,
         ask: Callable[[str], str] | None = None,
     ) -> None:
+        self._domain = domain
         self._session, self._folder, self._options = session, folder, options
-        self._ask = ask or (input if sys.stdin.isatty() else None)
+        self._ask = ask or (input if sys.stdin.isatty() and not options.page else None)
         # With nobody in the walker's place there is nobody to rest.
         self._rests = options.real_time and not options.no_rest
 
@@ -59,17 +64,23 @@ class SessionRun:
         if options.note:
             folder.note("note", text=options.note)
         if options.repeat is not None:
-            self._repeat(options.repeat, options.reason)
+            folder.repeat(options.reason, options.repeat)
+        if folder.paused is not None:  # by whoever has now had it go on
+            folder.note("go on", text="resumed")
         rested = not folder.runs()
-        while (number := folder.next_block()) is not None:
-            block = self._session.ordered[number - 1]
-            if self._rests and not rested:
-                self._rest(block.rest)
-            rested = False
-            if self._ask and not self._agreed(number):
+        while True:
+            if folder.paused is not None:
+                self._wait()
+            if (number := folder.next_block()) is None:
                 return
-            if folder.next_block() == number:  # else the one before is to be repeated
+            if self._rests and not rested:
+                self._rest(number)
+                rested = True
+            elif self._ask and not self._agreed(number):
+                return
+            elif folder.next_block() == number:  # else the one before is to be repeated
                 self._run(number)
+                rested = False
 
     def _agreed(self, number: int) -> bool:
         """Ask the operator what is next; return whether the session goes on now."""
@@ -91,18 +102,19 @@ class SessionRun:
                 self._folder.note("pause", number, text=text)
                 return False
             else:
-                self._repeat(number - 1, text)
+                self._folder.repeat(text)
                 return True
 
-    def _repeat(self, number: int, reason: str) -> None:
-        done = self._folder.runs()
-        if number not in done:
-            allowed = ", ".join(map(str, done)) or "none yet"
-            raise SessionError(f"repeat: block {number} is not done; allowed: {allowed}")
-        self._folder.note("repeat", number, done[number].name, reason)
+    def _wait(self) -> None:
+        """Wait until the operator has the session go on."""
+        print(f"{self._folder.standing()}; session/go_on ends it", file=sys.stderr, flush=True)
+        while self._folder.paused is not None:
+            time.sleep(_LOOKED)
 
-    def _rest(self, seconds: float) -> None:
-        """Count a rest down."""
+    def _rest(self, number: int) -> None:
+        """Count the rest before a block down."""
+        seconds = self._session.ordered[number - 1].rest
+        self._folder.note("rest", number, text=f"{seconds:g} s")
         end = time.monotonic() + seconds
         while (left := math.ceil(end - time.monotonic())) > 0:
             print(f"\r\x1b[Krest: {left} s", end="", file=sys.stderr, flush=True)
@@ -151,7 +163,9 @@ class SessionRun:
             run_experiment,
             protocol,
             bag,
-            options=self._options,
+            self._domain,
+            # One page is there for all of them.
+            options=argparse.Namespace(**vars(self._options) | {"page": False}),
             quiet=self._session.blind,  # a blinded operator does not see where the pulses fall
             about=about,
         )
@@ -222,8 +236,7 @@ def _conduct(parent: int, answer: Any, keyboard: int, conduct: Callable[..., Non
     try:
         if not end_with(parent):
             return
-        with claimed_domain() as domain:
-            conduct(domain=domain)
+        conduct()
     except (EntrainmentError, OSError) as error:
         reason = str(error)
     except KeyboardInterrupt:

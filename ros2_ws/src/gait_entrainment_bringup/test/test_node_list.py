@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 import rclpy
 import yaml
+from ament_index_python.packages import get_package_prefix
 
 from gait_entrainment.protocol import DEFAULT_PROTOCOL
 from gait_entrainment.settings import settings_of
@@ -105,6 +106,12 @@ def test_file_lists_what_a_user_may_set_at_its_default(tmp_path):
     assert found[0] == found[1]
     elsewhere = set(full_names(given)) | ELSEWHERE
     assert listed == (set(found[0]) - elsewhere)
+
+
+@pytest.mark.parametrize("node", [*sorted(ALL), DISPLAY, PAGE])
+def test_launch_finds_the_executable_of_each_node(node):
+    package = "gait_entrainment_page" if node == PAGE else "gait_entrainment_nodes"
+    assert (Path(get_package_prefix(package)) / "lib" / package / node).exists()
 
 
 def test_file_lists_what_a_user_may_set_of_the_page_at_its_default():

@@ -36,6 +36,7 @@ def conduct(tmp_path, monkeypatch):
         session = read_session(path)
         folder = SessionFolder.begin(tmp_path / "study", session)
         told = {"note": "", "repeat": None, "reason": "", "real_time": False, "no_rest": False}
+        told["page"] = False
         ended = itertools.chain(ends, itertools.repeat(""))
 
         def in_a_process(_self, protocol, bag, about):
@@ -47,7 +48,7 @@ def conduct(tmp_path, monkeypatch):
         if answers:
             replies = iter(answers)
             ask = lambda question: next(replies)  # noqa: E731, ARG005
-        run = SessionRun(session, folder, argparse.Namespace(**{**told, **options}), ask)
+        run = SessionRun(session, folder, argparse.Namespace(**{**told, **options}), 0, ask)
         run.conduct()
         return folder
 
@@ -82,6 +83,33 @@ def test_the_operator_notes_pauses_and_repeats_with_a_reason(conduct, capsys):
     ]
     conduct([""])
     assert [bag for _, bag, _ in conduct.conducted] == ["block-01", "block-01_run-2", "block-02"]
+
+
+def test_a_paused_session_waits_and_repeats_the_block_before_it_goes_on(
+    conduct, tmp_path, monkeypatch
+):
+    def desk(folder=tmp_path / "study/sub-P01/ses-1"):
+        return SessionFolder(folder)
+
+    def first_block():
+        desk().note("pause", 2, text="belt stopped")
+        yield ""
+        yield from itertools.repeat("")
+
+    def meanwhile(_seconds):
+        assert len(conduct.conducted) == 1
+        desk().repeat("belt stopped")
+        desk().note("go on", 1)
+
+    monkeypatch.setattr(session_run.time, "sleep", meanwhile)
+    folder = conduct(ends=first_block())
+    assert [bag for _, bag, _ in conduct.conducted] == ["block-01", "block-01_run-2", "block-02"]
+    assert [what for what, _, _ in ledger(folder)][:5] == [
+        "begun", "pause", "done", "repeat", "go on",
+    ]  # fmt: skip
+    folder.note("pause", text="and then the computer crashed")
+    conduct(repeat=2, reason="why")
+    assert [what for what, _, _ in ledger(folder)][-4:] == ["repeat", "go on", "begun", "done"]
 
 
 def test_the_end_of_the_input_is_a_pause(conduct, monkeypatch):

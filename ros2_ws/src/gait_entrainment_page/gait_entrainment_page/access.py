@@ -223,7 +223,7 @@ class Seat:
         return time.monotonic() - self._heard.get(self.holder, -1e9) < self.timeout
 
 
-def listen(host: str, port: int) -> socket.socket:
+def listen(host: str, port: int, option: str = "--port") -> socket.socket:
     """Return a socket that listens; UsageError if the port is taken, or the host is another."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     listener = socket.socket(family, socket.SOCK_STREAM)
@@ -234,9 +234,8 @@ def listen(host: str, port: int) -> socket.socket:
     except OSError as error:
         listener.close()
         if error.errno == errno.EADDRINUSE:
-            raise UsageError(
-                f"--port: {port} is taken by another program; choose another, or 0 for a free one"
-            ) from None
+            taken = f"{option}: {port} is taken by another program"
+            raise UsageError(f"{taken}; choose another, or 0 for a free one") from None
         raise UsageError(
             f"--host: {host}: {error.strerror}; allowed: an address of here"
         ) from None

@@ -8,6 +8,7 @@ import subprocess
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 from gait_entrainment.errors import EntrainmentError
@@ -28,41 +29,37 @@ class ActionError(EntrainmentError):
     """An action from the page that cannot be done now, or nobody answered."""
 
 
-class Robot(Protocol):
+class Nodes(Protocol):
     """What the page asks of the nodes; a bag offers none of it."""
 
-    def stop(self) -> str:
-        """Stop a robot that another machine drives, over ROS; return the answer."""
+    def ask(self, what: str, reason: str = "") -> str:
+        """
+        Stop or arm the robot; have the session pause, go on or repeat a block for a reason.
 
-    def arm(self) -> str:
-        """Arm the robot; return the answer."""
+        ``what`` is one of stop, arm, pause, go_on and repeat. Returns the answer; raises
+        ActionError for a refusal, or if nobody answers.
+        """
 
     def note(self, text: str) -> str:
         """Publish a note."""
 
-    def pause(self, *, paused: bool) -> str:
-        """Have the session wait before its next block, or go on."""
-
-    def repeat(self) -> str:
-        """Have the session walk its last block again."""
-
     def offered(self) -> set[str]:
-        """Return which of stop, arm, pause and repeat somebody answers."""
+        """Return what of all that somebody answers."""
 
 
-def stop(robot: Robot | None = None) -> Stopped:
+def stop(nodes: Nodes | None = None) -> Stopped:
     """
     Bring every robot of this machine to zero torque, as `entrain stop` does.
 
-    If this machine drives none, the ``robot`` of another one is asked over ROS.
+    If this machine drives none, that of another one is asked over ROS.
     """
     answers = stop_all()
     lines = [f"{name}: {a.message if a else 'no answer'}" for name, a in answers.items()]
     done = bool(answers) and all(answer and answer.done for answer in answers.values())
     if not answers:
-        if robot is None or "stop" not in robot.offered():
+        if nodes is None or "stop" not in nodes.offered():
             return Stopped(False, ("no robot is driven by this machine",))
-        done, answer = attempted(robot.stop)
+        done, answer = attempted(partial(nodes.ask, "stop"))
         lines = [f"asked over ROS: {answer}"]
     if not done:
         lines.append("not everybody confirmed the stop: cut the power")
@@ -71,15 +68,16 @@ def stop(robot: Robot | None = None) -> Stopped:
 
 class Command:
     """
-    ``entrain run`` or ``entrain preflight`` with the options of the page, one at a time.
+    What the page may start, or the checklist before it, one at a time.
 
-    It is a process of its own: a run outlives the page that started it. ``words`` are the options;
-    without any, there is nothing to start. A run of which the page is a ``heartbeat`` is told so.
+    It is a process of its own: a run outlives the page that started it. ``words`` are those of
+    `entrain run` or `entrain session`; without any, there is nothing to start. A run of which the
+    page is a ``heartbeat`` is told so.
     """
 
     def __init__(self, words: Sequence[str], *, heartbeat: bool = False) -> None:
         self.words = tuple(words)
-        self._of_run = ("--heartbeat",) if heartbeat else ()
+        self._heartbeat = ("--heartbeat",) if heartbeat else ()
         self._process: subprocess.Popen[bytes] | None = None
         self._output = tempfile.TemporaryFile()  # noqa: SIM115, as long as the page
         self.name = ""
@@ -89,32 +87,42 @@ class Command:
         """Whether a command goes on."""
         return self._process is not None and self._process.poll() is None
 
-    def start(self, name: str) -> str:
-        """Start a command; ActionError if one goes on, or nothing was given to start."""
-        if not self.words:
-            raise ActionError("nothing to start: open the page with entrain page PROTOCOL.yaml")
+    def start(self, *, preflight: bool = False) -> str:
+        """Start it, or its checklist; ActionError if one of them goes on."""
         if self.runs:
             raise ActionError(f"entrain {self.name} goes on: wait for its end, or stop it")
-        self.name = name
+        kind, *options = self.words
+        words = [*self.words, *self._heartbeat]
+        if preflight:
+            session = ["--session"] if kind == "session" else []
+            words = ["preflight", *session, *options]
+        self.name = words[0]
         self._output.seek(0)
         self._output.truncate()
         self._process = subprocess.Popen(
-            ["entrain", name, *self.words, *(self._of_run if name == "run" else ())],
+            ["entrain", *words],
+            env={**os.environ, "PYTHONUNBUFFERED": "1"},  # each line as it is printed
             stdin=subprocess.DEVNULL,
             stdout=self._output,
             stderr=subprocess.STDOUT,
             start_new_session=True,
         )
-        return f"entrain {name} has started"
+        return f"entrain {self.name} has started"
 
-    def told(self) -> list[str]:
-        """Return the last lines that the command has printed, and how it ended."""
+    def told(self, *, outcome: bool = True) -> list[str]:
+        """
+        Return the last lines that the command has printed, and how it ended.
+
+        Without ``outcome`` only the latter of a run that ended well: the rest tells the condition.
+        """
         if self._process is None:
             return []
         size = os.fstat(self._output.fileno()).st_size
         text = os.pread(self._output.fileno(), 8192, max(size - 8192, 0)).decode(errors="replace")
         lines = [line.rpartition("\r")[2] for line in text.splitlines()][-_TOLD:]
         code = self._process.poll()
+        if self.name == "run" and not (outcome or code):
+            lines = []
         if code is not None:
             lines.append(f"entrain {self.name} has ended with exit code {code}")
         return lines

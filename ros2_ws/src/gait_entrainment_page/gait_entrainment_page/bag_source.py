@@ -36,7 +36,7 @@ class BagSource:
     does not hold and the page would show. Raises BagError if it is no bag or has no gait events.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, blinded: bool = False) -> None:
         self._bag = BagReader(path)
         self._lock = threading.Lock()
         recorded = self._bag.find_topic(names.GAIT_EVENTS)
@@ -61,7 +61,7 @@ class BagSource:
         }
         counts = self._bag.counts
         self.lacking = [w for n, w in wanted.items() if not counts.get(self._namespace + n)]
-        self.view = View()
+        self.view = View(blinded=blinded)
         self.record = (
             f"{self._bag.message_count} messages, {self._bag.size / 1e6:.1f} MB, "
             f"{self._bag.duration / NANOSECONDS_PER_SECOND:.0f} s"
@@ -72,7 +72,7 @@ class BagSource:
         """Bring the view to an instant [ns]."""
         with self._lock:  # of the reader: the view stays free meanwhile
             samples = self._samples(instant)
-            fresh = View()
+            fresh = View(blinded=self.view.blinded)
             fresh.version = self.view.version + 1
             entries = [entry for entry in self._messages if entry[0] <= instant]
             # Readings come before the stride that cuts them out.

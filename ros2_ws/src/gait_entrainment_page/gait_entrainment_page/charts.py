@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The charts of the page as options of ECharts.
+The charts of the page as options of ECharts; each would tell a blinded operator the condition.
 
 Colours are those of Okabe and Ito (2008), which colour-blind people tell apart; lines differ in
 their dashes too.
@@ -18,13 +18,13 @@ BLUE, VERMILLION, GREEN, SKY, BLACK, GREY = (
     "#0072B2", "#D55E00", "#009E73", "#56B4E9", "#1A1A1A", "#5F6B76",
 )  # fmt: skip
 _FONT = 17  # [px], to be read from two metres
-_MARGIN = 0.08  # of the range of an axis, above and below
+_DARK_GREEN = "#00704F"  # of letters on the shade
 
 Options = dict[str, Any]
 Points = list[list[float]]
 
 
-def period_chart(view: View, *, blinded: bool) -> Options:
+def period_chart(view: View) -> Options:
     """Return stride period and pulse period over the strides."""
     strides: Points = [[n, period] for n, period in view.strides]
     series = [_line("stride period", strides, BLUE, symbol="circle", symbolSize=6)]
@@ -34,17 +34,15 @@ def period_chart(view: View, *, blinded: bool) -> Options:
             ("baseline", view.state.measured_period, GREY, "dotted"),
             ("pulse period", view.state.pulse_period, VERMILLION, "dashed"),
         ):
-            if not math.isnan(value) and not (blinded and name == "pulse period"):
+            if not math.isnan(value):
                 level = [[first, value], [last, value]]
                 series.append(_line(name, level, color, dash))
     values = [y for line in series for _, y in line["data"]]
     return _chart("stride", "s", series, _range(values, least=0.02))
 
 
-def lag_chart(view: View, *, blinded: bool) -> Options:
+def lag_chart(view: View) -> Options:
     """Return the phase lag over the strides, double stance shaded, in ms and % of the stride."""
-    if blinded:
-        return _chart("hidden: this session is blinded", "", [], (0.0, 1.0))
     lags: Points = [[n, 1e3 * lag] for n, lag in view.lags]
     series = [
         _line("phase lag: pulse onset minus toe-off", lags, BLACK, symbol="circle", symbolSize=7)
@@ -67,10 +65,8 @@ def lag_chart(view: View, *, blinded: bool) -> Options:
     return chart
 
 
-def torque_chart(view: View, *, blinded: bool) -> Options:
+def torque_chart(view: View) -> Options:
     """Return the torque of the last stride, commanded and measured."""
-    if blinded:
-        return _chart("hidden: this session is blinded", "", [], (0.0, 1.0))
     commanded: Points = [[at, c] for at, c, _ in view.torque]
     measured: Points = [[at, m] for at, _, m in view.torque if not math.isnan(m)]
     series = [_line("commanded", commanded, BLACK, "dashed", step="end")]
@@ -96,19 +92,19 @@ def _line(name: str, data: Points, color: str, dash: str = "solid", **more: Any)
 
 
 def _shade(begin: Options, end: Options) -> Options:
-    label = {"show": True, "position": "insideBottomLeft", "color": GREEN, "fontSize": _FONT - 2}
+    label = {"show": True, "position": "insideBottomLeft", "color": _DARK_GREEN, "fontSize": _FONT}
     area = [{"name": "double stance", **begin}, end]
     style = {"color": GREEN, "opacity": 0.18}
     return {"silent": True, "itemStyle": style, "label": label, "data": [area]}
 
 
 def _range(values: list[float], least: float) -> tuple[float, float]:
-    """Return a range that holds values with a margin, and is not shorter than ``least``."""
+    """Return a range that holds values and is not shorter than ``least``."""
     values = [value for value in values if math.isfinite(value)]
     if not values:
         return 0.0, 1.0
     low, high = min(values), max(values)
-    margin = max(_MARGIN * (high - low), (least - (high - low)) / 2)
+    margin = max((least - (high - low)) / 2, 0.0)
     return low - margin, high + margin
 
 
@@ -138,6 +134,7 @@ def _chart(across: str, up: str, series: list[Options], within: tuple[float, flo
             "top": 0,
             "textStyle": text,
             "itemWidth": 34,
+            "itemStyle": {"opacity": 0},  # lines alone
             "data": [line["name"] for line in series],
         },
         "xAxis": {

@@ -20,11 +20,11 @@ from nicegui import ui
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment_page.access import ACT, Access, Seat, one_line
-from gait_entrainment_page.actions import Command, Robot, attempted, stop
+from gait_entrainment_page.actions import Command, Nodes, attempted, stop
 from gait_entrainment_page.bag_source import BagSource
 from gait_entrainment_page.charts import lag_chart, period_chart, torque_chart
 from gait_entrainment_page.server import Server, state_of
-from gait_entrainment_page.view import View
+from gait_entrainment_page.view import SESSION, View
 
 # Legs are drawn at every tick [s], words at every fifth, charts if there is something new.
 TICK = 0.1
@@ -34,6 +34,15 @@ _CHARTS = 10
 _LITTLE = 2 * 10**9
 _HEAD = (
     """<link rel="stylesheet" href="/static/page.css"><script src="/static/page.js"></script>"""
+)
+_OF_SESSION = {
+    "pause": "Pause before the next block",
+    "go_on": "Go on",
+    "repeat": "Repeat the block",
+}
+_BLINDED = (
+    "Blinded: torque, periods, lag, verdict and names of blocks are hidden; STOP, limits and "
+    "faults are not."
 )
 _HEARTBEAT = (
     "This page is the operator's heartbeat: closing, hiding or leaving it ends the robot's torque."
@@ -52,10 +61,10 @@ class Page:
         Who acts, and who may.
     listener
         The socket to serve at.
-    robot, command
+    nodes, command
         What can be asked of the nodes, and what can be started; None for a bag.
-    heartbeat, blinded
-        Whether the page is the operator's sign of life; whether the condition stays hidden.
+    heartbeat
+        Whether the page is the operator's sign of life.
     record
         Folder of the record, whose disk is looked after.
     bag
@@ -70,15 +79,14 @@ class Page:
         access: Access,
         listener: socket.socket,
         *,
-        robot: Robot | None = None,
+        nodes: Nodes | None = None,
         command: Command | None = None,
         heartbeat: bool = False,
-        blinded: bool = False,
         record: str = "",
         bag: BagSource | None = None,
     ) -> None:
-        self.view, self.seat, self.robot, self.command = view, seat, robot, command
-        self.heartbeat, self.blinded, self.record, self.bag = heartbeat, blinded, record, bag
+        self.view, self.seat, self.nodes, self.command = view, seat, nodes, command
+        self.heartbeat, self.record, self.bag = heartbeat, record, bag
         self._charts: tuple[Any, list[dict[str, Any]]] = (None, [])
         app = FastAPI(openapi_url=None)
         app.add_api_route("/stop", self._stop, methods=["POST"])
@@ -97,7 +105,7 @@ class Page:
 
     async def _stop(self) -> dict[str, Any]:
         """Stop every robot of this machine; whoever may look may stop."""
-        stopped = await asyncio.to_thread(stop, self.robot)
+        stopped = await asyncio.to_thread(stop, self.nodes)
         return {"done": stopped.done, "lines": stopped.lines}
 
     async def _alive(self, request: Request) -> dict[str, float]:
@@ -124,8 +132,7 @@ class Page:
             version = (id(view), view.version)
             if version != self._charts[0]:
                 charts = (period_chart, lag_chart, torque_chart)
-                made = [chart(view, blinded=self.blinded) for chart in charts]
-                self._charts = (version, made)
+                self._charts = (version, [chart(view) for chart in charts])
         return self._charts
 
 
@@ -144,7 +151,6 @@ class Shown:
     version: Any = None
     legs: Any = None
     answer: str = ""
-    paused: bool = False
 
     @property
     def acts(self) -> bool:
@@ -167,17 +173,14 @@ class Shown:
         ui.element("div").classes("banner warn").props('id="clock"')
         if self.page.heartbeat:
             self._label("heartbeat", "banner warn", _HEARTBEAT)
+        if self.page.view().blinded:
+            self._label("blinded", "banner warn", _BLINDED)
         self._label("alarm", "banner alarm")
         if self.page.bag is not None:
             self._seek(self.page.bag)
         with ui.element("div").classes("panels"):
-            self._chart("Stride period against pulse period", "w5")
-            self._chart("Phase lag", "w4")
-            with self._panel("Is the gait entrained?", "w3"):
-                self._label("verdict", "verdict")
-                self._label("figures", "said")
-                self._label("lag", "lag")
-            self._chart("Ankle torque of the last stride", "w5")
+            if not self.page.view().blinded:
+                self._gait()
             with self._panel("Legs", "w4"):
                 ui.html('<canvas class="legs"></canvas>', sanitize=False).style(
                     "flex:1; display:flex"
@@ -185,9 +188,19 @@ class Shown:
             self._table("robot", "Ankle robot", "w3")
             self._table("sensors", "Gait events", "w3")
             self._table("record", "Record", "w4")
-            with self._panel("Operator", "w5"):
+            with self._panel("Operator", "w5 first"):
                 self._operator()
         self.tick()
+
+    def _gait(self) -> None:
+        """Make what tells whether the gait follows, and what the robot does."""
+        self._chart("Stride period against pulse period", "w5 first")
+        self._chart("Phase lag", "w4 first")
+        with self._panel("Is the gait entrained?", "w3 first"):
+            self._label("verdict", "verdict")
+            self._label("figures", "said")
+            self._label("lag", "lag")
+        self._chart("Ankle torque of the last stride", "w5")
 
     def _label(self, name: str, classes: str, text: str = "") -> None:
         self.labels[name] = ui.label(text).classes(classes)
@@ -214,28 +227,30 @@ class Shown:
 
     def _operator(self) -> None:
         self._label("seat", "said")
+        self._label("session", "said")
         with ui.element("div").classes("acts"):
-            acts: dict[str, tuple[str, Callable[[], str]]] = {}
             if (command := self.page.command) is not None and command.words:
-                acts["preflight"] = ("Preflight", partial(command.start, "preflight"))
-                acts["start"] = ("Start", partial(command.start, "run"))
-            if (robot := self.page.robot) is not None:
-                acts["arm"] = ("Arm", robot.arm)
-                acts["pause"] = ("Pause before the next block", self._pause)
-                acts["repeat"] = ("Repeat the block", robot.repeat)
-            for name, (text, action) in acts.items():
-                button = ui.button(text, on_click=partial(self._act, action))
-                self.buttons[name] = button.props("unelevated no-caps color=blue-10")
-            take = ui.button("Take over", on_click=self._take_over)
-            self.buttons["take"] = take.props("unelevated no-caps color=brown-9")
-        if self.page.robot is not None:
+                preflight = partial(command.start, preflight=True)
+                self._button("preflight", "Preflight", partial(self._act, preflight))
+                self._button("start", "Start", partial(self._act, command.start))
+            if (nodes := self.page.nodes) is not None:
+                self._button("arm", "Arm", partial(self._act, partial(nodes.ask, "arm")))
+                for name, text in _OF_SESSION.items():
+                    self._button(name, text, partial(self._say, partial(nodes.ask, name)))
+            self._button("take", "Take over", self._take_over, "brown-9")
+        if self.page.nodes is not None:
             with ui.element("div").classes("acts"):
-                self.note = ui.input("Note").props("outlined dense maxlength=500")
+                self.note = ui.input("Note or reason").props("outlined dense maxlength=500")
                 self.note.on("keydown.enter", self._note)
-                button = ui.button("Note it", on_click=self._note)
-                self.buttons["note"] = button.props("unelevated no-caps color=blue-10")
+                self._button("note", "Note it", self._note)
         self._label("answer", "said")
         self.rows["notes"] = (ui.element("div").classes("rows"), None)
+
+    def _button(
+        self, name: str, text: str, on_click: Callable[[], Any], color: str = "blue-10"
+    ) -> None:
+        button = ui.button(text, on_click=on_click)
+        self.buttons[name] = button.props(f"unelevated no-caps color={color}")
 
     def _seek(self, bag: BagSource) -> None:
         seconds = (bag.end - bag.start) / NANOSECONDS_PER_SECOND
@@ -253,31 +268,29 @@ class Shown:
 
     # What a click does
 
-    async def _act(self, action: Callable[[], str]) -> None:
-        """Do what the operator asks for, and tell how it went."""
+    async def _act(self, action: Callable[[], str]) -> bool:
+        """Do what the operator asks for, and tell how it went; return whether it was done."""
         if not self.acts:
             self.answer = "Another browser is the operator: take over first."
-            return
+            return False
         done, answer = await asyncio.to_thread(attempted, action)
         self.answer = answer if done else f"Refused: {answer}"
+        return done
 
     def _take_over(self) -> None:
         if self.may_act:
             self.page.seat.take(self.browser)
             self.answer = ""
 
-    def _pause(self) -> str:
-        assert self.page.robot is not None
-        answer = self.page.robot.pause(paused=not self.paused)
-        self.paused = not self.paused
-        return answer
-
     async def _note(self) -> None:
-        assert self.page.robot is not None
-        if text := one_line(self.note.value or ""):
-            await self._act(partial(self.page.robot.note, text))
-            if self.acts:
-                self.note.value = ""
+        assert self.page.nodes is not None
+        if one_line(self.note.value or ""):
+            await self._say(self.page.nodes.note)
+
+    async def _say(self, action: Callable[[str], str]) -> None:
+        """Do something with what was typed: a note, or a reason."""
+        if await self._act(partial(action, one_line(self.note.value or ""))):
+            self.note.value = ""
 
     # How it is kept up to date
 
@@ -285,14 +298,13 @@ class Shown:
         """Bring the browser up to date."""
         view = self.page.view()
         with view.lock:
-            legs = (view.legs, view.side, (view.robot and view.robot.commanded_torque) or 0.0)
+            legs = (view.legs, view.side, view.pushes)
             if self.ticks % _WORDS == 0:
                 self._words(view)
         if view.legs and legs != self.legs:
             self.legs = legs
-            angles, side, torque = legs
-            ui.run_javascript(f"entrain.legs({json.dumps(angles)},{json.dumps(side)},{torque})")
-        if self.ticks % _CHARTS == 0:
+            ui.run_javascript(f"entrain.legs({','.join(map(json.dumps, legs))})")
+        if self.charts and self.ticks % _CHARTS == 0:
             version, options = self.page.chart_options()
             if version != self.version:
                 self.version = version
@@ -308,23 +320,21 @@ class Shown:
         self._set("stride", f"{state.stride} of {state.strides}" if state else "–")
         self._set("left", _clock(view.time_left()))
         self._set("measured", view.measured())
-        verdict, figures = view.verdict_words()
-        if self.page.blinded:
-            verdict, figures = "hidden", "This session is blinded."
-        self._set("verdict", verdict)
-        word = verdict.partition(" ")[0]
-        self.labels["verdict"].classes(replace=f"verdict {word}")
-        self._set("figures", figures)
-        self._set("lag", "" if self.page.blinded else f"lag {view.lag()}")
+        if not view.blinded:
+            verdict, figures = view.verdict_words()
+            self._set("verdict", verdict)
+            word = verdict.partition(" ")[0]
+            self.labels["verdict"].classes(replace=f"verdict {word}")
+            self._set("figures", figures)
+            self._set("lag", f"lag {view.lag()}")
         alarm = state.message if view.part == "failed" else ""
         if view.robot is not None and view.robot.faults:
             alarm = f"Robot: {', '.join(view.robot.faults)}. {view.measured()} measured. {alarm}"
         self._set("alarm", alarm)
         if bag is not None:
             self._set("instant", _clock((view.now - bag.start) / NANOSECONDS_PER_SECOND))
-        hidden = {"commanded", "limits"} if self.page.blinded else set()
-        robot = [row for row in view.robot_words() if row[0] not in hidden]
-        self._rows("robot", robot + [("told", line) for line in view.troubles][-2:])
+        troubles = [("told", line) for line in view.troubles][-2:]
+        self._rows("robot", view.robot_words() + troubles)
         self._rows("sensors", view.sensor_words())
         self._rows("record", self._record_words(view))
         self._rows("notes", [(_of_day(at), text) for at, _, text in view.notes][-3:])
@@ -342,23 +352,22 @@ class Shown:
             away = "" if self.page.seat.watched else " and is away"
             seat = f"Another browser is the operator{away}. STOP works here too."
         self._set("seat", seat)
-        command, robot = self.page.command, self.page.robot
-        offered = robot.offered() if robot is not None else set()
+        command, nodes = self.page.command, self.page.nodes
+        offered = nodes.offered() if nodes is not None else set()
         going_on = view.going_on or (command is not None and command.runs)
+        session, waits = view.session(time.monotonic())
+        self._set("session", session)
+        self.labels["session"].classes(replace="said waits" if waits else "said")
         usable = {"preflight": not going_on, "start": not going_on, "note": True}
         for name, button in self.buttons.items():
             if name == "take":
                 button.set_visibility(self.may_act and not self.acts)
-            elif name in ("pause", "repeat"):  # of a session
-                button.set_visibility(name in offered)
+            elif name in _OF_SESSION:
+                button.set_visibility(name in offered and name != ("pause" if waits else "go_on"))
                 button.set_enabled(self.acts)
             else:
                 button.set_enabled(self.acts and usable.get(name, name in offered))
-        if "pause" in self.buttons:
-            self.buttons["pause"].set_text(
-                "Go on" if self.paused else "Pause before the next block"
-            )
-        told = command.told() if command is not None else []
+        told = command.told(outcome=not view.blinded) if command is not None else []
         self._set("answer", "\n".join([self.answer, *told[-4:]]).strip())
         self._tell_script()
 
@@ -372,7 +381,10 @@ class Shown:
     def _record_words(self, view: View) -> list[tuple[str, str]]:
         if self.page.bag is not None:
             return [("bag", self.page.bag.path.name), ("holds", self.page.bag.record)]
-        recorder = next((s for n, s in view.nodes.items() if n.endswith("bag_recorder")), None)
+        nodes = {name.rpartition("/")[2]: state for name, state in view.nodes.items()}
+        if (player := nodes.get("bag_player")) is not None:  # what else is heard was recorded
+            return [("replay", player.message)]
+        recorder = nodes.get("bag_recorder")
         rows = [("record", recorder.message if recorder else "no recorder is heard")]
         if recorder and "messages" in recorder.values:
             rows.append(("messages", recorder.values["messages"]))
@@ -385,7 +397,7 @@ class Shown:
         rows += [
             (name.rpartition("/")[2], f"{level}: {message}" if level != "ok" else message)
             for name, level, message in view.node_words(time.monotonic())
-            if not name.endswith(("bag_recorder", "operator_page"))
+            if not name.endswith(("bag_recorder", "operator_page", SESSION))
         ]
         return rows
 

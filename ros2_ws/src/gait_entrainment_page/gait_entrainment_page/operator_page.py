@@ -20,11 +20,12 @@ from typing import Any
 
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
-from std_srvs.srv import SetBool, Trigger
+from std_srvs.srv import Trigger
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment.settings import setting, settings_of
 from gait_entrainment_msgs.msg import Note
+from gait_entrainment_msgs.srv import AskSession
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.stamps import header
 from gait_entrainment_nodes.nodes.loop import run_node
@@ -64,11 +65,12 @@ SAMPLED = (
     # Only the latest posture is drawn.
     (topics.JOINT_STATES, topics.quality(1, reliable=False)),
 )
-SERVICES = {
+SERVICES: dict[str, tuple[Any, str]] = {
     "stop": (Trigger, "perturbator/stop"),
     "arm": (Trigger, "perturbator/arm"),
-    "pause": (SetBool, "session/pause"),
-    "repeat": (Trigger, "session/repeat"),
+    "pause": (AskSession, "session/pause"),
+    "go_on": (AskSession, "session/go_on"),
+    "repeat": (AskSession, "session/repeat"),
 }
 
 
@@ -87,7 +89,7 @@ class Settings:
         0, "port of a Foxglove connection to the same data; 0: none", "1", (0, 65535)
     )
     record: str = setting("", "folder of the record, whose disk is looked after")
-    command: tuple[str, ...] = texts("options of the entrain run that the page may start")
+    command: tuple[str, ...] = texts("words of the entrain run or session that the page may start")
 
 
 class OperatorPage(Participant):
@@ -100,7 +102,8 @@ class OperatorPage(Participant):
     def __init__(self) -> None:
         super().__init__("operator_page")
         self.begin_participation(settings=Settings, fixed=settings_of(Settings))
-        settings, self.view = self.settings, View()
+        settings = self.settings
+        self.view = View(blinded=settings.blinded)
         access = Access.of_environment(settings.host)
         listener = listen(settings.host, settings.port)
         self._foxglove: Any = None
@@ -130,10 +133,9 @@ class OperatorPage(Participant):
             Seat(settings.heartbeat_timeout),
             access,
             listener,
-            robot=self,
+            nodes=self,
             command=Command(settings.command, heartbeat=settings.heartbeat),
             heartbeat=settings.heartbeat,
-            blinded=settings.blinded,
             record=settings.record,
         )
 
@@ -191,24 +193,8 @@ class OperatorPage(Participant):
     # Acting, from the threads of the web server
 
     def offered(self) -> set[str]:
-        """Return which of stop, arm, pause and repeat somebody answers."""
+        """Return what of SERVICES somebody answers."""
         return {name for name, client in self._services_asked.items() if client.service_is_ready()}
-
-    def stop(self) -> str:
-        """Stop a robot that another machine drives, over ROS; return the answer."""
-        return self._ask("stop", Trigger.Request())
-
-    def arm(self) -> str:
-        """Arm the robot; return the answer."""
-        return self._ask("arm", Trigger.Request())
-
-    def pause(self, *, paused: bool) -> str:
-        """Have the session wait before its next block, or go on."""
-        return self._ask("pause", SetBool.Request(data=paused))
-
-    def repeat(self) -> str:
-        """Have the session walk its last block again."""
-        return self._ask("repeat", Trigger.Request())
 
     def note(self, text: str) -> str:
         """Publish a note, with the run's own time where that is not the wall clock's."""
@@ -222,8 +208,10 @@ class OperatorPage(Participant):
         self._wishes.put(publish)
         return "noted"
 
-    def _ask(self, name: str, request: Any) -> str:
-        """Ask a service; ActionError if it refuses or does not answer."""
+    def ask(self, what: str, reason: str = "") -> str:
+        """Ask one of SERVICES; ActionError if it refuses or does not answer."""
+        kind, service = SERVICES[what]
+        request = kind.Request(reason=reason) if kind is AskSession else kind.Request()
         answered, answers = threading.Event(), []
 
         def on_answer(future: Any) -> None:
@@ -231,14 +219,14 @@ class OperatorPage(Participant):
             answered.set()
 
         def ask() -> None:
-            self._services_asked[name].call_async(request).add_done_callback(on_answer)
+            self._services_asked[what].call_async(request).add_done_callback(on_answer)
 
         self._wishes.put(ask)
         if not answered.wait(ANSWER_TIMEOUT):
-            raise ActionError(f"{SERVICES[name][1]} does not answer")
+            raise ActionError(f"{service} does not answer")
         answer = answers[0]
         if not answer.success:
-            raise ActionError(answer.message or f"{SERVICES[name][1]} refused")
+            raise ActionError(answer.message or f"{service} refused")
         return str(answer.message)
 
     def on_stop(self) -> None:

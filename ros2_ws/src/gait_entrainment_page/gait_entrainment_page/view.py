@@ -41,10 +41,13 @@ _LINES_KEPT = 8
 STALE_AFTER = 5.0
 PARTS = ("waiting", "baseline", "pulses", "washout", "finished", "failed", "rest")
 STATUSES = ("inactive", "active", "stopped", "fault")
+_ACTIVE = STATUSES.index("active")
 _LEVELS = ("ok", "warning", "error", "stale")
 JOINTS = ("l_hip", "r_hip", "l_ankle", "r_ankle")
-# Limits that are told.
+# Limits that are told; one of them follows from the pulses of the block.
 _LIMITS = ("torque", "duration", "rate", "rising")
+_TELLING = "rate"
+SESSION = "session"  # the node that tells how a session stands
 _NAN = math.nan
 
 
@@ -62,11 +65,13 @@ class View:
     """
     The run as it stands. ``lock`` is held by whoever reads or writes it.
 
-    Stamps are nanoseconds, as recorded; ``version`` grows with what the charts are made of.
+    Stamps are nanoseconds, as recorded; ``version`` grows with what the charts are made of. A
+    ``blinded`` one says nothing of the robot and the protocol by which a block would be known; its
+    charts, lag and verdict are not to be shown.
     """
 
-    def __init__(self) -> None:
-        self.lock = threading.RLock()
+    def __init__(self, *, blinded: bool = False) -> None:
+        self.lock, self.blinded = threading.RLock(), blinded
         self._take: dict[str, Callable[[Any], None]] = {
             names.EXPERIMENT_STATE: self._on_state,
             names.STRIDES: self._on_stride,
@@ -79,12 +84,14 @@ class View:
             names.JOINT_STATES: self._on_joints,
             names.OPERATOR_NOTES: self._on_note,
         }
-        self.version = self.now = 0
+        self.version = 0
         self.nodes: dict[str, NodeState] = {}
+        self.notes: deque[tuple[int, str, str]] = deque(maxlen=_LINES_KEPT)
         self._reset()
 
     def _reset(self) -> None:
         """Forget the run: another one begins."""
+        self.now = 0
         self.state: Any = None  # latest ExperimentState
         self.side: Side | None = None  # the perturbed leg
         self.strides: deque[tuple[int, float]] = deque(maxlen=STRIDES_SHOWN)  # number, period [s]
@@ -103,7 +110,6 @@ class View:
         self.torque: list[tuple[float, float, float]] = []
         self.toe_off = self.double_stance = _NAN  # of that stride, from its start [s]
         self.troubles: deque[str] = deque(maxlen=_LINES_KEPT)
-        self.notes: deque[tuple[int, str, str]] = deque(maxlen=_LINES_KEPT)
         self._readings: deque[tuple[int, float, float]] = deque(maxlen=READINGS_KEPT)
         self._strikes: deque[int] = deque(maxlen=_EVENTS_COUNTED)
         self._toe_off_at = self._other_strike_at = 0
@@ -223,13 +229,14 @@ class View:
         return statistics.median(last) if last else _NAN
 
     def part_words(self) -> str:
-        """Return the part of the protocol, and the block by its neutral name if it has several."""
+        """Return the part of the protocol, and the block if it has several."""
         if self.state is None:
             return "no run"
         blocks = getattr(self.state, "blocks", 1)  # which bags of earlier versions lack
         if blocks < 2:
             return self.part
-        return f"{self.part}, {self.state.block_name or self.state.block} of {blocks} blocks"
+        name = "" if self.blinded else self.state.block_name
+        return f"{self.part}, {name or self.state.block} of {blocks} blocks"
 
     def time_left(self) -> float:
         """Return how long the rest takes at the period of the last strides [s]; NaN if unknown."""
@@ -272,10 +279,21 @@ class View:
             )
         return word, f"{meaning[0].upper()}{meaning[1:]}.{figures}"
 
+    @property
+    def pushes(self) -> bool:
+        """Whether torque is commanded now."""
+        return not self.blinded and self.robot is not None and self.robot.commanded_torque != 0
+
     def measured(self) -> str:
-        """Return the torque as measured; never zero where none was measured."""
+        """
+        Return the torque as measured; never zero where none was measured.
+
+        A blinded operator learns it once the robot is stopped or has a fault: whether it falls.
+        """
         if self.robot is None:
             return "nothing heard of the robot"
+        if self.blinded and self.robot.status == _ACTIVE and not self.robot.faults:
+            return "hidden"
         torque = self.robot.measured_torque
         if math.isnan(torque):
             return "not measured"
@@ -286,11 +304,14 @@ class View:
         rows = [("state", "not heard")]
         if self.robot is not None:
             rows = [("state", STATUSES[min(self.robot.status, 3)])]
-            rows.append(("commanded", _torque(self.robot.commanded_torque)))
+            if not self.blinded:
+                rows.append(("commanded", _torque(self.robot.commanded_torque)))
             rows.append(("measured", self.measured()))
             rows.append(("faults", ", ".join(self.robot.faults) or "none"))
         if (setup := self.setup) is not None:
             limits = dict(zip(setup.limit_names, setup.limits, strict=False))
+            if self.blinded:
+                limits.pop(_TELLING, None)
             rows.append(("driver", setup.driver.partition(":")[0]))
             if not self.simulated:
                 rows.append(("armed by", setup.armed_by or "nobody"))
@@ -321,12 +342,25 @@ class View:
                 rows.append(("rate", f"{60 * (len(self._strikes) - 1) / span:.1f} steps a minute"))
         return rows
 
+    def session(self, now: float) -> tuple[str, bool]:
+        """Return how a session stands that somebody conducts, and whether it was paused."""
+        for name, level, message in self.node_words(now):
+            if name.endswith(SESSION) and level != "stale":
+                return message, level == "warning"
+        return "", False
+
     def node_words(self, now: float) -> list[tuple[str, str, str]]:
-        """Return name, level and message of every node; ``now`` is on the clock of `heard_at`."""
+        """
+        Return name, level and message of every node; ``now`` is on the clock of `heard_at`.
+
+        Those that have ended with their run, as all do between two blocks, are left out.
+        """
         rows = []
         for name, state in sorted(self.nodes.items()):
             silent = now - state.heard_at
             stale = silent > STALE_AFTER
+            if stale and self.state is not None and not self.going_on:
+                continue
             level = "stale" if stale else state.level
             rows.append((name, level, f"silent for {silent:.0f} s" if stale else state.message))
         return rows

@@ -8,7 +8,7 @@ import math
 from types import SimpleNamespace as Message
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
@@ -48,7 +48,7 @@ def robot(at, commanded, measured, faults=()):
     )  # fmt: skip
 
 
-def walk(view, first, last, strides, readings=20):
+def walk(view, first, last, strides, readings=20, height=10.0):
     """Walk strides of one second: toe-off at 0.6 s, behind a double stance of 0.2 s."""
     for number in range(first, last + 1):
         start = number * PERIOD
@@ -56,7 +56,7 @@ def walk(view, first, last, strides, readings=20):
         view.take("gait_events", event(start + PERIOD * 4 // 10, STRIKE, LEFT))
         view.take("gait_events", event(start + PERIOD * 6 // 10, TOE_OFF, RIGHT))
         for reading in range(readings):
-            torque = 10.0 if reading == readings // 2 else 0.0
+            torque = height if reading == readings // 2 else 0.0
             at = start + PERIOD * reading // readings
             view.take("perturbator/state", robot(at, torque, torque / 2))
         view.take(
@@ -70,9 +70,11 @@ def walk(view, first, last, strides, readings=20):
         view.take("experiment/state", state(number, strides))
 
 
+CHARTS = (period_chart, lag_chart, torque_chart)
+
+
 def size(view):
-    charts = (period_chart, lag_chart, torque_chart)
-    return sum(len(json.dumps(chart(view, blinded=False))) for chart in charts)
+    return sum(len(json.dumps(chart(view))) for chart in CHARTS)
 
 
 def test_ten_thousand_strides_cost_what_the_first_hundreds_did():
@@ -97,7 +99,7 @@ def test_the_last_stride_and_its_double_stance_are_cut_out():
     assert view.double_stance == pytest.approx(0.2)
     assert view.time_left() == pytest.approx(7.0)
     assert "-100 ms = -10.0 % of the stride" in view.lag()
-    area = lag_chart(view, blinded=False)["series"][0]["markArea"]["data"][0]
+    area = lag_chart(view)["series"][0]["markArea"]["data"][0]
     assert (area[0]["yAxis"], area[1]["yAxis"]) == (pytest.approx(-200.0), 0)
 
 
@@ -139,13 +141,58 @@ def test_another_run_begins_anew_also_of_another_command():
     assert list(view.strides) == []
 
 
-def test_a_blinded_chart_shows_no_condition():
-    view = View()
-    walk(view, 1, 5, 10)
-    names = [line["name"] for line in period_chart(view, blinded=True)["series"]]
-    assert "pulse period" not in names
-    assert lag_chart(view, blinded=True)["series"] == []
-    assert torque_chart(view, blinded=True)["series"] == []
+def everything(view):
+    """All that the page shows of a view, blinded or not."""
+    words = (view.part_words(), view.measured(), view.pushes, view.time_left())
+    return *words, view.robot_words(), view.sensor_words()
+
+
+def conditioned(torque, lag, verdict, name, *, blinded, **of_robot):
+    """Return the view of a run in which pulses of a torque have come and one is under way."""
+    view = View(blinded=blinded)
+    view.take(
+        "perturbator/setup",
+        Message(header=header(0), run=1, side=RIGHT, driver="odrive_can", armed_by="A",
+                watchdog="", limit_names=["torque", "rate"], limits=[30.0, abs(torque) / 0.01]),
+    )  # fmt: skip
+    walk(view, 1, 3, 10, height=torque)
+    at = 4 * PERIOD
+    view.take("gait/pulse_phases", Message(header=header(at), run=1, stride=3, phase_lag=lag))
+    told = Message(header=header(at), run=1, verdict=verdict, reason=0, drift=lag, window=10)
+    told.drift_interval = told.pulse_period = told.mean_period = lag
+    told.entrained_since_stride = 2
+    view.take("gait/entrainment", told)
+    now = state(3, 10)
+    now.pulse_period, now.blocks, now.block_name = 1.0 + lag, 2, name
+    view.take("experiment/state", now)
+    view.take("perturbator/state", robot(at, torque, 0.9 * torque, **of_robot))
+    return view
+
+
+CONDITIONS = st.tuples(
+    st.floats(-50, 50), st.floats(-0.5, 0.5), st.integers(0, 4), st.sampled_from(["sham", "real"])
+)
+
+
+@settings(derandomize=True, deadline=None, max_examples=25)
+@given(CONDITIONS, CONDITIONS)
+def test_a_blinded_operator_sees_the_same_whatever_the_condition(one, other):
+    views = [conditioned(*each, blinded=True) for each in (one, other)]
+    assert everything(views[0]) == everything(views[1])
+    assert "30 N m" in dict(views[0].robot_words())["limits"]
+
+
+def test_who_is_not_blinded_sees_the_condition():
+    sham, real = (conditioned(t, 0.1, 1, str(t), blinded=False) for t in (0.5, 10.0))
+    differs = [one != other for one, other in zip(everything(sham), everything(real), strict=True)]
+    assert differs == [True, True, False, False, True, False]
+    assert torque_chart(sham) != torque_chart(real)
+
+
+def test_whether_torque_falls_after_a_fault_is_told_to_everybody():
+    view = conditioned(10.0, 0.1, 1, "b", blinded=True, faults=["too much torque"])
+    assert view.measured() == "+9.00 N m"
+    assert ("faults", "too much torque") in view.robot_words()
 
 
 def test_a_node_that_falls_silent_is_called_so():

@@ -36,7 +36,7 @@ _PLAN, _KEY, _LEDGER, _COPY = "session.json", "key.json", "ledger.tsv", "session
 
 
 class Entry(NamedTuple):
-    """A line of the ledger; ``what`` is begun, done, failed, repeat, pause, note or the like."""
+    """A line of the ledger; ``what``: begun, done, failed, repeat, rest, pause, go on, note..."""
 
     time: str
     what: str
@@ -118,13 +118,63 @@ class SessionFolder:
 
     def runs(self) -> dict[int, Path]:
         """Return the bag that stands for each block that is done."""
-        done: dict[int, Path] = {}
-        for entry in self.ledger:
-            if entry.what == "done":
-                done[int(entry.block)] = self.path / "bags" / entry.bag
-            elif entry.what == "repeat":
-                done.pop(int(entry.block), None)
+        ledger = self.ledger
+        repeated = {entry.bag for entry in ledger if entry.what == "repeat"}
+        done = {
+            int(entry.block): self.path / "bags" / entry.bag
+            for entry in ledger
+            if entry.what == "done" and entry.bag not in repeated
+        }
         return dict(sorted(done.items()))
+
+    def repeat(self, reason: str, block: int = 0) -> int:
+        """
+        Have a block that is done walked again, or the one that was begun last; return its number.
+
+        Raises SessionError if there is no such block, it failed, or it is to be repeated already.
+        """
+        ledger, done = self.ledger, self.runs()
+        begun = [entry for entry in ledger if entry.what == "begun"]
+        if block:
+            bag = done[block].name if block in done else ""
+        else:
+            block, bag = (int(begun[-1].block), begun[-1].bag) if begun else (0, "")
+        ended = {entry.bag for entry in ledger if entry.what in ("failed", "repeat")}
+        if not bag or bag in ended:
+            allowed = ", ".join(map(str, done)) or "none yet"
+            what = f"block {block} is not done" if block else "no block has begun"
+            raise SessionError(f"repeat: {what}; allowed: {allowed}")
+        if not reason:
+            raise SessionError("repeat: a repetition needs a reason")
+        self.note("repeat", block, bag, reason)
+        return block
+
+    @property
+    def paused(self) -> str | None:
+        """Why the operator has the session wait before its next block; None if it goes on."""
+        last = self._last("pause", "go on")
+        return last.text if last is not None and last.what == "pause" else None
+
+    def standing(self) -> str:
+        """Return how the session stands, in words."""
+        last, paused = self._last("begun", "done", "failed", "rest"), self.paused
+        goes_on = last is not None and last.what == "begun"
+        number = int(last.block) if last is not None and goes_on else self.next_block()
+        name = f"block {number} of {self.plan['count']}" if number else "the end"
+        if number and not self.plan["blind"]:
+            name += f" ({self.plan['blocks'][number - 1]})"
+        if goes_on:
+            return name if paused is None else f"{name}, then a pause: {paused}"
+        if paused is not None:
+            return f"paused before {name}: {paused}"
+        if last is not None and last.what == "rest":
+            passed = datetime.now(timezone.utc) - datetime.fromisoformat(last.time)
+            left = float(last.text.split()[0]) - passed.total_seconds()
+            return f"rest before {name}: {max(left, 0):.0f} s"
+        return f"next: {name}"
+
+    def _last(self, *what: str) -> Entry | None:
+        return next((entry for entry in reversed(self.ledger) if entry.what in what), None)
 
     def next_block(self) -> int | None:
         """Return the first block, from 1, that is not done; None if all are."""

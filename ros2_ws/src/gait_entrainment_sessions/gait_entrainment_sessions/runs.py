@@ -46,6 +46,12 @@ class PlacedRun:
         return run.blocks or (whole,)
 
 
+def is_sealed(bag: Path) -> bool:
+    """Whether a bag lies in a session of which nothing is to be told yet."""
+    folder = bag.absolute().parents[1]
+    return (folder / "ledger.tsv").exists() and SessionFolder(folder).sealed
+
+
 def sessions_in(path: Path) -> list[SessionFolder]:
     """Return the sessions in a folder, which may be one itself."""
     found = sorted(path.rglob("ledger.tsv")) if path.is_dir() else []

@@ -94,6 +94,8 @@ TABLES: dict[str, tuple[Column, ...]] = {
     ),
 }
 
+_TELLING = ("pulses", "blocks")  # tables in which the condition of a run can be read
+
 
 def rows_of(placed: PlacedRun, kind: str) -> Iterator[Row]:
     """Return the rows of a run in one of TABLES, without person, session and block."""
@@ -151,13 +153,16 @@ def write_tables(runs: Iterable[PlacedRun], out: Path, format_name: str = "tsv")
     """
     Write each of TABLES over all runs into a folder; files of these names are replaced.
 
-    Returns the paths. Raises BagError if pyarrow is missing for Parquet.
+    Of a sealed run there are no pulses and no verdict. Returns the paths. Raises BagError if
+    pyarrow is missing for Parquet.
     """
     rows: dict[str, list[Row]] = {name: [] for name in TABLES}
     for placed in runs:
         place = placed.place
         head = (place.person or None, place.session or None, place.block, place.name)
         for name, found in rows.items():
+            if place.sealed and name in _TELLING:
+                continue
             found += ((*head, *row) for row in rows_of(placed, name))
     out.mkdir(parents=True, exist_ok=True)
     paths = []

@@ -30,7 +30,7 @@ def test_a_session_is_resumed_at_the_first_block_that_is_not_done(begun):
     assert begun().next_block() == 2
     assert folder.runs() == {1: folder.path / "bags/block-01_run-2"}
     assert [entry.text for entry in folder.ledger] == ["", "it broke off", ""]
-    folder.note("repeat", 1, text="why")
+    assert folder.repeat("why", 1) == 1
     folder.note("done", 2, "block-02")
     assert begun().next_block() == 1
     folder.note("done", 1, "block-01_run-3")
@@ -105,6 +105,57 @@ def test_two_do_not_conduct_it_at_once(begun):
         pass
     with folder.held():
         pass
+
+
+def test_a_block_is_repeated_while_it_goes_on_or_once_it_is_done(begun):
+    folder = begun()
+    with pytest.raises(SessionError, match="no block has begun; allowed: none yet"):
+        folder.repeat("why")
+    folder.note("begun", 1, "block-01")
+    with pytest.raises(SessionError, match="needs a reason"):
+        folder.repeat("")
+    assert folder.repeat("shoes untied") == 1
+    folder.note("done", 1, "block-01")
+    assert (folder.runs(), folder.next_block()) == ({}, 1)
+    with pytest.raises(SessionError, match="block 1 is not done"):  # it is the next one already
+        folder.repeat("again")
+    folder.note("begun", 1, "block-01_run-2")
+    folder.note("done", 1, "block-01_run-2")
+    assert folder.next_block() == 2
+    folder.note("begun", 2, "block-02")
+    folder.note("failed", 2, "block-02", "it broke")
+    with pytest.raises(SessionError, match="block 2 is not done; allowed: 1"):
+        folder.repeat("it broke")
+
+
+def test_a_session_tells_how_it_stands(begun):
+    folder = begun()
+    told = []
+
+    def note(*entry, **text):
+        folder.note(*entry, **text)
+        told.append((folder.standing(), folder.paused))
+
+    note("begun", 1, "block-01")
+    note("pause", 2, text="tired")
+    note("done", 1, "block-01")
+    note("go on", 2)
+    note("rest", 2, text="600 s")
+    note("begun", 2, "block-02")
+    note("done", 2, "block-02")
+    assert told == [
+        ("block 1 of 2 (faster)", None),
+        ("block 1 of 2 (faster), then a pause: tired", "tired"),
+        ("paused before block 2 of 2 (slower): tired", "tired"),
+        ("next: block 2 of 2 (slower)", None),
+        ("rest before block 2 of 2 (slower): 600 s", None),
+        ("block 2 of 2 (slower)", None),
+        ("next: the end", None),
+    ]
+
+
+def test_a_blinded_session_stands_by_numbers(begun):
+    assert begun(BLIND).standing() == "next: block 1 of 2"
 
 
 def test_a_sealed_session_tells_no_name_before_it_is_unblinded(begun):

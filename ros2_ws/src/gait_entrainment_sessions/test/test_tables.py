@@ -99,7 +99,7 @@ def test_a_folder_without_runs_is_told(done, tmp_path):
     with pytest.raises(BagError, match="no recorded run: a bag, a session"):
         places_in(tmp_path)
     folder = done()
-    folder.note("repeat", 1)
-    folder.note("repeat", 2)
+    folder.repeat("why", 1)
+    folder.repeat("why", 2)
     with pytest.raises(BagError, match="no block of it is done yet"):
         places_in(folder.path)

@@ -6,13 +6,19 @@
 import argparse
 import json
 from collections.abc import Iterator
+from pathlib import Path
 
 from gait_entrainment.errors import UsageError
 from gait_entrainment.robot import find_driver
 from gait_entrainment.settings import Setting
 from gait_entrainment_bringup.checklist import Point, points
 from gait_entrainment_bringup.operator_console import keys_at_once
-from gait_entrainment_bringup.run_options import add_run_options, checked_run
+from gait_entrainment_bringup.run_options import (
+    SESSION_FILE,
+    add_run_options,
+    checked_run,
+    checked_session,
+)
 from gait_entrainment_drivers.proof import keep_preflight
 from gait_entrainment_drivers.signals import stop_on_signals
 
@@ -39,6 +45,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="compare the clock of this node's host, on which it runs already; repeatable",
     )
+    parser.add_argument("--session", action="store_true", help=SESSION_FILE)
     parser.add_argument("--timeout", default="60", help=f"{_TIMEOUT.meaning} [s] (60)")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
@@ -49,7 +56,14 @@ def run(options: argparse.Namespace) -> int:
     stop_on_signals()
     timeout = _TIMEOUT.parse("--timeout", options.timeout)
     options.real_time = options.unproved = True  # a lacking proof is a point that fails
-    protocol, bag = checked_run(options)
+    if options.session:
+        session = checked_session(options.protocol, options)
+        # The limits are the person's, so the highest pulses stand for all.
+        blocks = [block.protocol for block in session.blocks]
+        protocol = max(blocks, key=lambda one: abs(one.pulse_torque))
+        bag = options.out or Path("sessions")
+    else:
+        protocol, bag = checked_run(options)
     if find_driver(protocol.driver).simulated:
         raise UsageError(
             f"driver: {protocol.driver} applies no real torque; allowed: a real robot"

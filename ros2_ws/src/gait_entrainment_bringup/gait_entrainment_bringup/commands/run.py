@@ -9,7 +9,7 @@ import json
 import os
 import shutil
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -32,7 +32,7 @@ from gait_entrainment_bringup.run_options import (
     chosen_parameters,
     claimed_folder,
 )
-from gait_entrainment_bringup.supervisor import supervised
+from gait_entrainment_bringup.supervisor import Supervisor, supervised
 from gait_entrainment_drivers.signals import stop_on_signals
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 from gait_entrainment_page.access import Access
@@ -134,9 +134,7 @@ def run_experiment(
             if node not in options.elsewhere:
                 supervisor.start(node, arguments)
         if options.page:
-            supervisor.start(PAGE, arguments, "gait_entrainment_page")
-            access = Access.of_environment(options.host)
-            access.tell(given[PAGE]["port"])  # its own words go to its log
+            start_page(supervisor, arguments, options)
         # Not at the top: it loads ROS, and a mistake in the options is answered without.
         from gait_entrainment_bringup.run_client import SILENCE_TIMEOUT, conduct
 
@@ -156,6 +154,14 @@ def run_experiment(
         (bag / "protocol.yaml").write_text(write_protocol(protocol))
         if once_recorded:
             once_recorded(bag)
+
+
+def start_page(
+    supervisor: Supervisor, arguments: Sequence[str], options: argparse.Namespace
+) -> None:
+    """Start the operator's page, and tell where it is: its own words go to its log."""
+    supervisor.start(PAGE, arguments, "gait_entrainment_page")
+    Access.of_environment(options.host).tell(options.page_parameters["port"])
 
 
 def tell(bag: Path, options: argparse.Namespace) -> None:

@@ -4,39 +4,41 @@
 """entrain session: the blocks of a session one after the other, each a run with a bag."""
 
 import argparse
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from gait_entrainment.errors import UsageError
 from gait_entrainment_bags import BagError
-from gait_entrainment_bringup.commands.run import add_node_options, check_nodes
-from gait_entrainment_bringup.run_options import (
-    add_conduct_options,
-    check_numbers,
-    check_robot,
-    check_walker,
-)
+from gait_entrainment_bringup.commands.run import add_node_options, check_nodes, start_page
+from gait_entrainment_bringup.node_list import PAGE, Parameters, parameter_arguments
+from gait_entrainment_bringup.run_options import add_conduct_options, checked_session
 from gait_entrainment_bringup.session_run import SessionRun
+from gait_entrainment_bringup.supervisor import supervised
 from gait_entrainment_drivers.signals import stop_on_signals
+from gait_entrainment_nodes.messaging.domain import claimed_domain
 from gait_entrainment_sessions.dataset import complete
 from gait_entrainment_sessions.folder import SessionFolder
 from gait_entrainment_sessions.runs import read_runs
-from gait_entrainment_sessions.session_file import Session, read_session
+from gait_entrainment_sessions.session_file import Session
 from gait_entrainment_sessions.tables import FORMATS, write_tables
 
 DESCRIPTION = (
     "Conduct the blocks of a session file, with rests between them, into one folder. The same "
     "command resumes a session that was paused or broke off, at the block where it stopped; "
     "nothing is overwritten. At a terminal it asks before each block: Enter goes on, p REASON "
-    "pauses, r REASON repeats the block before, n TEXT notes something."
+    "pauses, r REASON repeats the block before, n TEXT notes something. With --page it is asked "
+    "there instead."
 )
 EXAMPLES = """examples:
   entrain session session.yaml                 simulated, as fast as it goes: no rest is waited for
   entrain session session.yaml --real-time --arm
+  entrain session session.yaml --real-time --arm-later --page     pauses, repeats, arms from there
   entrain session session.yaml --repeat 2 --reason "the treadmill stopped"
   entrain session unblind STUDY/sub-P01/ses-1  break the seal of a blinded session
   entrain session export STUDY --out tables --format parquet    of all its sessions together
 """
+DESK = "session_desk"
 _ACTIONS = {"unblind": "break the seal", "export": "write tables over all runs in a folder"}
 
 
@@ -71,25 +73,38 @@ def run(options: argparse.Namespace) -> int:
             raise UsageError("--out: missing; allowed: a folder for the tables")
         _print_paths(write_tables(read_runs(options.path), options.out, options.format))
         return 0
-    return _conduct(read_session(options.path), options)
+    # Stopping from outside takes the same path as Ctrl-C: torque first, then the rest.
+    stop_on_signals()
+    return _conduct(checked_session(options.path, options), options)
+
+
+@contextmanager
+def _at_hand(folder: SessionFolder, domain: int, options: argparse.Namespace) -> Iterator[None]:
+    """Have the operator's side of a session in its domain: what takes requests, and the page."""
+    # Not as the process is named: its services are to be `session/pause` and the like.
+    given: Parameters = {"session": {"folder": str(folder.path.absolute())}}
+    if options.page:
+        given[PAGE] = {"record": str(folder.path), "use_sim_time": not options.real_time}
+        given[PAGE] |= options.page_parameters
+    with supervised(domain, (PAGE, DESK), real_time=options.real_time) as supervisor:
+        arguments = parameter_arguments(given, supervisor.folder)
+        supervisor.start(DESK, arguments, "gait_entrainment_bringup")
+        if options.page:
+            start_page(supervisor, arguments, options)
+        yield
 
 
 def _conduct(session: Session, options: argparse.Namespace) -> int:
-    stop_on_signals()
-    check_numbers(options)
-    check_walker(options.walker, options.detector, real_time=options.real_time)
     options.blinded |= session.blind  # what a page shows, too
     check_nodes(options, session.blocks[0].protocol)
-    for block in session.blocks:
-        switches = {"armed": options.arm, "unproved": options.unproved}
-        check_robot(block.protocol, real_time=options.real_time, **switches)
     if options.repeat is not None and not options.reason:
         raise UsageError("--reason: missing; a repetition needs one")
     study = options.out or Path("sessions") / session.study
     folder = SessionFolder.begin(study, session)
-    with folder.held():
+    with folder.held(), claimed_domain() as domain:
         try:
-            SessionRun(session, folder, options).conduct()
+            with _at_hand(folder, domain, options):
+                SessionRun(session, folder, options, domain).conduct()
         except BaseException:
             with suppress(BagError, OSError):  # why it ended is what counts
                 _complete(folder)

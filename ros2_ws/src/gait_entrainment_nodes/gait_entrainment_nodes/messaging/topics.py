@@ -50,7 +50,8 @@ EVERY_MESSAGE_IN_REAL_TIME = quality(2048)
 # The latest state matters, also to who joins late. The writer keeps more than that, so that a
 # recorder which is briefly behind misses nothing.
 LATEST_STATE = quality(1000, lasting=True)
-# What rqt expects of /diagnostics, tf2 and RViz of what is drawn. Nobody waits for a viewer.
+# What people see, and tools expect: rqt of /diagnostics, tf2 and RViz of what is drawn. Nobody
+# waits for a viewer.
 VIEWED = quality(100)
 # What was said before somebody joined counts too: a description, a button that was pressed.
 SAID_ONCE = quality(1, lasting=True)
@@ -93,7 +94,8 @@ TROUBLE = Topic(topic_names.TROUBLE, msg.Trouble)
 EMERGENCY_STOP = Topic(topic_names.EMERGENCY_STOP, Bool, SAID_ONCE)
 
 OPERATOR_HEARTBEAT = Topic(topic_names.OPERATOR_HEARTBEAT, String, HEARTBEAT)
-OPERATOR_NOTES = Topic(topic_names.OPERATOR_NOTES, msg.Note, LATEST_STATE)
+# Not lasting: a page outlives runs, and the next recorder is to have no notes of the last one.
+OPERATOR_NOTES = Topic(topic_names.OPERATOR_NOTES, msg.Note, VIEWED)
 
 HORIZON = Topic(topic_names.HORIZON, msg.Horizon)
 EXPERIMENT_STATE = Topic(topic_names.EXPERIMENT_STATE, msg.ExperimentState, LATEST_STATE)

@@ -28,6 +28,8 @@ const entrain = { heartbeat: false, acting: false };
   // At the press: a finger may rest on the button.
   for (const kind of ["pointerdown", "click"])
     document.addEventListener(kind, (event) => { if (event.target.closest?.("#stop")) stop(); });
+  // Who goes on to something else has read what came of it.
+  document.addEventListener("click", (event) => { if (event.target.closest?.(".acts .q-btn")) tell("told", ""); });
 
   async function alive() {
     const sent = Date.now();
@@ -56,7 +58,7 @@ const entrain = { heartbeat: false, acting: false };
   addEventListener("DOMContentLoaded", alive);
 
   // Angles: hips and ankles, left and right [rad]; lengths are those of the drawing.
-  entrain.legs = (angles, perturbed, torque) => {
+  entrain.legs = (angles, perturbed, pushes) => {
     const canvas = document.querySelector("canvas.legs");
     if (!canvas || !canvas.clientWidth) return;
     const ratio = devicePixelRatio, width = canvas.clientWidth, height = canvas.clientHeight;
@@ -78,14 +80,14 @@ const entrain = { heartbeat: false, acting: false };
     const hip = place([0, 0]);
     for (const leg of legs) {
       const ankle = place(leg.heel);
-      if (leg.side === perturbed && Math.abs(torque) > 0.05) {
+      if (leg.side === perturbed && pushes) {
         draw.fillStyle = "#E69F00"; draw.beginPath(); draw.arc(...ankle, 20, 0, 7); draw.fill();
       }
-      draw.strokeStyle = leg.side === 0 ? "#0072B2" : "#D55E00"; draw.lineWidth = 9;
+      draw.strokeStyle = leg.side === 0 ? "#0072B2" : "#D55E00"; draw.lineWidth = leg.side === perturbed ? 12 : 6;
       draw.beginPath(); draw.moveTo(...hip); draw.lineTo(...ankle); draw.lineTo(...place(leg.toe)); draw.stroke();
     }
     draw.fillStyle = "#1a1a1a"; draw.beginPath(); draw.arc(...hip, 13, 0, 7); draw.fill();
-    draw.font = "600 17px sans-serif";
+    draw.font = "700 19px sans-serif";
     draw.fillStyle = "#0072B2"; draw.fillText(perturbed === 0 ? "left (robot)" : "left", 8, 18);
     draw.fillStyle = "#D55E00"; draw.fillText(perturbed === 1 ? "right (robot)" : "right", 8, 40);
   };

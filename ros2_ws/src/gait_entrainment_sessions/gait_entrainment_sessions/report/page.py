@@ -97,7 +97,7 @@ def write_report(path: Path, out: Path) -> None:
 
 def _section(place: Place, *, drawn: bool) -> RunSection:
     run = read_run(place.bag, torques=drawn and not place.sealed)
-    checks, origin = checks_of(run, place.bag), origin_of(place.bag)
+    checks, origin = checks_of(run, place.bag, sealed=place.sealed), origin_of(place.bag)
     if place.sealed:
         return RunSection(place, checks, origin, sealed=True)
     findings = Findings.of(PlacedRun(place, run))

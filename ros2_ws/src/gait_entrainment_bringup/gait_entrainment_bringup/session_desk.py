@@ -1,0 +1,99 @@
+# SPDX-FileCopyrightText: 2026 The gait_entrainment authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""
+The node ``session``: takes what the operator asks of a session that `entrain session` conducts.
+
+It is a process of its own, as a process with a ROS context could not fork the blocks. What is
+asked goes into the ledger, where the conductor finds it before the next block; so do notes, which
+nobody else records between two blocks. Its state says how the session stands.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from gait_entrainment.settings import setting, settings_of
+from gait_entrainment_msgs.msg import Note
+from gait_entrainment_msgs.srv import AskSession
+from gait_entrainment_nodes.messaging import topics
+from gait_entrainment_nodes.nodes.loop import run_node
+from gait_entrainment_nodes.nodes.participant import Participant
+from gait_entrainment_sessions.folder import SessionFolder
+from gait_entrainment_sessions.session_file import SessionError
+
+# How often the state is looked at anew [s].
+_PERIOD = 0.5
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Parameters of the node."""
+
+    folder: str = setting("", "folder of the session")
+
+
+class SessionDesk(Participant):
+    """ROS side of a session."""
+
+    settings: Settings
+    real_time = False  # it waits for nobody, but its turn does not come before that of others
+
+    def __init__(self) -> None:
+        super().__init__("session")
+        self.begin_participation(settings=Settings, fixed=settings_of(Settings))
+        self._folder, self._due = SessionFolder(Path(self.settings.folder)), 0.0
+        self.subscribe(topics.OPERATOR_NOTES, self._on_note)
+        for name in ("pause", "go_on", "repeat"):
+            self.create_service(AskSession, f"~/{name}", self._answered(getattr(self, f"_{name}")))
+
+    def _answered(self, action: Callable[[str], str]) -> Callable[[Any, Any], Any]:
+        """Return the callback of a service that does an action, or says why not."""
+
+        def answer(request: AskSession.Request, response: AskSession.Response) -> Any:
+            try:
+                response.message, response.success = action(request.reason.strip()), True
+            except SessionError as error:
+                response.message = str(error)
+            self._due = 0.0
+            return response
+
+        return answer
+
+    def _pause(self, reason: str) -> str:
+        if self._folder.paused is not None:
+            raise SessionError("the session is to pause already")
+        self._folder.note("pause", self._folder.next_block() or 0, text=reason)
+        return "the session waits before its next block"
+
+    def _go_on(self, reason: str) -> str:
+        if self._folder.paused is None:
+            raise SessionError("the session is not paused")
+        self._folder.note("go on", self._folder.next_block() or 0, text=reason)
+        return "the session goes on"
+
+    def _repeat(self, reason: str) -> str:
+        return f"block {self._folder.repeat(reason)} is the next one again"
+
+    def _on_note(self, note: Note) -> None:
+        self._folder.note("note", self._folder.next_block() or 0, text=note.text)
+
+    def next_deadline(self) -> float:
+        """Return when to look at the session."""
+        return self._due
+
+    def on_deadline(self) -> None:
+        """Note how the session stands: a warning while it waits for the operator."""
+        self._due = time.monotonic() + _PERIOD
+        waits = self._folder.paused is not None
+        level = DiagnosticStatus.WARN if waits else DiagnosticStatus.OK
+        self.note_state(level, self._folder.standing())
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node(SessionDesk)
