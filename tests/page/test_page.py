@@ -8,7 +8,6 @@ import sys
 from pathlib import Path
 
 from browser import chromium
-from harness import QUICK
 from pages import Look, free_port, page, request, until_served
 from test_drivers import emulated_motor
 
@@ -38,75 +37,60 @@ blocks: [{name: pulses}]
 def test_a_blinded_session_with_a_robot_is_conducted_from_the_page(tmp_path, browser, monkeypatch):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     file, study = tmp_path / "session.yaml", tmp_path / "study"
-    with emulated_motor(tmp_path) as (driver, _):
+    with emulated_motor(tmp_path) as (driver, _), chromium() as tablet:
         keep_proof(driver, 0.1)
         file.write_text(SESSION.replace("DRIVER", driver))
         words = ("--session", str(file), "--real-time", "--arm", f"--out={study}")
         with page(tmp_path, *words) as served:
-            look = Look(browser, served.port)
-            look.until("You are the operator", "Blinded: torque")
-            look.click("Preflight")
-            look.until("press the stop")
+            operator = Look(browser, served.port)
+            operator.until("You are the operator", "no run", "Blinded: torque")
+            operator.click("Preflight")
+            operator.until("press the stop")
             browser.find_element("id", "stop").click()
-            look.until("fit for a session", "entrain preflight has ended with exit code 0")
-            look.click("Start")
-            look.until("block 1 of 1", "baseline")
-            look.click("Arm")
-            shown = look.until("torque is possible from now on", "hidden")
+            operator.until("fit for a session", "entrain preflight has ended with exit code 0")
+            operator.click("Start")
+            operator.until("block 1 of 1", "baseline")
+            operator.click("Arm")
+            shown = operator.until("torque is possible from now on", "hidden")
             assert "N m" not in shown.replace("torque 6 N m", "")
-            look.type("belt stopped")
-            look.click("Pause before the next block")
-            look.until("then a pause: belt stopped")
-            look.until("paused before the end: belt stopped")
-            look.note("belt mended")
-            look.click("Repeat the block")
-            look.until("Refused: repeat: a repetition needs a reason")
-            look.type("belt stopped")
-            look.click("Repeat the block")
-            look.until("block 1 is the next one again")
-            look.click("Go on")
-            look.until("entrain session has ended with exit code 0")
-    ledger = SessionFolder(study / "sub-P01/ses-1").ledger
-    assert [
-        (e.what, e.block, e.text) for e in ledger if e.what in ("pause", "note", "repeat")
-    ] == [
+            operator.note(NOTE)
+            operator.until(NOTE)  # as text, not as what it says in HTML
+            operator.type("belt stopped")
+            operator.click("Pause before the next block")
+            operator.until("then a pause: belt stopped")
+            browser.refresh()
+            operator.until("You are the operator", "of 7", NOTE, "then a pause: belt stopped")
+            other = Look(tablet, served.port)
+            other.until("Another browser is the operator", "paused before the end: belt stopped")
+            other.click("Take over")
+            other.until("You are the operator")
+            operator.until("Another browser is the operator")
+            other.click("Repeat the block")
+            other.until("Refused: repeat: a repetition needs a reason")
+            other.type("belt stopped")
+            other.click("Repeat the block")
+            other.until("block 1 is the next one again")
+            other.click("Go on")
+            operator.until("entrain session has ended with exit code 0", "finished", "7 of 7")
+    folder = SessionFolder(study / "sub-P01/ses-1")
+    told = [(e.what, e.block, e.text) for e in folder.ledger]
+    assert [entry for entry in told if entry[0] in ("note", "pause", "repeat", "go on")] == [
+        ("note", "1", NOTE),
         ("pause", "1", "belt stopped"),
-        ("note", "", "belt mended"),
         ("repeat", "1", "belt stopped"),
+        ("go on", "1", ""),
     ]
-    assert [(e.what, e.bag) for e in ledger if e.what in ("preflight", "done")] == [
-        ("preflight", ""), ("done", "block-01"), ("preflight", ""), ("done", "block-01_run-2"),
+    assert [text.partition(": ")[2] for what, _, text in told if what == "preflight"] == [
+        "passed", "passed",
     ]  # fmt: skip
-    assert {e.text.partition(": ")[2] for e in ledger if e.what == "preflight"} == {"passed"}
-
-
-def test_a_run_is_started_noted_shared_reloaded_and_followed_to_its_end(tmp_path, browser):
-    walk = (*QUICK, "--real-time", "--baseline=3", "--pulses=8", "--washout=1")
-    bag = tmp_path / "bag"
-    with (
-        page(tmp_path, *walk, f"--out={bag}") as served,
-        chromium() as tablet,
-    ):
-        operator = Look(browser, served.port)
-        operator.until("You are the operator", "no run")
-        other = Look(tablet, served.port)
-        other.until("Another browser is the operator")
-        operator.click("Start")
-        operator.until("entrain run has started", "of 12", "pulses")
-        operator.note(NOTE)
-        operator.until(NOTE)  # as text, not as what it says in HTML
-        browser.refresh()
-        operator.until("You are the operator", "of 12", NOTE)
-        other.click("Take over")
-        other.until("You are the operator")
-        operator.until("Another browser is the operator")
-        other.until("finished", "12 of 12")
-        other.until("entrain run has ended with exit code 0")
-        assert "no verdict yet" not in other.text
-    with BagReader(bag) as reader:
-        notes = [message.text for _, message in reader.decoded([f"/{OPERATOR_NOTES.name}"])]
-        assert reader.custom_data["messages_lost"] == "{}"
-    assert notes == [NOTE]
+    assert [e.bag for e in folder.ledger if e.what == "done"] == ["block-01", "block-01_run-2"]
+    notes = []
+    for bag in ("block-01", "block-01_run-2"):
+        with BagReader(folder.path / "bags" / bag) as reader:
+            topics = [name for name in reader.topics if name == f"/{OPERATOR_NOTES.name}"]
+            notes.append([m.text for _, m in reader.decoded(topics)] if topics else [])
+            assert reader.custom_data["messages_lost"] == "{}"
+    assert notes == [[NOTE], []]
 
 
 def test_ten_thousand_strides_leave_the_page_as_small(browser):

@@ -9,6 +9,7 @@ times a second; samples are subscribed to only while time passes as it does for 
 is the operator's heartbeat, it publishes a sign of life for as long as the page is watched.
 """
 
+import contextlib
 import importlib
 import os
 import queue
@@ -145,7 +146,11 @@ class OperatorPage(Participant):
         self._readers[topic.name] = topic, RawReader(self, topic.type, topic.name, qos)
 
     def _follow(self, wanted: bool) -> None:
-        """Look at the samples, or no longer."""
+        """Look at the samples, or no longer: then whoever walks is not kept waiting for us."""
+        policy = os.SCHED_OTHER if wanted else os.SCHED_BATCH
+        for thread in map(int, os.listdir("/proc/self/task")):
+            with contextlib.suppress(ProcessLookupError):
+                os.sched_setscheduler(thread, policy, os.sched_param(0))
         for topic, qos in SAMPLED:
             if wanted and topic.name not in self._readers:
                 self._look_at(topic, qos)
