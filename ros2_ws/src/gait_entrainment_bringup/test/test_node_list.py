@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 import rclpy
 import yaml
-from ament_index_python.packages import get_package_prefix
 
 from gait_entrainment.protocol import DEFAULT_PROTOCOL
 from gait_entrainment.settings import settings_of
@@ -25,6 +24,7 @@ from gait_entrainment_bringup.node_list import (
     replay_parameters,
     settings_file,
 )
+from gait_entrainment_nodes.messaging.environment import shared_file
 from gait_entrainment_nodes.nodes.bag_player import BagPlayer
 from gait_entrainment_nodes.nodes.bag_recorder import BagRecorder
 from gait_entrainment_nodes.nodes.experiment import Experiment
@@ -111,7 +111,8 @@ def test_file_lists_what_a_user_may_set_at_its_default(tmp_path):
 @pytest.mark.parametrize("node", [*sorted(ALL), DISPLAY, PAGE])
 def test_launch_finds_the_executable_of_each_node(node):
     package = "gait_entrainment_page" if node == PAGE else "gait_entrainment_nodes"
-    assert (Path(get_package_prefix(package)) / "lib" / package / node).exists()
+    prefix = shared_file(package, "package.xml").parents[2]
+    assert (prefix / "lib" / package / node).exists()
 
 
 def test_file_lists_what_a_user_may_set_of_the_page_at_its_default():

@@ -89,6 +89,6 @@ const entrain = { heartbeat: false, acting: false };
     draw.fillStyle = "#1a1a1a"; draw.beginPath(); draw.arc(...hip, 13, 0, 7); draw.fill();
     draw.font = "700 19px sans-serif";
     draw.fillStyle = "#0072B2"; draw.fillText(perturbed === 0 ? "left (robot)" : "left", 8, 18);
-    draw.fillStyle = "#D55E00"; draw.fillText(perturbed === 1 ? "right (robot)" : "right", 8, 40);
+    draw.fillStyle = "#b34700"; draw.fillText(perturbed === 1 ? "right (robot)" : "right", 8, 40);
   };
 })();
