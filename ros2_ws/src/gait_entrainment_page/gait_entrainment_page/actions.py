@@ -7,7 +7,6 @@ import os
 import subprocess
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Protocol
 
@@ -15,14 +14,6 @@ from gait_entrainment.errors import EntrainmentError
 from gait_entrainment_drivers.stop_channel import stop_all
 
 _TOLD = 12  # last lines of a command
-
-
-@dataclass(frozen=True)
-class Stopped:
-    """What came of a stop: whether everybody confirmed it, and what each robot answered."""
-
-    done: bool
-    lines: tuple[str, ...]
 
 
 class ActionError(EntrainmentError):
@@ -47,23 +38,21 @@ class Nodes(Protocol):
         """Return what of all that somebody answers."""
 
 
-def stop(nodes: Nodes | None = None) -> Stopped:
+def stop(nodes: Nodes | None) -> list[str]:
     """
-    Bring every robot of this machine to zero torque, as `entrain stop` does.
+    Bring every robot of this machine to zero torque, as `entrain stop` does; return the answers.
 
     If this machine drives none, that of another one is asked over ROS.
     """
     answers = stop_all()
     lines = [f"{name}: {a.message if a else 'no answer'}" for name, a in answers.items()]
-    done = bool(answers) and all(answer and answer.done for answer in answers.values())
+    done = all(answer and answer.done for answer in answers.values())
     if not answers:
         if nodes is None or "stop" not in nodes.offered():
-            return Stopped(False, ("no robot is driven by this machine",))
+            return ["no robot is driven by this machine"]
         done, answer = attempted(partial(nodes.ask, "stop"))
         lines = [f"asked over ROS: {answer}"]
-    if not done:
-        lines.append("not everybody confirmed the stop: cut the power")
-    return Stopped(done, tuple(lines))
+    return lines if done else [*lines, "not everybody confirmed the stop: cut the power"]
 
 
 class Command:

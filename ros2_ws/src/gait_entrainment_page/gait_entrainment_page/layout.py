@@ -103,10 +103,9 @@ class Page:
 
     # Without NiceGUI, so that nothing of it is in the way
 
-    async def _stop(self) -> dict[str, Any]:
+    async def _stop(self) -> list[str]:
         """Stop every robot of this machine; whoever may look may stop."""
-        stopped = await asyncio.to_thread(stop, self.nodes)
-        return {"done": stopped.done, "lines": stopped.lines}
+        return await asyncio.to_thread(stop, self.nodes)
 
     async def _alive(self, request: Request) -> dict[str, float]:
         role, browser = state_of(request)

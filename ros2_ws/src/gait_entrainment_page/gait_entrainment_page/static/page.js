@@ -20,7 +20,7 @@ const entrain = { heartbeat: false, acting: false };
     try {
       const response = await fetch("/stop", { method: "POST" });
       if (!response.ok) throw new Error(await response.text());
-      tell("told", "STOP: " + (await response.json()).lines.join("\n"));
+      tell("told", "STOP: " + (await response.json()).join("\n"));
     } catch (error) {
       tell("told", "STOP DID NOT ARRIVE: cut the power. " + error.message);
     }
