@@ -4,15 +4,16 @@
 """How fast the tongue is swept, on how many cores, beside the paper's integrator."""
 
 import time
+from functools import partial
 
 import numpy as np
 import paper_integrator
 import pytest
 
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment_studies.sweep.engine import available_cores, rows_by_processes
+from gait_entrainment_studies.sweep.engine import available_cores, by_processes
 from gait_entrainment_studies.sweep.plan import Axis, SweepPlan
-from gait_entrainment_studies.sweep.row import exact_borders
+from gait_entrainment_studies.sweep.row import exact_borders, sweep_row
 
 pytestmark = pytest.mark.benchmark
 
@@ -36,7 +37,7 @@ def seconds(work):
 
 def sweep(jobs):
     rows = range(PLAN.torque_fractions.count)
-    assert len(list(rows_by_processes(PLAN, rows, jobs))) == len(rows)
+    assert len(list(by_processes(partial(sweep_row, PLAN), rows, jobs))) == len(rows)
 
 
 def by_the_papers_method(strides):

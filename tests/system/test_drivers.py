@@ -32,6 +32,7 @@ from gait_entrainment.simulation import simulate
 from gait_entrainment_bags import BagReader
 from gait_entrainment_bags.recorded_run import read_run
 from gait_entrainment_bringup.node_list import STOP_ORDER
+from gait_entrainment_commands.timing import timings_of
 from gait_entrainment_msgs.msg import AnkleRobotState
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 from gait_entrainment_nodes.messaging.topics import (
@@ -106,7 +107,7 @@ def test_emulated_robot_walks_as_in_the_simulation_and_twice_the_same(tmp_path):
     with BagReader(bags[0]) as reader:
         events = [message for _, message in reader.decoded(["/gait_events"])]
         protocol = read_protocol(reader.custom_data["protocol"])
-    simulation = simulate(protocol, measured_onsets=True)
+    simulation = simulate(protocol, timings_of=timings_of, measured_onsets=True)
     walked = [stamp_of(event.header) - stamp_of(events[0].header) for event in events]
     assert walked == [event.stamp for event in simulation.events]
     # Commanded, sent and measured onset of each pulse are in the bag.

@@ -21,6 +21,7 @@ from harness import (
     stamp_of,
 )
 
+from gait_entrainment.conventions import Side
 from gait_entrainment.protocol import read_protocol
 from gait_entrainment.simulation import simulate
 from gait_entrainment_bags import BagReader, check
@@ -58,7 +59,10 @@ washout: 2
 blocks:
   - {name: sham, pulses: {torque: 0, jitter: 0.02}, rest: 4}
   - {name: assisted, pulses: {phase: 0.42, shape: half_sine, rising: 2}}
-  - {name: own shape, pulses: {shape: samples, samples: [0, 1, 0.3, 0], catch_pulses: [2]}}
+  - name: own shape
+    side: left
+    pulses: {shape: samples, samples: [0, 1, 0.3, 0], catch_pulses: [2]}
+  - {name: in turn, side: both}
 """
 
 
@@ -71,21 +75,28 @@ def test_blocks_pulses_by_phase_and_shapes_are_those_of_the_simulation(tmp_path)
     assert events_since_start(bag) == simulated_events(bag)
     recorded = read_run(bag)
     start = recorded.events[0].stamp
-    assert tuple(onset - start for onset in recorded.onsets) == simulation.onsets
+    found = [(side, timing.commanded - start) for side, timing in recorded.delivered]
+    assert found == [(side, timing.commanded) for side, timing in simulation.delivered]
     assert recorded.differences == ()
     told = outcome_of(simulation)["blocks"]
     assert [{**a, **b} for a, b in zip(told, outcome["blocks"], strict=True)] == told
     with BagReader(bag) as reader:
         states = [m for _, m in reader.decoded(["/experiment/state"])]
         pulses = [m for _, m in reader.decoded(["/perturbation/pulses"])]
-    shown = [(m.block, m.block_name, m.phase) for m in states if 0 < m.phase < 4 or m.phase == 6]
-    assert list(dict.fromkeys(shown)) == [
-        *((1, "sham", phase) for phase in (1, 2, 3, 6)),
-        *((2, "assisted", phase) for phase in (1, 2, 3)),
-        *((3, "own shape", phase) for phase in (1, 2, 3)),
+    shown = dict.fromkeys((m.block, m.block_name, m.phase) for m in states)
+    assert (1, "sham", 6) in shown
+    assert [one for one in shown if 0 < one[2] < 4] == [
+        (number, name, phase)
+        for number, name in enumerate(("sham", "assisted", "own shape", "in turn"), start=1)
+        for phase in (1, 2, 3)
     ]
-    assert [pulse.number for pulse in pulses] == list(range(1, 13))
-    assert [pulse.torque for pulse in pulses] == [0] * 4 + [2, 4, 6, 6] + [6, 0, 6, 6]
+    by_ankle = [[pulse for pulse in pulses if pulse.side == side] for side in Side]
+    for of_ankle, torques in zip(
+        by_ankle, ([6, 0] + [6] * 6, [0] * 4 + [2, 4] + [6] * 6), strict=True
+    ):
+        assert [pulse.number for pulse in of_ankle] == list(range(1, len(torques) + 1))
+        assert [pulse.torque for pulse in of_ankle] == torques
+    assert [block["side"] for block in told] == ["right", "right", "left", "right"]
 
 
 def test_outcome_says_what_happened(paper_example):

@@ -15,14 +15,14 @@ is waiting for.
 import enum
 import math
 import statistics
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from itertools import chain, islice
+from dataclasses import dataclass, field
+from itertools import chain, islice, pairwise
 
-from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, nanoseconds
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side, nanoseconds
 from gait_entrainment.errors import EntrainmentError
-from gait_entrainment.gait import GaitEvent, GaitLimits, StrideTracker
+from gait_entrainment.gait import GaitEvent, GaitLimits, Stride, StrideTracker
 from gait_entrainment.gait.strides import PLACES
 from gait_entrainment.protocol import Block, Protocol, ProtocolError
 from gait_entrainment.robot import Pulse, PulseTrain
@@ -69,14 +69,15 @@ class BlockRun:
 
     plan: Block
     number: int  # from 1
+    ankles: tuple[Side, ...]  # that get its pulses, that of the leg whose strides count first
     start: int | None = None  # heel strike that starts its first stride [ns]
-    strides_before: int = 0  # of the perturbed leg in the run
+    strides_before: int = 0  # of its leg in the run
     doubted_before: int = 0  # events that were not believed
     baseline: int = 0  # strides that it lasted; 0 while it does
-    planned: int = 0  # pulses so far
+    planned: Counter[Side] = field(default_factory=Counter)  # pulses so far, by ankle
     first_onset: int | None = None  # of the pulses that are planned [ns]
     pulses_end: int = 0  # of the last one that is planned [ns]
-    train: PulseTrain | None = None  # requested so far
+    trains: dict[Side, PulseTrain] = field(default_factory=dict)  # requested so far
     # Mean stride period over the baseline [s] and its standard error; NaN if not measured.
     measured_period: float = math.nan
     measured_period_error: float = math.nan
@@ -84,9 +85,32 @@ class BlockRun:
     end: int | None = None  # heel strike that ends its last stride [ns]
 
     @property
-    def pulses_left(self) -> int:
-        """Pulses that are not planned yet."""
-        return self.plan.pulses.count - self.planned
+    def leg(self) -> Side:
+        """The leg whose strides count."""
+        return self.ankles[0]
+
+    @property
+    def train(self) -> PulseTrain | None:
+        """The pulses on its leg that are requested so far."""
+        return self.trains.get(self.leg)
+
+    def pulses_left(self, side: Side) -> int:
+        """Pulses on an ankle that are not planned yet."""
+        return self.plan.pulses.count - self.planned[side]
+
+
+class _Leg:
+    """The strides of one leg, as they come."""
+
+    def __init__(self, side: Side, limits: GaitLimits) -> None:
+        self.side = side
+        self.tracker = StrideTracker(side, limits)
+        self.recent: deque[float] = deque(maxlen=STEADY_STRIDES)  # latest stride periods [s]
+
+    @property
+    def predicted_from(self) -> list[float]:
+        """The stride periods [s] whose mean is the prediction of the next one."""
+        return list(self.recent)[-PREDICTED_FROM:]
 
 
 class Conductor:
@@ -106,20 +130,20 @@ class Conductor:
         limits: GaitLimits | None = None,
     ) -> None:
         self.protocol = protocol
-        self.blocks = [BlockRun(protocol.sequence[0], 1)]  # those that have begun
         self._limits = limits or GaitLimits()
         own = self._limits.scaled(protocol.walker.time_scale)
-        self._tracker = StrideTracker(protocol.side, own)
-        self._recent: deque[float] = deque(maxlen=STEADY_STRIDES)  # latest stride periods [s]
-        self._periods = self._baseline_periods()
+        self._legs = {side: _Leg(side, own) for side in protocol.sides}
+        self.blocks: list[BlockRun] = []  # those that have begun
+        self._begin_block()
         self._longest_lookahead = longest_lookahead
         self._shortest = _shortest_stride(protocol)
         self._lookahead = min(self._shortest, longest_lookahead)
         self._longest_promise = self._lookahead
         self._promised = 0  # up to this instant [ns]
         self._heights: list[float] = []  # of the pulses of the block [N m]
-        self._rest: Iterator[Pulse] = iter(())  # planned and not requested yet
-        self._next_part_at = 0  # the promise that is not made before they are [ns]
+        # By ankle: pulses planned and not requested yet, and the promise not made before they are.
+        self._rest: dict[Side, Iterator[Pulse]] = {side: iter(()) for side in self._legs}
+        self._next_part_at = dict.fromkeys(self._legs, 0)  # [ns]
         self._resting_until: int | None = None  # between two blocks [ns]
         self._closing_strike: int | None = None  # strike that closes the last stride [ns]
 
@@ -130,8 +154,14 @@ class Conductor:
 
     @property
     def strides(self) -> int:
-        """Strides of the perturbed leg completed so far."""
-        return max(self._tracker.stride_in_progress - 1, 0)
+        """Strides of the protocol's leg completed so far."""
+        return max(self._legs[self.protocol.side].tracker.stride_in_progress - 1, 0)
+
+    @property
+    def _leg(self) -> _Leg:
+        """The leg whose strides count: of the block under way, in a rest of the next one."""
+        number = self.block.number - (self._resting_until is None)
+        return self._legs[self.protocol.leg(self.protocol.sequence[number])]
 
     def part(self, known_until: int) -> Part:
         """Return the part of the protocol that is under way at an instant [ns]."""
@@ -144,7 +174,8 @@ class Conductor:
             return Part.WASHOUT
         if first is None or known_until < first:
             return Part.BASELINE
-        return Part.PULSES if known_until < block.pulses_end or block.pulses_left else Part.WASHOUT
+        pulses = known_until < block.pulses_end or block.pulses_left(block.leg)
+        return Part.PULSES if pulses else Part.WASHOUT
 
     def add_event(self, event: GaitEvent, now: float = math.inf) -> None:
         """
@@ -155,25 +186,31 @@ class Conductor:
         Raises ProtocolError if they would overlap at the resulting period, GaitError if the
         baseline is not one to measure a period by.
         """
-        strike = self._tracker.latest_strike
-        stride = self._tracker.add(event, now)
-        if self._tracker.latest_strike == strike:
-            return  # not a heel strike of the leg, or not believed
-        if stride is not None:
-            self._recent.append(stride.period)
-            if not self.block.baseline:
-                self._periods.append(stride.period)
-                # A promise must end before the next strike can be an onset's reference.
-                self._lookahead = min(self._longest_lookahead, *self._periods)
-                self._longest_promise = max(self._longest_promise, self._lookahead)
-        if self._closing_strike is not None or not self._in_block(event.stamp):
+        for leg in self._legs.values():
+            strike, stride = leg.tracker.latest_strike, leg.tracker.add(event, now)
+            if leg.tracker.latest_strike == strike:
+                continue  # not a heel strike of the leg, or not believed
+            if stride is not None:
+                leg.recent.append(stride.period)
+            if leg is self._leg:
+                self._take_strike(event.stamp, stride)
+            elif self.block.first_onset and self.block.end is None and self._due_by_phase(leg):
+                self._plan_by_phase(leg, event.stamp)
+
+    def _take_strike(self, strike: int, stride: Stride | None) -> None:
+        """Take a heel strike [ns] of the leg whose strides count, and the stride it closes."""
+        if stride is not None and not self.block.baseline:
+            self._periods.append(stride.period)
+            # A promise must end before the next strike can be an onset's reference.
+            self._lookahead = min(self._longest_lookahead, *self._periods)
+            self._longest_promise = max(self._longest_promise, self._lookahead)
+        if self._closing_strike is not None or not self._in_block(strike):
             return
-        block = self.block
-        if not block.baseline:
-            if self._baseline_is_over(event.stamp):
-                self._plan(event.stamp)
-        elif block.plan.pulses.phase is not None and block.pulses_left:
-            self._plan_by_phase(event.stamp)
+        if not self.block.baseline:
+            if self._baseline_is_over(strike):
+                self._plan(strike)
+        elif self._due_by_phase(self._leg):
+            self._plan_by_phase(self._leg, strike)
 
     def due(self, known_until: int) -> PulseTrain | None:
         """
@@ -181,15 +218,15 @@ class Conductor:
 
         Of many, a part: the next one is due before a promise reaches the middle of this one.
         """
-        if self._until(known_until) < self._next_part_at:
-            return None
-        part = tuple(islice(self._rest, PART_PULSES))
-        if not part:
-            return None
-        self._next_part_at = part[len(part) // 2].onset
-        requested, before = PulseTrain(self.protocol.side, part), self.block.train
-        self.block.train = before.followed_by(requested) if before else requested
-        return requested
+        for side, rest in self._rest.items():
+            if self._until(known_until) < self._next_part_at[side]:
+                continue
+            if part := tuple(islice(rest, PART_PULSES)):
+                self._next_part_at[side] = part[len(part) // 2].onset
+                requested, before = PulseTrain(side, part), self.block.trains.get(side)
+                self.block.trains[side] = before.followed_by(requested) if before else requested
+                return requested
+        return None
 
     def horizon(self, known_until: int) -> Horizon:
         """
@@ -201,8 +238,9 @@ class Conductor:
         the promise before was made, and no lookahead is longer than the shortest stride that
         entered the measured period: so no promise covers an onset that is not yet planned. If the
         latest stride was that short and changes the mean, the onset is put off to the promise's
-        end. A pulse at phase P lies P predicted periods after its strike, and no lookahead is
-        longer than the least that this can be, as far as strides are believed at all.
+        end. A pulse by phase lies so many predicted periods after the strike at which it is
+        planned, and no lookahead is longer than the least that this can be, as far as strides are
+        believed at all.
 
         The run ends at a fixed distance after its closing strike, which no promise made before
         that strike can have passed: the end does not depend on how the run was cut into grants.
@@ -212,7 +250,7 @@ class Conductor:
         until, last = self._until(known_until), self._closing_strike is not None
         if not last:
             walking = self.block.first_onset is not None and self._resting_until is None
-            if walking and (stopped := self._tracker.watch.stopped(known_until)):
+            if walking and (stopped := self._leg.tracker.watch.stopped(known_until)):
                 raise GaitError(stopped)
             self._promised = max(self._promised, until)
         return Horizon(until, last)
@@ -221,49 +259,47 @@ class Conductor:
         """Return how far the promise at an instant goes, both [ns]."""
         if self._closing_strike is not None:
             return self._closing_strike + nanoseconds(self._longest_promise)
-        return known_until + nanoseconds(min(self._lookahead, self._lookahead_by_phase()))
+        by_phase = map(self._lookahead_by_phase, self._legs.values())
+        return known_until + nanoseconds(min(self._lookahead, *by_phase))
 
     # Blocks
 
     @property
     def _started(self) -> int:
         """Number of the stride in progress in its block, from 1."""
-        return self._tracker.stride_in_progress - self.block.strides_before
+        return self._leg.tracker.stride_in_progress - self.block.strides_before
 
     def _in_block(self, strike: int) -> bool:
         """Whether a stride of a block starts with a strike [ns]; ends and begins blocks."""
         if self._resting_until is not None:
             if strike < self._resting_until:
                 return False
+            self._begin_block(strike)
             self._resting_until = None
         elif self._is_over(strike):
             self.block.end = strike
             if self.block.number == len(self.protocol.sequence):
                 self._closing_strike = strike
                 return False
-            if rest := self.block.plan.rest:
-                self._resting_until = strike + nanoseconds(rest)
+            after = self.protocol.sequence[self.block.number]
+            if self.block.plan.rest or self.protocol.leg(after) is not self.block.leg:
+                self._resting_until = strike + nanoseconds(self.block.plan.rest)
                 return False
-        else:
-            if self.block.start is None:
-                self.block.start = strike
-            return True
-        number = self.block.number
-        self.blocks.append(
-            BlockRun(
-                self.protocol.sequence[number],
-                number + 1,
-                strike,
-                self._tracker.stride_in_progress - 1,
-                self._tracker.counts.implausible,
-            )
-        )
-        self._periods = self._baseline_periods()
+            self._begin_block(strike)
+        elif self.block.start is None:
+            self.block.start = strike
         return True
 
-    def _baseline_periods(self) -> deque[float]:
-        """Return a place for the periods [s] of the latest complete strides of a baseline."""
-        return deque(maxlen=max(self.block.plan.baseline - 1, 1))
+    def _begin_block(self, strike: int | None = None) -> None:
+        """Begin the next block, with a strike [ns] of its leg if one has come."""
+        number = len(self.blocks)
+        plan = self.protocol.sequence[number]
+        tracker = self._legs[self.protocol.leg(plan)].tracker
+        before = max(tracker.stride_in_progress - 1, 0), tracker.counts.implausible
+        ankles = self.protocol.ankles(plan)
+        self.blocks.append(BlockRun(plan, number + 1, ankles, strike, *before))
+        # Periods [s] of the latest complete strides of the baseline.
+        self._periods: deque[float] = deque(maxlen=max(plan.baseline - 1, 1))
 
     def _baseline_is_over(self, strike: int) -> bool:
         """Whether the stride that starts with a strike [ns] is the last one of the baseline."""
@@ -296,7 +332,7 @@ class Conductor:
 
     def _is_steady(self, most: float) -> bool:
         """Whether the latest strides vary by at most a share of their mean; 0 asks nothing."""
-        recent = self._recent
+        recent = self._leg.recent
         if most == 0:
             return True
         full = len(recent) == STEADY_STRIDES
@@ -304,42 +340,43 @@ class Conductor:
 
     # Pulses
 
-    def _predicted(self) -> list[float]:
-        """Return the stride periods [s] whose mean is the prediction of the next one."""
-        return list(self._recent)[-PREDICTED_FROM:]
+    def _due_by_phase(self, leg: _Leg) -> bool:
+        """Whether a pulse by phase comes in each of a leg's strides to come."""
+        block = self.block
+        by_phase = block.plan.pulses.phase is not None and leg.side in block.ankles
+        return by_phase and block.pulses_left(leg.side) > 0
 
-    def _lookahead_by_phase(self) -> float:
+    def _lookahead_by_phase(self, leg: _Leg) -> float:
         """Return how far [s] a promise may go, so that it covers no pulse by phase to come."""
-        phase = self.block.plan.pulses.phase
-        if phase is None or not self.block.pulses_left:
+        if not self._due_by_phase(leg):
             return math.inf
-        periods = self._predicted() or [self._shortest]
+        after = self.block.plan.pulses.after_strike
+        periods = leg.predicted_from or [self._shortest]
         # The next stride, as short as can be believed, changes the mean by its share.
         change, share = self._limits.stride_change, 1 / min(len(periods) + 1, PREDICTED_FROM)
-        lookahead = phase * min(periods) * (1 - change * share)
-        if self.block.baseline:
+        lookahead = after * min(periods) * (1 - change * share)
+        if self.block.baseline or after >= 1:
             return lookahead
         # The strike that ends the baseline is not known: a whole stride lies before the pulse.
-        return max(lookahead, (1 + phase) * min(periods) * (1 - change))
+        return max(lookahead, (1 + after) * min(periods) * (1 - change))
 
-    def _plan_by_phase(self, strike: int) -> None:
-        """Plan the pulse of the stride that starts with a strike [ns]."""
+    def _plan_by_phase(self, leg: _Leg, strike: int) -> None:
+        """Plan a leg's next pulse by phase at a strike of it [ns]."""
         block, plan = self.block, self.block.plan.pulses
-        assert plan.phase is not None
-        period = statistics.fmean(self._predicted() or [block.measured_period])
-        onset = max(strike + nanoseconds(plan.phase * period), self._promised)
-        self._add_pulses([onset])
+        period = statistics.fmean(leg.predicted_from or [block.measured_period])
+        onset = max(strike + nanoseconds(plan.after_strike * period), self._promised)
+        self._add_pulses(leg.side, [onset])
 
-    def _add_pulses(self, onsets: Sequence[int]) -> None:
-        """Add the next pulses of the block at their onsets [ns], to be requested when due."""
+    def _add_pulses(self, side: Side, onsets: Sequence[int]) -> None:
+        """Add an ankle's next pulses at their onsets [ns], to be requested when due."""
         block, plan = self.block, self.block.plan.pulses
-        heights = self._heights[block.planned :]
-        self._rest = chain(self._rest, map(plan.pulse, onsets, heights))
-        self._next_part_at = 0
-        block.planned += len(onsets)
+        heights = self._heights[block.planned[side] :]
+        self._rest[side] = chain(self._rest[side], map(plan.pulse, onsets, heights))
+        self._next_part_at[side] = 0
+        block.planned[side] += len(onsets)
         if block.first_onset is None:
             block.first_onset = onsets[0]
-        block.pulses_end = onsets[-1] + nanoseconds(plan.width)
+        block.pulses_end = max(block.pulses_end, onsets[-1] + nanoseconds(plan.width))
 
     def _plan(self, strike: int) -> None:
         """Plan the pulses at the strike [ns] that starts the last baseline stride."""
@@ -362,7 +399,11 @@ class Conductor:
             block.measured_period_error = spread / math.sqrt(len(self._periods))
         seed = protocol.seed, block.number
         self._heights = plan.heights(block.plan.torque(protocol.walker), seed)
-        if plan.count == 0 or plan.phase is not None:
+        if plan.count == 0:
+            return
+        if plan.phase is not None:
+            if plan.after_strike >= 1:
+                self._plan_by_phase(self._leg, strike)
             return
         delay = nanoseconds((1 + plan.initial_phase) * stride)
         if self._periods:
@@ -371,13 +412,17 @@ class Conductor:
             delay = math.floor((1 + plan.initial_phase) * stride * NANOSECONDS_PER_SECOND) + 1
         block.pulse_period = plan.period_for(stride)
         first = max(strike + delay, self._promised)
-        self._add_pulses(plan.onsets(first, block.pulse_period, seed))
+        *onsets, after = plan.onsets(first, block.pulse_period, seed)
+        self._add_pulses(block.leg, onsets)
+        for other in block.ankles[1:]:
+            between = [(one + next_one) // 2 for one, next_one in pairwise([*onsets, after])]
+            self._add_pulses(other, between)
 
     def _require_plausible_baseline(self) -> None:
         """Raise GaitError if the baseline's strides are not those of one gait."""
         periods = self._periods
         # By a stride's worth of events.
-        events = self._tracker.counts.implausible - self.block.doubted_before
+        events = self._leg.tracker.counts.implausible - self.block.doubted_before
         doubted = math.ceil(events / PLACES)
         if doubted > len(periods):
             raise GaitError(

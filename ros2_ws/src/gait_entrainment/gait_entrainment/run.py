@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
+from typing import Any
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.experiment import BlockRun
@@ -33,8 +34,10 @@ class JudgedBlock:
     """One block of a run, analyzed by itself, against its own baseline."""
 
     name: str
+    side: Side  # the leg whose strides count
     first_stride: int
     last_stride: int | None  # None if it did not end
+    end: float  # heel strike that ends it [ns]; infinite if it did not end
     measured_period: float  # mean stride period over its baseline [s]; NaN if unknown
     pulse_period: float  # as planned [s]; NaN if unknown, or by phase
     analysis: Analysis
@@ -43,39 +46,48 @@ class JudgedBlock:
 def analyze_blocks(
     blocks: Sequence[BlockRun],
     events: Sequence[GaitEvent],
-    onsets: Sequence[int],
+    onsets: Sequence[tuple[Side, int]],
     side: Side,
     settings: VerdictSettings | None = None,
-    unknown: Sequence[tuple[int, int]] = (),
+    unknown: Sequence[tuple[Side, int, int]] = (),
 ) -> tuple[Analysis, tuple[JudgedBlock, ...]]:
     """
     Analyze a run, and each of its blocks, unless its protocol is one of fixed length.
 
-    As ``analyze``; ``blocks`` are those of a conductor that has seen the events. With
-    blocks, pulses, verdicts and holes of the run are those of its blocks.
+    As ``analyze``, on each leg for itself; ``blocks`` are those of a conductor that has seen the
+    events. With blocks, pulses, verdicts and holes of the run are those of its blocks.
     """
     plans = [block.plan for block in blocks]
-    whole = analyze(events, onsets, side, settings_for(plans, settings), unknown)
+
+    def on(leg: Side, start: float = 0, end: float = math.inf) -> tuple[list[int], list[Any]]:
+        holes = [(a, b) for s, a, b in unknown if s is leg and start < b and a < end]
+        return [onset for s, onset in onsets if s is leg and start <= onset < end], holes
+
+    own, missing = on(side)
+    whole = analyze(events, own, side, settings_for(plans, settings), missing)
     if len(blocks) <= 1 and not any(block.plan.open_ended for block in blocks):
         return whole, ()
     judged = []
     for block in blocks:
         start = block.start or 0
         end = math.inf if block.end is None else block.end
+        own, missing = on(block.leg, start, end)
         analysis = analyze(
             [event for event in events if start <= event.stamp <= end],
-            [onset for onset in onsets if start <= onset < end],
-            side,
+            own,
+            block.leg,
             settings_for([block.plan], settings),
-            [hole for hole in unknown if start < hole[1] and hole[0] < end],
+            missing,
             block.strides_before,
         )
         strides = [stride.number for stride in analysis.strides if stride.end == end]
         judged.append(
             JudgedBlock(
                 name=block.plan.name,
+                side=block.leg,
                 first_stride=block.strides_before + 1,
                 last_stride=strides[0] if strides else None,
+                end=end,
                 measured_period=block.measured_period,
                 pulse_period=block.pulse_period,
                 analysis=analysis,
@@ -95,8 +107,7 @@ class Run:
 
     protocol: Protocol | None  # None if nobody told it
     events: tuple[GaitEvent, ...]  # in the order in which they came
-    onsets: tuple[int, ...]  # of the pulses
-    timings: tuple[PulseTiming, ...]  # commanded, sent and measured onset of each pulse
+    delivered: tuple[tuple[Side, PulseTiming], ...]  # pulses, ankle by ankle
     measured_period: float  # mean stride period before the pulses [s]; NaN if unknown
     pulse_period: float  # as planned, without a protocol as seen [s]; NaN if unknown
     analysis: Analysis
@@ -105,7 +116,17 @@ class Run:
     @property
     def strides(self) -> list[Stride]:
         """The strides of the protocol, which more may follow; without a protocol, all."""
-        last = math.inf if self.protocol is None else self.protocol.strides
         if self.blocks:
-            last = self.blocks[-1].last_stride or math.inf
+            return [s for s in self.analysis.strides if s.end <= self.blocks[-1].end]
+        last = math.inf if self.protocol is None else self.protocol.strides
         return [stride for stride in self.analysis.strides if stride.number <= last]
+
+    @property
+    def onsets(self) -> tuple[int, ...]:
+        """Commanded onsets of the pulses."""
+        return tuple(timing.commanded for _, timing in self.delivered)
+
+    @property
+    def timings(self) -> tuple[PulseTiming, ...]:
+        """Commanded, sent and measured onset of each pulse."""
+        return tuple(timing for _, timing in self.delivered)

@@ -8,20 +8,26 @@ Conductor, ankle robot and walker are the objects that the nodes hold, driven in
 which a lock-step run drives them. So both give the same events to the nanosecond.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from gait_entrainment.conventions import Side
 from gait_entrainment.experiment import Conductor
 from gait_entrainment.gait import GaitEvent, VerdictSettings
 from gait_entrainment.protocol import Protocol
 from gait_entrainment.robot import (
     GuardedRobot,
     LimitError,
-    MeasuredOnsets,
+    Pulse,
+    PulseTiming,
     PulseTrain,
-    find_driver,
+    RobotState,
+    make_robots,
 )
 from gait_entrainment.run import Run, analyze_blocks
 from gait_entrainment.walker import Ending, Walker
+
+TimingsOf = Callable[[Sequence[Pulse], Sequence[RobotState]], Sequence[PulseTiming]]
 
 
 @dataclass(frozen=True)
@@ -37,52 +43,50 @@ def simulate(
     protocol: Protocol,
     settings: VerdictSettings | None = None,
     *,
+    timings_of: TimingsOf | None = None,
     measured_onsets: bool = False,
 ) -> Simulation:
     """
     Conduct a protocol on the simulated walker.
 
-    With ``measured_onsets`` the analysis takes the onset of each pulse from the torque that the
-    robot measured, if that shows one, instead of from the command.
+    ``timings_of`` says when the pulses on an ankle began, by them and the states of the robot
+    (gait_entrainment_commands.timing does); with ``measured_onsets`` the analysis takes its word,
+    instead of that of the command.
 
     Raises LimitError if the driver is unknown or the pulses are outside the protocol's limits,
     ProtocolError if the pulses would overlap at the measured period.
     """
-    robot = begun_robot(protocol)
+    robots = begun_robots(protocol)
     conductor = Conductor(protocol)
     walker = Walker(protocol.walker, protocol.side, None, protocol.variation, protocol.seed)
     ended = False
     events: list[GaitEvent] = []
-    onsets: list[int] = []
-    measured = MeasuredOnsets()
+    pulses: dict[Side, list[Pulse]] = {side: [] for side in robots}
+    states: dict[Side, list[RobotState]] = {side: [] for side in robots}
     while not ended:
         horizon = conductor.horizon(walker.time_reached)
-        profile = robot.promise(horizon.until)
-        onsets += profile.onsets
-        measured.add_promise(profile.onsets, profile.valid_until)
-        for onset in profile.onsets:
-            assert robot.train is not None
-            pulse = robot.train.pulses[robot.train.latest(onset)]
-            measured.add_pulse(onset, pulse.torque, pulse.duration)
-        for state in robot.read():
-            measured.add_state(state)
-        walker.promise(profile)
+        for side, robot in robots.items():
+            profile = robot.promise(horizon.until)
+            for onset in profile.onsets:
+                assert robot.train is not None
+                pulses[side].append(robot.train.pulses[robot.train.latest(onset)])
+            states[side] += robot.read()
+            walker.promise(profile)
         for transition in walker.advance(horizon.until):
             event = GaitEvent(transition.stamp, transition.kind, transition.side, transition.step)
             events.append(event)
             conductor.add_event(event)
         while train := conductor.due(walker.time_reached):
-            robot.schedule(train)
+            robots[train.side].schedule(train)
         ended = horizon.last or walker.ending is not None
-    measured.finish()
-    if measured_onsets:
-        onsets = [timing.onset for timing in measured.timings]
+    timings_of = timings_of or (lambda of, _: [PulseTiming(pulse.onset) for pulse in of])
+    delivered = [(s, t) for s in robots for t in timings_of(pulses[s], states[s])]
+    onsets = [(s, t.onset if measured_onsets else t.commanded) for s, t in delivered]
     analysis, blocks = analyze_blocks(conductor.blocks, events, onsets, protocol.side, settings)
     return Simulation(
         protocol=protocol,
         events=tuple(events),
-        onsets=tuple(onsets),
-        timings=tuple(measured.timings),
+        delivered=tuple(delivered),
         train=conductor.block.train,
         measured_period=conductor.block.measured_period,
         pulse_period=conductor.block.pulse_period,
@@ -92,21 +96,20 @@ def simulate(
     )
 
 
-def begun_robot(protocol: Protocol) -> GuardedRobot:
+def begun_robots(protocol: Protocol) -> dict[Side, GuardedRobot]:
     """
-    Return the simulated robot of a protocol, at the start of a run.
+    Return the simulated robots of a protocol, at the start of a run.
 
     Raises LimitError if the driver is unknown or a real robot's, or the pulses are outside the
     protocol's limits.
     """
-    driver = find_driver(protocol.driver)
-    if not driver.simulated:
-        raise LimitError(
-            f"driver: {driver.name} runs in real time only; use entrain run --real-time"
-        )
-    robot = driver.make(protocol.side, protocol.limits, protocol.seed)
+    robots = make_robots(protocol.driver, protocol.sides, protocol.limits, protocol.seed)
+    if not all(robot.capabilities.simulated for robot in robots.values()):
+        name = protocol.driver.partition(":")[0]
+        raise LimitError(f"driver: {name} runs in real time only; use entrain run --real-time")
     protocol.check_limits()
-    robot.configure()
-    robot.activate()
-    robot.begin(0)
-    return robot
+    for robot in robots.values():
+        robot.configure()
+        robot.activate()
+        robot.begin(0)
+    return robots

@@ -15,11 +15,12 @@ from gait_entrainment.protocol import Protocol, PulsePlan
 from gait_entrainment.robot import LimitError
 from gait_entrainment.simulation import simulate
 from gait_entrainment.walker import Walker
+from gait_entrainment_commands.timing import timings_of
 
 
 @pytest.fixture(scope="module")
 def default():
-    return simulate(Protocol())
+    return simulate(Protocol(), timings_of=timings_of)
 
 
 def test_the_papers_example_entrains_at_the_end_of_double_stance(default):
@@ -120,7 +121,7 @@ def test_a_walk_that_ends_by_itself_is_reported():
 
 def test_a_device_of_realistic_bandwidth_still_entrains(default):
     """Its pulses come later, so the gait locks with them commanded earlier by as much."""
-    emulated = simulate(Protocol(driver="emulated"))
+    emulated = simulate(Protocol(driver="emulated"), timings_of=timings_of)
     assert emulated.analysis.entrainments[-1].verdict is Verdict.ENTRAINED
     late = [(t.measured - t.commanded) / 1e9 for t in emulated.timings]
     assert len(late) == 50
@@ -129,7 +130,7 @@ def test_a_device_of_realistic_bandwidth_still_entrains(default):
     lag, ideal = (s.analysis.pulses[-1].phase_lag for s in (emulated, default))
     assert lag < ideal - 0.005
     # Seen from the torque that was measured, the lag is nearer to the ideal robot's.
-    seen = simulate(Protocol(driver="emulated"), measured_onsets=True)
+    seen = simulate(Protocol(driver="emulated"), timings_of=timings_of, measured_onsets=True)
     assert seen.events == emulated.events
     assert abs(seen.analysis.pulses[-1].phase_lag - ideal) < abs(lag - ideal) / 2
 

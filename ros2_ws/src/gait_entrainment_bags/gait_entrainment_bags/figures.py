@@ -10,7 +10,6 @@ import numpy as np
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind
 from gait_entrainment.gait import Analysis, Verdict
-from gait_entrainment.robot.timing import lateness_ms
 from gait_entrainment.run import JudgedBlock
 from gait_entrainment_bags.recorded_run import RecordedRun, drawn_strides
 from gait_entrainment_commands.drawing import (
@@ -29,6 +28,7 @@ from gait_entrainment_commands.outcome import (
     timing_outcome,
     timing_summary,
 )
+from gait_entrainment_commands.timing import lateness_ms
 
 _WIDTH, _HEIGHT = 7.2, 3.6  # [inch]
 _DOTTED_LINE = {"color": BLUE, "marker": ".", "lw": 0.8}

@@ -29,8 +29,9 @@ class RunRecord:
     def __init__(self) -> None:
         self._recorded: Counter[str] = Counter()  # messages by topic
         self._published: dict[str, int] = {}  # the same, as the nodes say
-        self._numbers: dict[tuple[TopicInfo, int], set[int]] = {}  # by topic and run, from 0
-        self._ended: set[tuple[TopicInfo, int]] = set()
+        # By topic, run, and ankle of a profile; from 0.
+        self._numbers: dict[tuple[TopicInfo, int, int], set[int]] = {}
+        self._ended: set[tuple[TopicInfo, int, int]] = set()
 
     def add(self, topic: TopicInfo, data: bytes) -> None:
         """Take a message; one that cannot be decoded is ignored."""
@@ -42,13 +43,14 @@ class RunRecord:
             if topic.type == _COUNTS:
                 self._published |= dict(zip(message.topics, message.counts, strict=True))
                 return
-            numbers = self._numbers.setdefault((topic, message.run), set())
+            place = topic, message.run, message.side if topic.type == _PROFILE else 0
+            numbers = self._numbers.setdefault(place, set())
             if topic.type == _EVENT:  # heel strike n closes step n, toe-off n begins its swing
                 numbers.add(2 * message.step - message.kind)
                 return
             numbers.add(message.revision)
             if message.last or message.stop:
-                self._ended.add((topic, message.run))
+                self._ended.add(place)
         except (BagError, AttributeError):
             return
 
@@ -59,10 +61,11 @@ class RunRecord:
             for topic, count in self._published.items()
             if 0 < self._recorded[topic] < count
         ]
-        for (topic, run), numbers in self._numbers.items():
+        for place, numbers in self._numbers.items():
+            topic, run, _ = place
             if missing := max(numbers) + 1 - len(numbers):
                 holes.append(f"{topic.name}: {missing} {_NAMES[topic.type]} of run {run}")
-            if topic.type == _PROFILE and (topic, run) not in self._ended:
+            if topic.type == _PROFILE and place not in self._ended:
                 holes.append(f"{topic.name}: the end of run {run}")
         return holes
 

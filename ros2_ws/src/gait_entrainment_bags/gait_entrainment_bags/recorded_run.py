@@ -20,7 +20,7 @@ import numpy as np
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.experiment import BlockRun, Conductor, GaitError
-from gait_entrainment.gait import Analysis, GaitEvent, Stride, VerdictSettings, analyze
+from gait_entrainment.gait import Analysis, GaitEvent, Stride, VerdictSettings
 from gait_entrainment.protocol import Protocol, ProtocolError, read_protocol
 from gait_entrainment.run import Run, analyze_blocks, settings_for
 from gait_entrainment.settings import SettingError
@@ -83,15 +83,23 @@ def read_run(
     with BagReader(path) as bag:
         protocol, side = protocol_and_side(bag, protocol, side)
         record = RunMessages(bag)
-        onsets = {"commanded": record.onsets, "measured": [t.onset for t in record.timings]}
+        onsets = {
+            "commanded": [(leg, timing.commanded) for leg, timing in record.delivered],
+            "measured": [(leg, timing.onset) for leg, timing in record.delivered],
+        }
         if (live_onset := bag.custom_data.get("onset", "commanded")) not in onsets:
             raise BagError(f"{path}: its onset is {live_onset!r}; allowed: {', '.join(onsets)}")
         recorded_side = _side_in(bag, topic_names.STRIDES)
-        live_side = side if recorded_side is None else recorded_side
+        live_sides: Sequence[Side] = [side if recorded_side is None else recorded_side]
+        if protocol is not None and len(protocol.sides) > 1:
+            live_sides = protocol.sides
         bias = _toe_off_bias(bag)
         events = without_bias(record.events, bias)
         told = settings_for(protocol.sequence if protocol else (), settings)
-        live = analyze(events, onsets[live_onset], live_side, told, record.unknown)
+        live = {
+            leg: analyze_blocks((), events, onsets[live_onset], leg, told, record.unknown)[0]
+            for leg in live_sides
+        }
         blocks = conducted(protocol, record.events)
         begun = onsets[onset or live_onset]
         analysis, judged = analyze_blocks(blocks, events, begun, side, settings, record.unknown)
@@ -101,14 +109,13 @@ def read_run(
             name=Path(path).stem if protocol is None else protocol.name,
             side=side,
             events=tuple(record.events),
-            onsets=tuple(record.onsets),
             measured_period=measured_period,
             pulse_period=pulse_period,
             analysis=analysis,
             blocks=judged,
-            timings=tuple(record.timings),
+            delivered=tuple(record.delivered),
             onset=live_onset,
-            differences=record.differences_from(live, live_side),
+            differences=record.differences_from(live),
             torques=record.read_torques(side, []),
             toe_off_bias=bias,
             messages=bag.message_count,
@@ -118,7 +125,7 @@ def read_run(
             ended_early=bag.custom_data.get(ENDED_EARLY, ""),
         )
         if record.true_events:
-            exact = analyze(record.true_events, begun, side, settings)
+            exact, _ = analyze_blocks((), record.true_events, begun, side, settings)
             errors = detector_errors(record.events, record.true_events)
             run = replace(run, detector_errors=errors | lag_shift(analysis, exact))
         if torques:

@@ -5,7 +5,8 @@
 
 import math
 import struct
-from collections.abc import Callable, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -16,13 +17,15 @@ from numpy.typing import NDArray
 from gait_entrainment.conventions import Side
 from gait_entrainment.gait import Analysis, GaitEvent, Stride
 from gait_entrainment.gait.analyzer import Result
-from gait_entrainment.robot import MeasuredOnsets, TorqueProfile
+from gait_entrainment.robot import TorqueProfile
 from gait_entrainment_bags import messages, topic_names
 from gait_entrainment_bags.decoding import decoder_for
 from gait_entrainment_bags.errors import BagError
 from gait_entrainment_bags.holes import hole_before
 from gait_entrainment_bags.mcap_records import BagMessage
+from gait_entrainment_bags.messages import pulse_of, side_of, state_of
 from gait_entrainment_bags.reader import BagReader
+from gait_entrainment_commands.timing import MeasuredOnsets
 
 _OWN = "gait_entrainment_msgs/msg/"
 _TYPES = {
@@ -38,6 +41,12 @@ _TYPES = {
 }
 # Fields that bags of earlier versions lack.
 _ADDED = {"reason", "stretch", "window", "spread", "scatter", "phase_lag_uncertainty"}
+# Field of an analysis by the topic on which it is published.
+_RESULTS = {
+    topic_names.STRIDES: "strides",
+    topic_names.PULSE_PHASES: "pulses",
+    topic_names.ENTRAINMENT: "entrainments",
+}
 _Value = TypeVar("_Value")
 
 
@@ -73,22 +82,22 @@ class RunMessages:
         self.real_time_factor = self._read()
         self.left_out = 0  # of another run, or of an unknown kind or side
         self._run: int | None = None  # its number
-        self.onsets: list[int] = []
-        self.unknown: list[tuple[int, int]] = []  # spans of which no torque profile is here [ns]
-        measured = MeasuredOnsets()
-        adjoins: float | None = None
+        self._begun: set[int] = set()  # ankles with the first of its profiles
+        # Ankle and span of which no torque profile is here [ns].
+        self.unknown: list[tuple[Side, int, int]] = []
+        measured = defaultdict[Side, MeasuredOnsets](MeasuredOnsets)
+        adjoins: dict[Side, float] = {}
         promises = self._values(topic_names.TORQUE_PROFILE, lambda m: (m, _promise_of(m)))
         for message, promise in promises:
+            side = side_of(message)
             if isinstance(promise, TorqueProfile):
-                if hole := hole_before(message, adjoins):
-                    self.unknown.append(hole)
-                adjoins = promise.valid_until
-                self.onsets += promise.onsets
-                measured.add_promise(promise.onsets, promise.valid_until)
+                if hole := hole_before(message, adjoins.get(side)):
+                    self.unknown.append((side, *hole))
+                adjoins[side] = promise.valid_until
+                measured[side].add_promise(promise.onsets, promise.valid_until)
             else:
-                adjoins = math.inf
-                self.onsets = [onset for onset in self.onsets if onset < promise]
-                measured.stop(promise)
+                adjoins[side] = math.inf
+                measured[side].stop(promise)
         events = self._messages[self._names[topic_names.GAIT_EVENTS]]
         self.events, self.true_events = (
             list(filter(None, self._values(name, self._event_of)))
@@ -96,12 +105,14 @@ class RunMessages:
         )
         # Whether the log times are the stamps, so that instants can be looked up.
         self._stamped = [m.log_time for m in events] == [event.stamp for event in self.events]
-        for pulse in self._values(topic_names.PULSES, messages.pulse_of):
-            measured.add_pulse(*pulse)
-        for state in self._values(topic_names.ROBOT_STATE, messages.state_of):
-            measured.add_state(state)
-        measured.finish()
-        self.timings = measured.timings
+        for side, pulse in self._values(topic_names.PULSES, lambda m: (side_of(m), pulse_of(m))):
+            measured[side].add_pulse(*pulse)
+        states = self._values(topic_names.ROBOT_STATE, lambda m: (side_of(m), state_of(m)))
+        for side, state in states:
+            measured[side].add_state(state)
+        for of_ankle in measured.values():
+            of_ankle.finish()
+        self.delivered = [(side, one) for side, of in measured.items() for one in of.timings]
 
     def _read(self) -> float:
         """Read the messages by topic; return walked over wall time by /clock, NaN without."""
@@ -135,11 +146,15 @@ class RunMessages:
         """Whether a message is of the run of the first: of a torque profile, if there is one."""
         if self._run is None:
             self._run = message.run
-        elif not getattr(message, "revision", True):  # that counts the profiles of a run from 0
+        # Profiles of a run are counted from 0, on each ankle.
+        begins = not getattr(message, "revision", True)
+        if begins and (message.run != self._run or message.side in self._begun):
             raise BagError(
                 f"{self._bag.path}: more than one run is in it (run {self._run}, then run "
                 f"{message.run}): record each into a bag of its own"
             )
+        if begins:
+            self._begun.add(message.side)
         self.left_out += message.run != self._run
         return bool(message.run == self._run)
 
@@ -151,21 +166,19 @@ class RunMessages:
             self.left_out += 1
             return None
 
-    def differences_from(self, analysis: Analysis, side: Side) -> tuple[str, ...] | None:
-        """Return how the published results differ from an analysis; None if there are none."""
-        results: dict[str, Sequence[Result]] = {
-            topic_names.STRIDES: analysis.strides,
-            topic_names.PULSE_PHASES: analysis.pulses,
-            topic_names.ENTRAINMENT: analysis.entrainments,
-        }
-        if results.keys().isdisjoint(self._names):
+    def differences_from(self, live: Mapping[Side, Analysis]) -> tuple[str, ...] | None:
+        """Return how the results published differ from an analysis; None if there are none."""
+        if _RESULTS.keys().isdisjoint(self._names):
             return None
         differences = []
-        for relative in filter(self._names.get, results):
-            current = [messages.result_values(result, side) for result in results[relative]]
+        for relative in filter(self._names.get, _RESULTS):
             with fields_expected(relative):
                 found = list(self._values(relative, lambda message: message))
-                differences.append(_difference(relative, found, current))
+                for leg, analysis in live.items():
+                    results: Sequence[Result] = getattr(analysis, _RESULTS[relative])
+                    current = [messages.result_values(result, leg) for result in results]
+                    own = [m for m in found if len(live) == 1 or m.side == leg]
+                    differences.append(_difference(relative, own, current))
         return tuple(filter(None, differences))
 
     def read_torques(self, side: Side, strides: Sequence[Stride]) -> AnkleTorques:

@@ -3,16 +3,13 @@
 
 """How well the walker of a recorded run kept time, as it reported."""
 
-from pathlib import Path
-
 from gait_entrainment_bags.reader import BagReader
 from gait_entrainment_bags.topic_names import WALKER_TIMING
 
 
-def walker_timing(bag: Path) -> dict[str, dict[str, float]]:
+def walker_timing(reader: BagReader) -> dict[str, dict[str, float]]:
     """Return what the outcome says about it, by the walker's last report; {} without one."""
-    with BagReader(bag) as reader:
-        told = list(reader.messages_of(WALKER_TIMING))[-1:]
+    told = list(reader.messages_of(WALKER_TIMING))[-1:]
     timing = {}
     for walker in told:
         if walker.samples:

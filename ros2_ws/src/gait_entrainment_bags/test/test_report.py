@@ -53,9 +53,7 @@ def test_a_slow_passage_is_not_taken_for_a_lock_and_says_so():
 def test_what_is_not_known_is_null_in_json():
     protocol = Protocol(baseline=2, washout=0, pulses=PulsePlan(count=1))
     nothing = analyze([], [], Side.RIGHT)
-    told = outcome_of(
-        Simulation(protocol, (), (), (), math.nan, math.nan, nothing, (), None, None)
-    )
+    told = outcome_of(Simulation(protocol, (), (), math.nan, math.nan, nothing, (), None, None))
     text = json.dumps(told, allow_nan=False)
     assert json.loads(text)["unperturbed_stride_period"] is None
     assert json.loads(text)["verdict"] == "undecided"
@@ -70,12 +68,11 @@ def test_the_figures_are_drawn(simulation, tmp_path):
         name="a_run",
         side=Side.RIGHT,
         events=simulation.events,
-        onsets=simulation.onsets,
         measured_period=simulation.measured_period,
         pulse_period=simulation.pulse_period,
         analysis=simulation.analysis,
         blocks=(),
-        timings=simulation.timings,
+        delivered=simulation.delivered,
         torques=AnkleTorques(stamps, zeros + 50, zeros, zeros),
         messages=0,
         lost=None,
@@ -83,8 +80,9 @@ def test_the_figures_are_drawn(simulation, tmp_path):
     )
     paths = [p for p in draw_figures(run, tmp_path) if p.suffix == ".png"]
     assert [p.stem for p in paths] == ["stride_period", "phase_lag", "ankle_torque"]
-    late = (PulseTiming(run.onsets[0], run.onsets[0] + 10**7, run.onsets[0] + 2 * 10**7),)
-    paths = draw_figures(dataclasses.replace(run, timings=late), tmp_path)
+    late = PulseTiming(run.onsets[0], run.onsets[0] + 10**7, run.onsets[0] + 2 * 10**7)
+    late_run = dataclasses.replace(run, delivered=((Side.RIGHT, late),))
+    paths = draw_figures(late_run, tmp_path)
     assert "pulse_timing" in [p.stem for p in paths]
     for path in (path for path in paths if path.suffix == ".png"):
         content = path.read_bytes()
@@ -114,12 +112,11 @@ def test_a_run_without_pulses_or_strides_can_be_drawn_too(tmp_path):
         name="a_run",
         side=Side.RIGHT,
         events=(),
-        onsets=(),
+        delivered=(),
         measured_period=math.nan,
         pulse_period=math.nan,
         analysis=analyze([], [], Side.RIGHT),
         blocks=(),
-        timings=(),
         torques=AnkleTorques(empty.astype(np.int64), empty, empty, empty),
         messages=0,
         lost=None,

@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from gait_entrainment.protocol import Protocol
-from gait_entrainment.robot import DeviceError, GuardedRobot, find_driver
+from gait_entrainment.robot import DeviceError, GuardedRobot, driver_on, make_robots
 from gait_entrainment.robot.faults import STOPPED
 from gait_entrainment_bags.messages import nanoseconds_of
 from gait_entrainment_bringup.node_list import CLOCK_OFFSET, limits_of
@@ -55,18 +55,20 @@ def points(
     ``elsewhere`` are nodes on other hosts; the stop has to be pressed within ``timeout`` [s].
     """
     yield _limits(protocol)
-    yield _watchdog(protocol.driver)
+    for side in protocol.sides:
+        yield _watchdog(driver_on(protocol.driver, side))
     yield _record(bag)
     if elsewhere:
         yield from _clocks(elsewhere)
-    driver = find_driver(protocol.driver)
     try:
-        with driver.make(protocol.side, protocol.limits, protocol.seed) as robot:
-            robot.configure()
-            robot.activate()
-            yield Point("device", True, robot.identity or "answers, but does not say what it is")
-            yield _loop(robot)
-            yield _stop(robot, timeout)
+        for robot in make_robots(protocol.driver, protocol.sides, protocol.limits).values():
+            with robot:
+                robot.configure()
+                robot.activate()
+                told = robot.identity or "answers, but does not say what it is"
+                yield Point("device", True, told)
+                yield _loop(robot)
+                yield _stop(robot, timeout)
     except DeviceError as error:
         yield Point("device", False, str(error))
 

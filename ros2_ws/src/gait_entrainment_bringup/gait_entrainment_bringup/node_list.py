@@ -130,20 +130,21 @@ def parameters(
     ``toe_off_bias`` [s].
     """
     nodes = nodes_for(walker)
-    side = protocol.side.name.lower()
+    ankles = {"side": protocol.side.name.lower(), "both_ankles": len(protocol.sides) > 1}
     measured = real_time and not find_driver(protocol.driver).simulated
     given: Parameters = {
         "walker_sim": {
             **asdict(protocol.walker),
             **{f"variation.{name}": value for name, value in asdict(protocol.variation).items()},
             "seed": protocol.seed,
-            "first_heel_strike": side,
+            "first_heel_strike": ankles["side"],
+            "both_ankles": ankles["both_ankles"],
             "real_time": real_time,
             "acknowledged": bag is not None and not real_time,
             "presentation_delay": MEASURED_DELAY if measured else 0.0,
         },
         "perturbator": {
-            "side": side,
+            **ankles,
             "driver": protocol.driver,
             "seed": protocol.seed,
             "armed": armed,
@@ -152,7 +153,7 @@ def parameters(
             **{f"limits.{k}": v for k, v in limits_of(protocol, worn=measured).items()},
         },
         "gait_analyzer": {
-            "side": side,
+            **ankles,
             "onset": onset,
             "toe_off_bias": toe_off_bias,
             **_verdict(protocol),
@@ -295,6 +296,7 @@ def replay_parameters(
         },
         "gait_analyzer": {
             "side": side.name.lower(),
+            "both_ankles": protocol is not None and len(protocol.sides) > 1,
             "onset": onset,
             "toe_off_bias": float(custom_data.get("toe_off_bias", "0")),
             "use_sim_time": True,

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from gait_entrainment.errors import UsageError
 from gait_entrainment.protocol import Protocol
-from gait_entrainment.robot import LimitError, find_driver
+from gait_entrainment.robot import LimitError, driver_on, find_driver, make_robots
 from gait_entrainment.settings import Setting
 from gait_entrainment_bags.truth import TOE_OFF_BIAS
 from gait_entrainment_bringup.node_list import (
@@ -97,7 +97,6 @@ def checked_run(
     """
     protocol = chosen_protocol(options)
     check_numbers(options)
-    protocol.check_limits()
     check_walker(options.walker, options.detector, real_time=options.real_time)
     if drives:
         _check_arming(protocol, options)
@@ -157,7 +156,8 @@ def check_robot(protocol: Protocol, *, real_time: bool, armed: bool, unproved: b
             f"driver: {driver.name} applies real torque: see that all is well, then add --arm, or "
             "--arm-later to arm it once the walk has begun"
         )
-    require_proof(protocol.driver, unproved=unproved)
+    for side in make_robots(protocol.driver, protocol.sides, protocol.limits):
+        require_proof(driver_on(protocol.driver, side), unproved=unproved)
 
 
 def check_output(bag: Path, option: str = "--out", *, exactly: bool = True) -> None:

@@ -6,6 +6,7 @@
 import json
 from pathlib import Path
 
+from gait_entrainment_bags import BagReader
 from gait_entrainment_bags.figures import draw_figures
 from gait_entrainment_bags.recorded_run import messages_line, read_run, recorded_outcome
 from gait_entrainment_bags.truth import detection_lines
@@ -16,7 +17,8 @@ from gait_entrainment_commands.outcome import summary, timing_summary
 def report(bag: Path, *, figures: bool, as_json: bool) -> None:
     """Print the outcome of a recorded run, as lines or as one JSON object; draw its figures."""
     recorded = read_run(bag, torques=figures)
-    outcome = recorded_outcome(recorded, bag) | walker_timing(bag)
+    with BagReader(bag) as reader:
+        outcome = recorded_outcome(recorded, bag) | walker_timing(reader)
     drawn = draw_figures(recorded, bag) if figures else []
     if as_json:
         print(json.dumps(outcome))

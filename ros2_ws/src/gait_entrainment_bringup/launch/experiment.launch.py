@@ -34,7 +34,7 @@ DELAY = Setting("from the start of the other nodes to that of the experiment", f
 
 def nodes(context: LaunchContext) -> list[Action]:
     """Make the nodes once the arguments are known: the protocol says what they are given."""
-    protocol = read_protocol(shared.value(context, "protocol") or None)
+    protocol = read_protocol(shared.value(context, "protocol") or None, to_run=True)
     real_time = shared.is_true(context, "real_time")
     arming = {"armed": "arm", "unproved": "unproved"}
     switches = {name: shared.is_true(context, argument) for name, argument in arming.items()}
@@ -47,7 +47,6 @@ def nodes(context: LaunchContext) -> list[Action]:
         check_output(bag, "bag")
     elif shared.value(context, "bag"):
         raise shared.LaunchError("bag: there is none with recorder:=none; leave one of them out")
-    protocol.check_limits()
     check_robot(protocol, real_time=real_time, **switches)
     walking = {
         "walker": shared.choice(context, "walker", *WALKERS),

@@ -13,8 +13,8 @@ from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind
 from gait_entrainment.gait import Analysis, GaitEvent, Hole, Reason, Verdict
 from gait_entrainment.protocol import Protocol, content_of
 from gait_entrainment.robot import PulseTiming
-from gait_entrainment.robot.timing import lateness_ms, quantile
 from gait_entrainment.run import Run
+from gait_entrainment_commands.timing import late_ms, lateness_ms, quantile
 
 # Pulses whose lags make up the final one: the paper's locked gait repeats itself exactly.
 FINAL_PULSES = 5
@@ -51,7 +51,7 @@ def outcome_of(run: Run) -> dict[str, Any]:
                 "phase_lag": pulse.phase_lag,
             }
             for pulse in analysis.pulses
-            if strides and pulse.stride <= strides[-1].number
+            if strides and pulse.onset < strides[-1].end
         ],
         **_judgement(analysis, run.events),
         "stretches": [
@@ -66,9 +66,11 @@ def outcome_of(run: Run) -> dict[str, Any]:
         "parameters": run.protocol and _parameters(run.protocol),
     }
     if run.blocks:
+        legs = {block.side for block in run.blocks}
         outcome["blocks"] = [
             {
                 "name": block.name,
+                **({"side": block.side.name.lower()} if len(legs) > 1 else {}),
                 "first_stride": block.first_stride,
                 "last_stride": block.last_stride,
                 "unperturbed_stride_period": block.measured_period,
@@ -143,14 +145,15 @@ def summary(outcome: dict[str, Any]) -> str:
     if "blocks" in outcome:
         plans = parameters.get("blocks", [parameters])
         for number, (block, said) in enumerate(zip(outcome["blocks"], plans, strict=False), 1):
-            lines += _block_lines(number, block, said["pulses"])
+            lines += _block_lines(number, block, said)
         return "\n".join([*lines, *_doubt_lines(outcome)])
     if strides:
         measured = "not measured" if unperturbed is None else f"{unperturbed:.4f} s"
         lines.append(f"stride period    {measured} unperturbed, {strides[-1]:.4f} s last")
     if timing := _timing(outcome, plan or {}):
         shape = f"{plan['torque']:.2f} N m for {plan['width']:g} s" if plan else ""
-        lines.append(f"pulses           {shape}{timing if plan else timing.lstrip()}")
+        timing = (timing if plan else timing.lstrip()) + _both(parameters)
+        lines.append(f"pulses           {shape}{timing}")
     lines.append(f"verdict          {_verdict(outcome)}")
     for stretch in outcome["stretches"][:-1]:
         lines.append(f"  until stride {stretch['last_stride']:<3} {stretch['verdict']}")
@@ -168,14 +171,22 @@ def _verdict(judged: dict[str, Any]) -> str:
     return f"{judged['verdict']}: {MEANINGS[judged['reason'] or judged['verdict']]}"
 
 
-def _block_lines(number: int, block: dict[str, Any], plan: dict[str, Any]) -> list[str]:
-    """Return what was done in a block, and what came of it."""
+def _block_lines(number: int, block: dict[str, Any], said: dict[str, Any]) -> list[str]:
+    """Return what was done in a block of which the protocol has ``said`` what, and the outcome."""
+    plan = said["pulses"]
     last = block["last_stride"] or "the end"
     told = f"block {number:<11}{block['name']}: strides {block['first_stride']} to {last}"
+    if "side" in block:
+        told += f" of the {block['side']} leg"
     if not plan["count"]:
         return [f"{told}, no pulses"]
     pulses = f"{block['pulses']} pulses of {plan['torque']:.2f} N m{_timing(block, plan)}"
-    return [f"{told}, {pulses}", f"{'':17}{_verdict(block)}"]
+    return [f"{told}, {pulses}{_both(said)}", f"{'':17}{_verdict(block)}"]
+
+
+def _both(said: dict[str, Any]) -> str:
+    """Say that the other leg got its pulses too, if it did."""
+    return ", the other leg in between" if said.get("both_legs") else ""
 
 
 def _timing(judged: dict[str, Any], plan: dict[str, Any]) -> str:
@@ -235,7 +246,7 @@ def timing_outcome(timings: Sequence[PulseTiming], stride: float) -> dict[str, A
         "sent": distribution(timings, "sent", stride),
         "measured": distribution(timings, "measured", stride),
         "each_ms": [
-            {kind: timing.late_ms(kind) for kind in ("sent", "measured")} for timing in timings
+            {kind: late_ms(timing, kind) for kind in ("sent", "measured")} for timing in timings
         ],
     }
 

@@ -53,7 +53,7 @@ def chosen_protocol(options: argparse.Namespace) -> Protocol:
 
     Raises
     ------
-    ProtocolError
+    ProtocolError, LimitError, DeviceError
         One line: place, field, what is allowed.
 
     """
@@ -61,4 +61,4 @@ def chosen_protocol(options: argparse.Namespace) -> Protocol:
     overrides = {
         field: (given[field], _option(field)) for field in FIELDS if given[field] is not None
     }
-    return read_protocol(options.protocol, overrides)
+    return read_protocol(options.protocol, overrides, to_run=True)

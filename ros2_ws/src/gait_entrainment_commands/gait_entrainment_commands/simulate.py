@@ -11,6 +11,7 @@ from gait_entrainment.simulation import simulate
 from gait_entrainment_commands.outcome import outcome_of, summary, timing_outcome, timing_summary
 from gait_entrainment_commands.outcome_options import add_outcome_options
 from gait_entrainment_commands.protocol_options import add_protocol_options, chosen_protocol
+from gait_entrainment_commands.timing import timings_of
 
 DESCRIPTION = "Conduct a protocol on the simulated walker, in one process."
 EXAMPLES = """examples:
@@ -29,7 +30,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Simulate and print; 1 if the walker falls or flies off."""
     protocol = chosen_protocol(options)
-    simulation = simulate(protocol, measured_onsets=options.onset == "measured")
+    simulation = simulate(
+        protocol, timings_of=timings_of, measured_onsets=options.onset == "measured"
+    )
     outcome = outcome_of(simulation)
     outcome["pulse_timing"] = timing_outcome(simulation.timings, simulation.measured_period)
     lines = [summary(outcome), *timing_summary(outcome["pulse_timing"])]

@@ -15,7 +15,8 @@ import can
 import pytest
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.robot import DeviceError, LimitError, MeasuredOnsets, PulseTrain, find_driver
+from gait_entrainment.robot import DeviceError, LimitError, PulseTrain, find_driver
+from gait_entrainment_commands.timing import MeasuredOnsets
 from gait_entrainment_drivers.ak_mit import ENTER, EXIT, MOTORS, Command, pack_command
 from gait_entrainment_drivers.ak_mit_can import AkMitCanOptions, AkMotorOnCan
 from gait_entrainment_drivers.ak_motor_emulator import EmulatedAkMotor

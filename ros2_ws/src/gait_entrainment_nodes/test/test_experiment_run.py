@@ -62,7 +62,9 @@ class Bench:
 
     def promise(self, **values):
         """Let the perturbator answer, up to the horizon if it is not said how far."""
-        profile = TorqueProfile(run=7, valid_until=to_time(self.run.promised_until))
+        profile = TorqueProfile(
+            run=7, side=Side.RIGHT, valid_until=to_time(self.run.promised_until)
+        )
         for name, value in values.items():
             setattr(profile, name, value)
         self.run.take_profile(profile)

@@ -3,6 +3,8 @@
 
 """One run of the ankle robot behind its guard: promises, and how trains end; without a node."""
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -16,6 +18,7 @@ from gait_entrainment.robot import (
     PulseTrain,
     Shape,
     find_driver,
+    make_robots,
 )
 from gait_entrainment.robot.faults import TORQUE_EXCEEDED
 from gait_entrainment_bags.messages import MessageError, nanoseconds_of, train_of
@@ -39,7 +42,9 @@ class Bench:
         self.robot.configure()
         self.robot.activate()
         self.profiles, self.pulses, self.states, self.ended = [], [], [], []
-        self.run = Run(4, seal_of(KEY), SECOND, self.robot, self.publish, self.ended.append)
+        robots = {Side.RIGHT: self.robot}
+        end = lambda result, _: self.ended.append(result)  # noqa: E731
+        self.run = Run(4, seal_of(KEY), SECOND, robots, self.publish, end)
 
     def publish(self, topic, message):
         assert message.run == 4
@@ -241,3 +246,34 @@ def test_pulses_of_every_shape_survive_the_goal():
     goal.pulses[2].shape = 9
     with pytest.raises(MessageError, match=r"shape: 9; allowed: 0 \(square\), 1"):
         train_of(goal)
+
+
+def test_each_ankle_is_promised_by_itself_and_a_fault_of_one_ends_both():
+    robots = make_robots("ideal", (Side.RIGHT, Side.LEFT), DeviceLimits())
+    for robot in robots.values():
+        robot.configure()
+        robot.activate()
+    published, ended = [], []
+    run = Run(
+        4,
+        seal_of(KEY),
+        SECOND,
+        robots,
+        lambda topic, message: published.append((topic.name, message)),
+        lambda result, side: ended.append((side, result.outcome, result.delivered)),
+    )
+    run.schedule(TRAIN, KEY)
+    run.schedule(replace(TRAIN.shifted(SECOND // 2), side=Side.LEFT), KEY)
+    assert run.requested == 4
+    run.take_horizon(SECOND, 4 * SECOND, last=False)
+    profiles = [m for name, m in published if name == TORQUE_PROFILE.name]
+    assert [(m.side, m.revision, len(m.onsets)) for m in profiles] == [(1, 0, 1), (0, 0, 1)]
+    pulses = [m for name, m in published if name == PULSES.name]
+    assert [(m.side, m.number) for m in pulses] == [(1, 1), (0, 1)]
+    robots[Side.LEFT].stop(TORQUE_EXCEEDED)
+    run.end_torque(Result.STOPPED, "a fault", fault=True)
+    assert ended == [(Side.RIGHT, Result.STOPPED, 1), (Side.LEFT, Result.STOPPED, 1)]
+    stops = [m for name, m in published if name == TORQUE_PROFILE.name and m.stop]
+    assert [(m.side, m.revision) for m in stops] == [(1, 1), (0, 1)]
+    run.take_horizon(4 * SECOND, 4 * SECOND, last=True)
+    assert run.closed

@@ -18,7 +18,7 @@ from gait_entrainment.gait import Analysis, GaitEvent
 from gait_entrainment.protocol import Protocol
 from gait_entrainment.robot import PulseTrain
 from gait_entrainment.run import analyze_blocks
-from gait_entrainment.simulation import begun_robot
+from gait_entrainment.simulation import begun_robots
 from gait_entrainment.walker import Ending, Walker
 from gait_entrainment_sensors.detection import ChosenDetector, Detection
 from gait_entrainment_sensors.emulated import EmulatedSensor, EmulatedSettings
@@ -84,19 +84,20 @@ def rehearse(protocol: Protocol, sensors: Sensors) -> Rehearsal:
     Raises as `gait_entrainment.simulate` does, and GaitError if the detected gait is not one that
     torque may follow.
     """
-    robot = begun_robot(protocol)
+    robots = begun_robots(protocol)
     conductor = Conductor(protocol)
     walker = Walker(protocol.walker, protocol.side, None, protocol.variation, protocol.seed)
     ended = False
     truth: list[GaitEvent] = []
     detected: list[GaitEvent] = []
-    onsets: list[int] = []
+    onsets: list[tuple[Side, int]] = []
     behind = nanoseconds(sensors.latency)
     while not ended:
         horizon = conductor.horizon(walker.time_reached - behind)
-        profile = robot.promise(horizon.until)
-        onsets += profile.onsets
-        walker.promise(profile)
+        for side, robot in robots.items():
+            profile = robot.promise(horizon.until)
+            onsets += ((side, onset) for onset in profile.onsets)
+            walker.promise(profile)
         transitions = walker.advance(horizon.until)
         events = [GaitEvent(t.stamp, t.kind, t.side, t.step) for t in transitions]
         truth += events
@@ -104,12 +105,12 @@ def rehearse(protocol: Protocol, sensors: Sensors) -> Rehearsal:
             detected.append(event)
             conductor.add_event(event)
         while train := conductor.due(walker.time_reached - behind):
-            robot.schedule(train)
+            robots[train.side].schedule(train)
         ended = horizon.last or walker.ending is not None
     return Rehearsal(
         truth=tuple(truth),
         events=tuple(detected),
-        onsets=tuple(onsets),
+        onsets=tuple(onset for _, onset in onsets),
         train=conductor.block.train,
         analysis=analyze_blocks(conductor.blocks, detected, onsets, protocol.side)[0],
         true_analysis=analyze_blocks(conductor.blocks, truth, onsets, protocol.side)[0],

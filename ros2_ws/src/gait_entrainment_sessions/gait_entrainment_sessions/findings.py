@@ -45,7 +45,8 @@ class Findings:
         pulses = statistics.last_pulses(part.analysis)
         final = pulses[-statistics.SLOPE_PULSES :]
         first = min((p.stride for p in part.analysis.pulses), default=math.inf)
-        baseline = [s.period for s in run.strides if begin <= s.number < first]
+        strides = [s for s in part.analysis.strides if s.end <= part.end]
+        baseline = [s.period for s in strides if begin <= s.number < first]
         variation = math.nan
         if len(baseline) > 1:
             variation = 100 * float(np.std(baseline, ddof=1) / np.mean(baseline))
@@ -63,6 +64,12 @@ class Findings:
             locking=statistics.locking(pulses, part.measured_period),
             holes=len(holes_of(run)),
         )
+
+    @property
+    def name(self) -> str:
+        """Name of the block of the session, and of the protocol's if that has several."""
+        name = self.placed.place.name
+        return f"{name}: {self.part.name}" if self.part.name else name
 
     @property
     def verdict(self) -> str:

@@ -9,17 +9,18 @@ pulses or makes good a share of the distance to its locked phase in each stride,
 walker of the model is walked: what a person does in between, nobody knows before.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from gait_entrainment.conventions import EventKind, Side, nanoseconds
+from gait_entrainment.conventions import Side, nanoseconds
 from gait_entrainment.errors import UsageError
 from gait_entrainment.gait import GaitEvent, Verdict, analyze
 from gait_entrainment.settings import Checked, setting
 from gait_entrainment_sessions.statistics import Estimate, Floats, share
 from gait_entrainment_studies.cohort.population import step_noise
+from gait_entrainment_studies.cohort.study import events_of
 
 # Toe-off within the stride, and its scatter [s]; those of docs/analysis.md.
 _TOE_OFF, _SCATTER = 0.68, 0.005
@@ -133,17 +134,7 @@ def walk(
         strikes.append(start + stride)
         toe_offs.append(start + _TOE_OFF * stride + float(scatter[k]))
     onsets = [nanoseconds(first) + nanoseconds(n * period) for n in range(pulses)]
-    return list(_events(strikes, toe_offs)), onsets
-
-
-def _events(strikes: Sequence[float], toe_offs: Sequence[float]) -> Iterator[GaitEvent]:
-    """Give the events of strides of the right leg; the left one strikes in the middle."""
-    strike, off = EventKind.HEEL_STRIKE, EventKind.TOE_OFF
-    yield GaitEvent(nanoseconds(strikes[0]), strike, Side.RIGHT, 0)
-    for k, toe_off in enumerate(toe_offs):
-        start, end, step = strikes[k], strikes[k + 1], 2 * k + 1
-        middle = (start + end) / 2
-        yield GaitEvent(nanoseconds((start + middle) / 2), off, Side.LEFT, step)
-        yield GaitEvent(nanoseconds(middle), strike, Side.LEFT, step)
-        yield GaitEvent(nanoseconds(toe_off), off, Side.RIGHT, step + 1)
-        yield GaitEvent(nanoseconds(end), strike, Side.RIGHT, step + 1)
+    # The left leg strikes in the middle of a stride, and leaves the ground in a quarter of it.
+    steps = np.interp(np.arange(2 * len(free) + 1) / 2, np.arange(len(strikes)), strikes)
+    offs = np.stack([(steps[:-1:2] + steps[1::2]) / 2, toe_offs], axis=1)
+    return events_of(steps, offs.ravel()), onsets

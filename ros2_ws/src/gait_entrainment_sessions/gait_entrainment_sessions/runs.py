@@ -3,10 +3,12 @@
 
 """The recorded runs in a folder: a bag, a session, a study, or bags without a session."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from gait_entrainment.conventions import Side
 from gait_entrainment.run import JudgedBlock, Run
 from gait_entrainment_bags import BagError
 from gait_entrainment_bags.recorded_run import read_run
@@ -41,9 +43,10 @@ class PlacedRun:
     @property
     def parts(self) -> tuple[JudgedBlock, ...]:
         """The blocks of its protocol, each judged by itself; of a protocol without, all of it."""
-        run = self.run
-        whole = JudgedBlock("", 1, None, run.measured_period, run.pulse_period, run.analysis)
-        return run.blocks or (whole,)
+        run, strides = self.run, self.run.strides
+        side, end = (strides[-1].side, strides[-1].end) if strides else (Side.RIGHT, math.inf)
+        periods = run.measured_period, run.pulse_period
+        return run.blocks or (JudgedBlock("", side, 1, None, end, *periods, run.analysis),)
 
 
 def is_sealed(bag: Path) -> bool:

@@ -19,7 +19,7 @@ instance, the other. The walker has the person's mass and legs, in the paper's p
 """
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -37,7 +37,7 @@ from gait_entrainment.protocol import (
     write_protocol,
 )
 from gait_entrainment.protocol.protocol import BLOCK_FIELDS
-from gait_entrainment.robot import DeviceLimits, LimitError, find_driver
+from gait_entrainment.robot import DeviceError, DeviceLimits, LimitError, find_driver
 from gait_entrainment.settings import Setting, SettingError, setting, settings_of
 from gait_entrainment_sessions.order import ORDERS, block_order
 
@@ -207,14 +207,15 @@ class _Reader:
         over = {key: value for key, value in told.items() if key not in common.said} | own.said
         source = common.source
         if "blocks" in own.said:
-            if clash := next((key for key in common.said if key in BLOCK_FIELDS), ""):
+            of_blocks = BLOCK_FIELDS.keys() - {"side"}
+            if clash := next((key for key in common.said if key in of_blocks), ""):
                 raise SessionError(
                     f"{common.said[clash][1]}: {clash}: does not go with the blocks that the "
                     f"protocol of {values['name']} has of its own; say it in them"
                 )
             source, over = own.source, told | common.said
             over = {key: value for key, value in over.items() if key not in own.said}
-        protocol = self._read(source, over)
+        protocol = self._read(source, over, to_run=True)
         driver = find_driver(protocol.driver)
         if not driver.simulated and "limits.torque" not in told:
             raise SessionError(
@@ -222,10 +223,6 @@ class _Reader:
                 "torque to a person; allowed: limits of the session, with the largest torque "
                 "for this person [N m]"
             )
-        try:
-            protocol.check_limits()
-        except LimitError as error:
-            raise SessionError(f"{place}: {error}") from None
         return Block(values["name"], values.get("rest", rest), protocol, place)
 
     def _piece(self, node: yaml.Node) -> "_Piece":
@@ -251,10 +248,10 @@ class _Reader:
                 )
         return _Piece(source, said)
 
-    def _read(self, source: Path | str | None, over: Mapping[str, tuple[object, str]]) -> Protocol:
+    def _read(self, source: Path | str | None, over: _Said, *, to_run: bool = False) -> Protocol:
         try:
-            return read_protocol(source, over)
-        except ProtocolError as error:
+            return read_protocol(source, over, to_run=to_run)
+        except (ProtocolError, LimitError, DeviceError) as error:
             message = str(error)
             if message.startswith("protocol:") and not isinstance(source, Path):
                 message = f"{self._path}{message.removeprefix('protocol')}"

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy import optimize, stats
 
 from gait_entrainment.gait import Analysis, PulsePhase
-from gait_entrainment_studies.cohort.population import locked_runs
+from gait_entrainment_studies.cohort.locked import locked_runs
 
 Floats = NDArray[np.float64]
 CONFIDENCE = 0.95

@@ -18,6 +18,7 @@ from typing import Any
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
 from gait_entrainment.gait import Verdict
 from gait_entrainment_bags import BagError
+from gait_entrainment_commands.timing import late_ms
 from gait_entrainment_sessions.findings import Findings
 from gait_entrainment_sessions.runs import PlacedRun
 
@@ -102,7 +103,6 @@ def rows_of(placed: PlacedRun, kind: str) -> Iterator[Row]:
     run = placed.run
     strides = run.strides
     start = strides[0].start if strides else min((e.stamp for e in run.events), default=0)
-    side = (strides[0].side if strides else Side.RIGHT).name.lower()
 
     def seconds(stamp: int) -> float:
         return (stamp - start) / NANOSECONDS_PER_SECOND
@@ -113,27 +113,35 @@ def rows_of(placed: PlacedRun, kind: str) -> Iterator[Row]:
             (e.stamp, 0.0, EventKind(e.kind).name.lower(), Side(e.side).name.lower(), e.step)
             for e in run.events
         ]
-        pulses = [(t, width, "pulse", side, n) for n, t in enumerate(run.onsets, start=1)]
+        pulses = [
+            (timing.commanded, width, "pulse", side.name.lower(), number)
+            for side in Side
+            for number, timing in enumerate((t for s, t in run.delivered if s is side), start=1)
+        ]
         for stamp, *rest in sorted([*events, *pulses]):
             yield seconds(stamp), *rest
     elif kind == "strides":
-        given = [pulse.stride for pulse in run.analysis.pulses]
+        given: dict[Side, list[int]] = {side: [] for side in Side}
+        for one in placed.parts:
+            given[one.side] += (pulse.stride for pulse in one.analysis.pulses)
+            if strides and one.side is not strides[0].side:
+                strides += (s for s in one.analysis.strides if s.end <= one.end)
         for s in strides:
-            part = "pulses"
-            if not given or s.number < min(given):
+            part, of_leg = "pulses", given[s.side]
+            if not of_leg or s.number < min(of_leg):
                 part = "baseline"
-            elif s.number > max(given):
+            elif s.number > max(of_leg):
                 part = "washout"
-            count = given.count(s.number)
-            yield s.number, part, side, seconds(s.start), s.period, *s.step_periods, count
+            count, of = of_leg.count(s.number), s.side.name.lower()
+            yield s.number, part, of, seconds(s.start), s.period, *s.step_periods, count
     elif kind == "pulses":
-        late = {timing.commanded: timing for timing in run.timings}
-        for p in run.analysis.pulses:
-            timing = late.get(p.onset)
+        late = {(side, timing.commanded): timing for side, timing in run.delivered}
+        for leg, p in ((part.side, p) for part in placed.parts for p in part.analysis.pulses):
+            timing = late.get((leg, p.onset))
             yield (
                 p.number,
                 p.stride,
-                side,
+                leg.name.lower(),
                 seconds(p.onset),
                 p.phase,
                 p.phase_lag,
@@ -145,7 +153,7 @@ def rows_of(placed: PlacedRun, kind: str) -> Iterator[Row]:
 
 
 def _seconds_late(timing: Any, kind: str) -> float:
-    late = None if timing is None else timing.late_ms(kind)
+    late = None if timing is None else late_ms(timing, kind)
     return math.nan if late is None else late / 1e3
 
 

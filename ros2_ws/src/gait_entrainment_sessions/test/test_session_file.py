@@ -66,7 +66,9 @@ def test_a_protocol_may_have_blocks_and_lists_of_its_own(write):
 MISTAKES = [
     ("count: 20", "count: x", 9, "pulses.count: 'x'; allowed: a whole number from 0"),
     ("torque: 9.0", "torqe: 9", 10, "pulses.torqe: unknown field; allowed: "),
-    ("torque: 9.0", "torque: 16", 12, "torque: 16 N m is outside the limit"),
+    ("torque: 9.0", "torque: 16", 10, "torque: 16 N m is outside the limit"),
+    ("torque_fraction: 0.1", "width: 0.6", 15, "width: 0.6 s is outside the limit"),
+    ("side: left", "driver: emulatd", 7, "driver: 'emulatd' is unknown; allowed: "),
     ("side: left", "limits: {torque: 4}", 7, "limits.torque: limits are the person's"),
     ("code: P01", "code: P 01", 3, "person.code: 'P 01'; allowed: letters and digits"),
     ("number: 2, ", "nmber: 2, ", 3, "nmber: unknown field of person; allowed: code, number"),

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, nanoseconds
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side, nanoseconds
 from gait_entrainment.errors import UsageError
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.robot import LimitError, Pulse, Shape
@@ -21,8 +21,9 @@ from gait_entrainment.settings import Checked, setting
 
 # A million strides are three weeks of walking: no run is longer.
 _MOST = 1_000_000
-# A pulse at a smaller phase leaves the robot too little time: it is asked for at the heel strike.
-_LEAST_PHASE = 0.05
+# A pulse at a smaller phase leaves the robot too little time after its strike: it is asked for at
+# the strike before.
+_EARLY_PHASE = 0.05
 # Of two or more ways to say the same one is given.
 HEIGHTS = ("torque", "torque_fraction")
 TIMINGS = ("period", "period_offset", "period_ratio", "phase")
@@ -75,7 +76,7 @@ class PulsePlan(Checked):
         None,
         "place of each pulse in its own stride, of which the length is predicted",
         "1",
-        (_LEAST_PHASE, 1.0),
+        (0.0, 1.0),
         kind=float,
         optional=True,
         most_excluded=True,
@@ -89,6 +90,12 @@ class PulsePlan(Checked):
     rising: int = setting(0, "first pulses, which rise in equal steps", "1", (0, _MOST))
     catch_share: float = setting(0.0, "share of the pulses that are left out", "1", (0.0, 1.0))
     catch_pulses: str = setting("", "numbers of the pulses that are left out, such as [5, 12]")
+
+    @property
+    def after_strike(self) -> float:
+        """Predicted strides from the strike at which a pulse by phase is planned to its onset."""
+        phase = self.phase or 0.0
+        return phase + 1 if phase < _EARLY_PHASE else phase
 
     def period_for(self, measured_period: float) -> float:
         """
@@ -118,15 +125,15 @@ class PulsePlan(Checked):
 
     def onsets(self, first: int, period: float, seed: tuple[int, int]) -> list[int]:
         """
-        Return the onsets [ns], of which the first is given, at a first period [s].
+        Return the onsets [ns], of which the first is given, at a first period [s], and one more.
 
         The period changes by the same amount from pulse to pulse, by ``sweep`` from the first to
         the last. Jitter is uniform and does not add up.
         """
-        n, change = np.arange(self.count), self.sweep / max(self.count - 2, 1) / 2
-        late = np.zeros(self.count)
+        n, change = np.arange(self.count + 1), self.sweep / max(self.count - 2, 1) / 2
+        late = np.zeros(n.size)
         if self.jitter:
-            late = np.random.default_rng((*seed, 0)).uniform(-self.jitter, self.jitter, self.count)
+            late = np.random.default_rng((*seed, 0)).uniform(-self.jitter, self.jitter, n.size)
             late -= late[0]
         places = np.rint((n * period + n * (n - 1) * change + late) * NANOSECONDS_PER_SECOND)
         return [first + place for place in places.astype(np.int64).tolist()]
@@ -206,6 +213,8 @@ class Block(Checked):
     )
     washout_steady: float = setting(0.0, "the same for the washout", "1", (0.0, 1.0))
     rest: float = setting(0.0, "pause before the next block, walked or not", "s", (0.0, 86_400.0))
+    side: Side | None = setting(None, "the perturbed leg: left or right", kind=Side, optional=True)
+    both_legs: bool = setting(False, "whether the other leg gets its pulses too, in between")
 
     def __post_init__(self) -> None:
         """Check every field, and what concerns more than one."""

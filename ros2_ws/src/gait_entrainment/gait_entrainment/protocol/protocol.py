@@ -31,6 +31,27 @@ class Protocol(Block):
     seed: int = setting(0, "seed of whatever is random", within=(0, 2**63 - 1))
     blocks: tuple[Block, ...] = ()
 
+    def __post_init__(self) -> None:
+        """Check every field; if each block is on the other leg, that is the protocol's."""
+        super().__post_init__()
+        if all(self.leg(block) is not self.side for block in self.sequence):
+            object.__setattr__(self, "side", self.side.other)
+
+    def leg(self, block: Block) -> Side:
+        """Return the leg whose strides a block counts."""
+        return self.side if block.side is None else block.side
+
+    def ankles(self, block: Block) -> tuple[Side, ...]:
+        """Return the ankles that get a block's pulses, that of its leg first."""
+        leg = self.leg(block)
+        return (leg, leg.other) if block.both_legs else (leg,)
+
+    @property
+    def sides(self) -> tuple[Side, ...]:
+        """The ankles that get pulses in some block, that of the protocol's leg first."""
+        found = {side for block in self.sequence for side in self.ankles(block)}
+        return tuple(sorted(found, key=lambda side: side is not self.side))
+
     @property
     def sequence(self) -> tuple[Block, ...]:
         """The blocks in their order."""
@@ -53,12 +74,12 @@ class Protocol(Block):
         return PlannedPulses(
             torque=abs(self.pulse_torque),
             duration=max(plan.width for plan in plans),
-            count=sum(plan.count for plan in plans),
+            count=sum(len(self.ankles(b)) * b.pulses.count for b in self.sequence),
         )
 
-    def check_limits(self) -> None:
-        """Raise LimitError if some pulse is outside the limits, before anything moves."""
-        for block in self.sequence:
+    def check_limits(self, *blocks: Block) -> None:
+        """Raise LimitError if some pulse, of some blocks only, is outside the limits."""
+        for block in blocks or self.sequence:
             self.limits.check_pulse(block.pulses.pulse(0, block.torque(self.walker)))
 
 

@@ -8,7 +8,7 @@ PyYAML's node graph keeps the line of every key, which its loaded dictionaries d
 """
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -25,6 +25,7 @@ from gait_entrainment.protocol.protocol import (
     content_of,
     said,
 )
+from gait_entrainment.robot import DeviceError, LimitError, find_driver
 from gait_entrainment.settings import Setting, SettingError
 
 DEFAULT_PROTOCOL = Protocol()
@@ -43,7 +44,10 @@ class _Entry(NamedTuple):
 
 
 def read_protocol(
-    source: Path | str | None = None, overrides: Mapping[str, tuple[object, str]] | None = None
+    source: Path | str | None = None,
+    overrides: Mapping[str, tuple[object, str]] | None = None,
+    *,
+    to_run: bool = False,
 ) -> Protocol:
     """
     Read and validate a protocol.
@@ -55,6 +59,8 @@ def read_protocol(
     overrides
         Values that replace those of the file: dotted field name -> (value, who says so), for
         instance ``{"pulses.width": (0.2, "--width")}``. A text is read as what it stands for.
+    to_run
+        Hold the pulses against the limits, and see that there is such a driver, too.
 
     Raises
     ------
@@ -63,19 +69,44 @@ def read_protocol(
 
     """
     entries = dict(_entries(source)) if source is not None else {}
-    replacing = {key: _Entry(*given) for key, given in (overrides or {}).items()}
+    replacing = dict(_spelled_out(key, _Entry(*given)) for key, given in (overrides or {}).items())
     blocks = entries.pop("blocks", None)
     if blocks is None:
-        return _build(Protocol, _merged(entries, replacing))
+        entries = _merged(entries, replacing)
+        return _checked(_build(Protocol, entries), [entries], to_run=to_run)
     # What is said beside the blocks holds for each that does not say otherwise.
-    common = {key: entries.pop(key) for key in BLOCK_FIELDS if key in entries and key != "name"}
-    in_blocks = {k: e for k, e in replacing.items() if k in BLOCK_FIELDS and k != "name"}
-    made = [
-        _build(Block, _merged(_merged(common, said), in_blocks))
-        for said in blocks.value  # type: ignore[attr-defined]
-    ]
-    whole = {k: e for k, e in replacing.items() if k not in in_blocks}
-    return replace(_build(Protocol, entries | whole), blocks=tuple(made))
+    of_blocks = BLOCK_FIELDS.keys() - {"name", "side"}
+    common = {key: entries.pop(key) for key in BLOCK_FIELDS if key in of_blocks & entries.keys()}
+    in_blocks = {k: e for k, e in replacing.items() if k in of_blocks}
+    told: Any = blocks.value
+    said = [_merged(_merged(common, of_block), in_blocks) for of_block in told]
+    made = [_build(Block, of_block) for of_block in said]
+    entries |= {k: e for k, e in replacing.items() if k not in in_blocks}
+    if "side" in replacing:
+        made = [replace(block, side=None) for block in made]
+    protocol = _build(Protocol, entries, blocks=tuple(made))
+    return _checked(protocol, [of_block | entries for of_block in said], to_run=to_run)
+
+
+def _checked(
+    protocol: Protocol, said: Sequence[Mapping[str, _Entry]], *, to_run: bool
+) -> Protocol:
+    """Return a protocol, checked if it is ``to_run``; of each block is ``said`` what."""
+    for block, entries in zip(protocol.sequence if to_run else (), said, strict=False):
+        try:
+            find_driver(protocol.driver, protocol.side)
+            protocol.check_limits(block)
+        except (LimitError, DeviceError) as error:
+            field, heights = str(error).partition(":")[0], (f"pulses.{name}" for name in HEIGHTS)
+            suspects = (field, f"pulses.{field}", *heights, f"limits.{field}")
+            raise type(error)(f"{_place(suspects, entries)}{error}") from None
+    return protocol
+
+
+def _place(suspects: Iterable[str], entries: Mapping[str, _Entry]) -> str:
+    """Return the place of the first field at fault that was said, else of the first that was."""
+    found = (entries[key].where + ": " for key in (*suspects, *entries) if key in entries)
+    return next(found, "")
 
 
 def write_protocol(protocol: Protocol) -> str:
@@ -150,7 +181,13 @@ def _walk(
                     f"{where}: {key}: {value_node.value[:40]!r} cannot be read as a value"
                 ) from None
             _require_plain_number(where, key, value_node, value)
-            yield key, _Entry(value, where)
+            yield _spelled_out(key, _Entry(value, where))
+
+
+def _spelled_out(key: str, entry: _Entry) -> tuple[str, _Entry]:
+    """Return an entry, and what "side: both" is short for."""
+    both = (key, entry.value) == ("side", "both")
+    return ("both_legs", entry._replace(value=True)) if both else (key, entry)
 
 
 def _require_plain_number(where: str, key: str, node: yaml.ScalarNode, value: object) -> None:
@@ -179,7 +216,7 @@ def _merged(entries: Mapping[str, _Entry], replacing: Mapping[str, _Entry]) -> d
     return merged
 
 
-def _build(kind: type[_B], entries: Mapping[str, _Entry]) -> _B:
+def _build(kind: type[_B], entries: Mapping[str, _Entry], **more: Any) -> _B:
     """Return a block or a whole protocol from what is said of it."""
     sections: dict[str, dict[str, Any]] = {"": {}}
     rules = BLOCK_FIELDS if kind is Block else FIELDS
@@ -190,13 +227,14 @@ def _build(kind: type[_B], entries: Mapping[str, _Entry]) -> _B:
             read = rule.parse(key, value) if isinstance(value, str) else rule.check(key, value)
             sections.setdefault(section, {})[name] = read
         except SettingError as error:
-            raise ProtocolError(f"{where}: {error}") from None
+            also = ", both" if key == "side" else ""
+            raise ProtocolError(f"{where}: {error}{also}") from None
     # What is given leaves no place for the default of its alternative.
     for group in _ALTERNATIVES:
         if any(key in entries for key in group):
             unsaid = {key.partition(".")[2]: None for key in group}
             sections["pulses"] = unsaid | sections["pulses"]
-    values = sections.pop("")
+    values = sections.pop("") | more
     try:
         values |= {name: SECTIONS[name](**content) for name, content in sections.items()}
         return kind(**values)
@@ -208,6 +246,5 @@ def _build(kind: type[_B], entries: Mapping[str, _Entry]) -> _B:
         raise ProtocolError(f"{', '.join(dict.fromkeys(places))}: walker: {error}") from None
     except ProtocolError as error:
         # What is wrong may be a default; then the field that does not go with it is at fault.
-        suspects = (str(error).partition(":")[0], *_SUSPECTS, *entries)
-        place = next((entries[key].where + ": " for key in suspects if key in entries), "")
-        raise ProtocolError(f"{place}{error}") from None
+        suspects = (str(error).partition(":")[0], *_SUSPECTS)
+        raise ProtocolError(f"{_place(suspects, entries)}{error}") from None

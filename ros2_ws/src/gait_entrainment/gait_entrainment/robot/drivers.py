@@ -7,11 +7,12 @@ Ankle robot drivers by name, loaded only when chosen.
 A text names a driver, NAME or NAME:OPTION=VALUE,OPTION=VALUE, in the same way everywhere: in a
 protocol, on the command line, as a parameter of the perturbator. A value may contain anything; of
 a comma in it, and of a backslash before a comma or a backslash, ``\,`` and ``\\`` are written.
+An option of the robot on one ankle is written left.OPTION=VALUE or right.OPTION=VALUE.
 Drivers of other packages are found under the entry point ``gait_entrainment.drivers``.
 """
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
@@ -61,14 +62,49 @@ def driver_names() -> dict[str, str]:
     return dict(sorted({**others, **OWN_DRIVERS}.items()))
 
 
-def find_driver(text: str) -> Driver:
+def make_robots(
+    text: str,
+    sides: Sequence[Side],
+    limits: DeviceLimits,
+    seed: int = 0,
+    dose: Dose | None = None,
+) -> dict[Side, GuardedRobot]:
     """
-    Load the driver that a text names, and check its options.
+    Return the robots of some ankles, each as ``Driver.make``; what stops one stops both.
+
+    Raises as ``find_driver``, and LimitError if two ankles have one real robot between them.
+    """
+    dose = dose or Dose()
+    drivers = {side: find_driver(text, side) for side in sides}
+    if len({driver_on(text, side) for side in sides}) < len(sides) and not all(
+        driver.simulated for driver in drivers.values()
+    ):
+        raise LimitError(
+            f"driver: {text} is one robot, and the protocol perturbs both legs; allowed: options "
+            "of each robot, such as left.NAME=VALUE,right.NAME=VALUE, or blocks on one leg"
+        )
+    robots = {s: d.make(s, limits, seed + n, dose) for n, (s, d) in enumerate(drivers.items())}
+    for side, robot in robots.items():
+        robot.partner = robots.get(side.other)
+    return robots
+
+
+def driver_on(text: str, side: Side) -> str:
+    """Return the text that names the driver on one ankle, without the options of the other."""
+    name, colon, options = text.partition(":")
+    own, other = (f"{leg.name.lower()}." for leg in (side, side.other))
+    parts = (part for part in split_options(options) if not part.startswith(other))
+    return name + colon + join_options(part.removeprefix(own) for part in parts)
+
+
+def find_driver(text: str, side: Side = Side.RIGHT) -> Driver:
+    """
+    Load the driver that a text names, and check its options on an ankle.
 
     Raises LimitError if there is none of that name, or an option is unknown or out of range;
     DeviceError if the driver cannot be loaded.
     """
-    name, _, options = text.partition(":")
+    name, _, options = driver_on(text, side).partition(":")
     target = OWN_DRIVERS.get(name) or driver_names().get(name)
     if target is None:
         known = ", ".join(driver_names())

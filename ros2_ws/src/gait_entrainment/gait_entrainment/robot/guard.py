@@ -37,7 +37,7 @@ from gait_entrainment.robot.faults import (
 )
 from gait_entrainment.robot.limits import DeviceLimits, Dose
 from gait_entrainment.robot.profile import ProfileError, TorqueProfile
-from gait_entrainment.robot.pulse_train import PulseTrain
+from gait_entrainment.robot.pulse_train import Pulse, PulseTrain
 
 # How often the watchdog looks whether the experiment has fallen silent [s].
 _WATCH_PERIOD = 0.01
@@ -65,6 +65,7 @@ class GuardedRobot:
         self.delivered = 0  # pulses of the run that have begun in what was promised
         self.promised_until = 0  # everything before this instant is promised [ns]
         self.faults: tuple[Fault, ...] = ()  # what latched the torque at zero, in order
+        self.partner: GuardedRobot | None = None  # on the other ankle: one stops with the other
         self._configured = self._active = self._in_run = False
         self._begun = 0  # pulses scheduled since the latest pause
         self._armed_until = -math.inf  # steady time [s]
@@ -197,10 +198,10 @@ class GuardedRobot:
             why = f"was armed more than {self.limits.arming:g} s ago" if lapsed else "is not armed"
             raise DeviceError(f"the device {why}; see that all is well, then arm it")
         before = self.train
-        earlier = before.pulses if before else ()
-        self.limits.check(train, earlier)
-        coming = [pulse for pulse in earlier if pulse.onset >= self.promised_until]
-        self.limits.check_dose(self.dose, [*coming, *train.pulses])
+        self.limits.check(train, before.pulses if before else ())
+        ankles = [robot for robot in (self, self.partner) if robot is not None]
+        pending = [pulse for robot in ankles for pulse in robot.pending]
+        self.limits.check_dose(self.dose, [*pending, *train.pulses])
         peak = self.capabilities.peak_torque
         largest = max((pulse.torque for pulse in train.pulses), key=abs)
         if abs(largest) > peak:
@@ -225,6 +226,12 @@ class GuardedRobot:
             self.stop()
             self._refuse_latched()
 
+    @property
+    def pending(self) -> list[Pulse]:
+        """Pulses that were accepted and are still to come."""
+        pulses = self.train.pulses if self.train else ()
+        return [pulse for pulse in pulses if pulse.onset >= self.promised_until]
+
     def cancel(self) -> None:
         """Forget the train: torque is zero from now on."""
         if self.train is not None:
@@ -237,12 +244,15 @@ class GuardedRobot:
 
         A driver that raises here breaks the last promise there is, which is a fault of its own.
         """
+        new = fault not in self.faults
         self._latch(fault)
         self.train = None
         try:
             self._robot.stop()
         except Exception:
             self._latch(NOT_STOPPED)
+        if new and self.partner is not None:
+            self.partner.stop(fault)
 
     def promise(self, until: int) -> TorqueProfile:
         """

@@ -153,3 +153,18 @@ class PulseTrain:
     def followed_by(self, other: "PulseTrain") -> "PulseTrain":
         """Return the pulses of this train and those of another that comes after it."""
         return PulseTrain(self.side, self.pulses + other.pulses)
+
+
+@dataclass(frozen=True)
+class PulseTiming:
+    """Onsets of one pulse [ns]; None if the states do not show it."""
+
+    commanded: int
+    sent: int | None = None
+    measured: int | None = None
+    sham: bool = False  # announced without torque: no state can show it
+
+    @property
+    def onset(self) -> int:
+        """The measured onset; the commanded one if no torque shows it."""
+        return self.commanded if self.measured is None else self.measured

@@ -3,6 +3,7 @@
 
 """The conductor: its plan, and the promises that must never cover an unplanned onset."""
 
+import bisect
 import itertools
 import math
 import statistics
@@ -166,7 +167,7 @@ def by_phase(phase, **more):
 @given(
     baseline=st.integers(3, 7),
     periods=st.lists(st.floats(0.95, 1.45), min_size=18, max_size=18),
-    phase=st.floats(0.05, 1, exclude_max=True),
+    phase=st.floats(0, 0.06) | st.floats(0, 1, exclude_max=True),
     longest=st.sampled_from([0.1, 0.3, math.inf]),
 )
 def test_a_pulse_by_phase_lies_where_the_mean_of_five_strides_predicts(
@@ -179,9 +180,11 @@ def test_a_pulse_by_phase_lies_where_the_mean_of_five_strides_predicts(
     assert horizons[-1].last
     strikes = strikes_of(events)
     walked = [(b - a) / 1e9 for a, b in itertools.pairwise(strikes)]
+    # One that comes too soon after its own strike is planned at the strike before.
+    early = phase < 0.05
     expected = [
-        strikes[n] + round(phase * statistics.fmean(walked[max(n - 5, 0) : n]) * 1e9)
-        for n in range(baseline, baseline + 6)
+        strikes[n] + round((early + phase) * statistics.fmean(walked[max(n - 5, 0) : n]) * 1e9)
+        for n in range(baseline - early, baseline - early + 6)
     ]
     assert [train.onsets[0] for train in trains] == expected
     assert conductor.block.train.onsets == tuple(expected)
@@ -279,7 +282,7 @@ def test_many_pulses_are_requested_in_parts_each_before_a_promise_reaches_it(
 def test_sweep_jitter_ramp_and_catch_pulses():
     plan = PulsePlan(count=9, sweep=-0.08, rising=2, catch_pulses="4, 6", torque=6.0,
                      torque_fraction=None)  # fmt: skip
-    onsets = plan.onsets(0, 1.0, (0, 1))
+    onsets = plan.onsets(0, 1.0, (0, 1))[:-1]
     steps = [b - a for a, b in itertools.pairwise(onsets)]
     assert steps == pytest.approx([1e9 - 8e7 * n / 7 for n in range(8)], abs=1)
     assert plan.heights(6.0, (0, 1)) == [2.0, 4.0, 6.0, 0.0, 6.0, 0.0, 6.0, 6.0, 6.0]
@@ -291,3 +294,51 @@ def test_sweep_jitter_ramp_and_catch_pulses():
     assert jittered.onsets(0, 1.0, (3, 1)) != jittered.onsets(0, 1.0, (3, 2))
     left_out = PulsePlan(count=40, catch_share=0.25).heights(1.0, (3, 1))
     assert left_out.count(0.0) == 10
+
+
+TWO_LEGS = (
+    Block("first", baseline=3, washout=1, pulses=PulsePlan(count=3)),
+    Block("other", baseline=3, washout=1, pulses=PulsePlan(count=2), side=Side.LEFT),
+    Block("both", baseline=3, washout=0, pulses=PulsePlan(count=3, sweep=0.1), both_legs=True),
+    Block("phase", baseline=3, washout=1, pulses=by_phase(0.3, count=3), both_legs=True),
+)
+
+
+@settings(derandomize=True, deadline=None, max_examples=40)
+@given(
+    periods=st.lists(st.floats(0.95, 1.45), min_size=45, max_size=45),
+    longest=st.sampled_from([0.1, math.inf]),
+)
+def test_a_block_counts_the_strides_of_its_own_leg_and_both_legs_take_turns(periods, longest):
+    protocol = Protocol(blocks=TWO_LEGS)
+    assert protocol.sides == (Side.RIGHT, Side.LEFT)
+    assert protocol.planned.count == 3 + 2 + 2 * 3 + 2 * 3
+    conductor = Conductor(protocol, longest, UNSTEADY)
+    events = walk(periods)
+    horizons, _ = conduct(conductor, events)
+    assert horizons[-1].last
+    first, other, both, phase = conductor.blocks
+    legs = {side: strikes_of(events, side) for side in Side}
+    assert [block.leg for block in conductor.blocks] == [1, 0, 1, 1]
+    assert other.start == next(s for s in legs[Side.LEFT] if s > first.end)
+    assert both.start == next(s for s in legs[Side.RIGHT] if s > other.end)
+    assert both.end == phase.start
+    for block in conductor.blocks:
+        strikes = legs[block.leg]
+        start, plan = strikes.index(block.start), block.plan
+        assert block.strides_before == start
+        mean = (strikes[start + 2] - strikes[start]) / 2e9
+        assert block.measured_period == pytest.approx(mean, abs=1e-9)
+        assert {side: len(train.pulses) for side, train in block.trains.items()} == dict.fromkeys(
+            protocol.ankles(plan), plan.pulses.count
+        )
+    own, between = (both.trains[side].onsets for side in (Side.RIGHT, Side.LEFT))
+    middles = [(a + b) / 2 for a, b in itertools.pairwise(own)]
+    assert between[:2] == pytest.approx(middles, abs=1)
+    assert own[-1] < between[-1]
+    for side, train in phase.trains.items():
+        for onset in train.onsets:
+            number = bisect.bisect(legs[side], onset) - 1
+            walked = [b - a for a, b in itertools.pairwise(legs[side][: number + 1])][-5:]
+            expected = pytest.approx(0.3 * statistics.fmean(walked), abs=1)
+            assert onset - legs[side][number] == expected

@@ -11,7 +11,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.robot import DeviceError, LimitError, driver_names, find_driver
+from gait_entrainment.robot import (
+    DeviceError,
+    DeviceLimits,
+    LimitError,
+    driver_names,
+    driver_on,
+    find_driver,
+    make_robots,
+)
 from gait_entrainment.robot.drivers import join_options, split_options
 
 
@@ -34,6 +42,19 @@ def test_options_reach_the_driver():
     assert (driver.options.peak_torque, driver.options.delay) == (7.5, 0.1)
     assert driver.simulated
     assert driver.make(Side.LEFT).capabilities.peak_torque == 7.5
+
+
+def test_each_ankle_has_a_robot_with_options_of_its_own():
+    text = "emulated:left.delay=0.1,peak_torque=7.5,right.delay=0.2"
+    robots = make_robots(text, (Side.RIGHT, Side.LEFT), DeviceLimits())
+    assert [(s, robot.side) for s, robot in robots.items()] == [(s, s) for s in (1, 0)]
+    assert robots[Side.LEFT].partner is robots[Side.RIGHT]
+    delays = {side: find_driver(text, side).options.delay for side in Side}
+    assert delays == {Side.LEFT: 0.1, Side.RIGHT: 0.2}
+    assert driver_on(text, Side.LEFT) == "emulated:delay=0.1,peak_torque=7.5"
+    with pytest.raises(LimitError, match=r"driver: ak_mit_can is one robot, .*both legs; allowed"):
+        make_robots("ak_mit_can", tuple(Side), DeviceLimits())
+    assert make_robots("ak_mit_can", (Side.LEFT,), DeviceLimits())[Side.LEFT].partner is None
 
 
 @settings(derandomize=True, deadline=None)

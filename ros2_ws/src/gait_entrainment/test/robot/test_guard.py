@@ -383,6 +383,27 @@ def test_a_silent_experiment_stops_a_real_device():
     guard.close()
 
 
+def test_what_stops_one_ankle_stops_both_and_the_dose_is_of_both():
+    limits, dose = DeviceLimits(session_pulses=11), Dose()
+    drivers = {side: RecordingRobot(side) for side in Side}
+    left, right = (GuardedRobot(driver, s, limits, dose) for s, driver in drivers.items())
+    left.partner, right.partner = right, left
+    for guard in (left, right):
+        guard.configure()
+        guard.activate()
+        guard.begin(0)
+    left.schedule(train())
+    right.schedule(train(side=Side.RIGHT))
+    with pytest.raises(LimitError, match="session_pulses: 12 with this train; allowed"):
+        left.schedule(train(first_onset=20 * SECOND))
+    drivers[Side.RIGHT].faults = (OVERHEATED,)
+    right.read()
+    assert left.faults == right.faults == (OVERHEATED,)
+    assert (left.train, drivers[Side.LEFT].calls[-1]) == (None, "stop")
+    with pytest.raises(DeviceError, match=r"latched at zero \(overheated"):
+        left.schedule(train())
+
+
 def test_a_broken_profile_stops_the_torque():
     guard, driver = ready()
     driver.promise = lambda until: TorqueProfile(Side.LEFT, (7,), (3.0,), (), until)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from gait_entrainment.errors import UsageError
 from gait_entrainment.gait import analyze
+from gait_entrainment.robot import PulseTiming
 from gait_entrainment.run import Run
 from gait_entrainment_bags.commands.record_options import add_record_options, told_of_record
 from gait_entrainment_bags.figures import draw_figures
@@ -108,7 +109,8 @@ def _of_tables(options: argparse.Namespace) -> int:
     events, onsets = read_events(options.events), read_onsets(options.pulses)
     analysis = analyze(without_bias(events, bias), onsets, told["side"])
     periods = periods_of(conducted(told["protocol"], events), analysis)
-    run = Run(told["protocol"], tuple(events), tuple(onsets), (), *periods, analysis, ())
+    delivered = tuple((told["side"], PulseTiming(onset)) for onset in onsets)
+    run = Run(told["protocol"], tuple(events), delivered, *periods, analysis, ())
     outcome = outcome_of(run) | ({"toe_off_bias": bias} if bias else {})
     lines = [summary(outcome), *detection_lines(outcome)]
     print(json.dumps(outcome) if options.json else "\n".join(lines))

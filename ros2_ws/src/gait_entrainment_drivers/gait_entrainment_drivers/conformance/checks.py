@@ -19,13 +19,12 @@ from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, nanoseconds
 from gait_entrainment.robot import (
     DeviceError,
     DeviceLimits,
-    MeasuredOnsets,
     Pulse,
     PulseTrain,
     Shape,
 )
 from gait_entrainment.robot.faults import EXPERIMENT_SILENT
-from gait_entrainment.robot.timing import lateness_ms, quantile
+from gait_entrainment_commands.timing import MeasuredOnsets, lateness_ms, quantile
 from gait_entrainment_drivers.conformance.bench import (
     PERIOD,
     POLL,

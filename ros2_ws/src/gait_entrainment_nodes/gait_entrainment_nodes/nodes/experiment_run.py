@@ -82,11 +82,18 @@ class Run:
         self._events = 0
         self._progress: msg.Progress | None = None  # received, not answered yet
         self._grant = self._recorded_grant = -1
-        self._covered_until = 0  # by profiles [ns since 1970]
+        self._covered: dict[int, int] = {}  # by profiles of each ankle [ns since 1970]
+        self._closed: set[int] = set()  # ankles whose robots have answered the closing horizon
         self._planning = False  # pulses were requested, and there is no answer yet
         self._began: int | None = None  # start of the walk minus steady time [ns]; in real time
         self._shown: tuple[Part, int] | None = None
         self.forgive()
+
+    @property
+    def _covered_until(self) -> int:
+        """How far the torque of every robot is promised [ns since 1970]."""
+        sides = self.conductor.protocol.sides if self.conductor else ()
+        return min((self._covered.get(side, 0) for side in sides), default=0)
 
     @property
     def over(self) -> bool:
@@ -189,9 +196,11 @@ class Run:
         if profile.stop:
             self._note_stop()
         else:
-            self._covered_until = nanoseconds_of(profile.valid_until)
+            self._covered[profile.side] = nanoseconds_of(profile.valid_until)
             self._profile_at = self._clock()
-            self.closed = self.closing
+            if self.closing and self.conductor is not None:
+                self._closed.add(profile.side)
+                self.closed = self._closed.issuperset(self.conductor.protocol.sides)
 
     def take_trouble(self, trouble: msg.Trouble) -> None:
         """Take what the perturbator reports; a fault that has ended the torque ends the run."""

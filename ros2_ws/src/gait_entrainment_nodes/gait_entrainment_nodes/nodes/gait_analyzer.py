@@ -34,6 +34,9 @@ class Settings:
     """Parameters of the node, beside those of the verdict."""
 
     side: Side = setting(Side.RIGHT, "the perturbed leg: left or right")
+    both_ankles: bool = setting(
+        False, "whether pulses come on the other ankle too: that leg is analyzed for itself"
+    )
     onset: str = setting(
         "commanded",
         "where a pulse begins: commanded, or measured where the robot's torque rises",
@@ -44,12 +47,21 @@ class Settings:
     )
 
 
+class Legs(tuple[Run, ...]):
+    """One run, as it is of each leg that is analyzed."""
+
+    @property
+    def number(self) -> int:
+        """Number of the run."""
+        return self[0].number
+
+
 class GaitAnalyzerNode(Participant):
     """ROS side of the analyzer."""
 
     settings: Settings
     verdict: VerdictSettings
-    run: Run | None
+    run: Legs | None
 
     def __init__(self) -> None:
         super().__init__("gait_analyzer")
@@ -70,7 +82,7 @@ class GaitAnalyzerNode(Participant):
             self.subscribe_to_run(topic, partial(self._add, add))
         self.create_service(Trigger, "~/finish", self._on_finish)
 
-    def run_of(self, message: Any) -> Run | None:
+    def run_of(self, message: Any) -> Legs | None:
         """
         Return the run of a message if it is analyzed; a newer run replaces it.
 
@@ -83,8 +95,11 @@ class GaitAnalyzerNode(Participant):
         ):
             self._latest_run = message.run
             side, measured = self.settings.side, self.settings.onset == "measured"
-            bias = self.settings.toe_off_bias
-            self.run = Run(message.run, side, self.verdict, bias, measured=measured)
+            bias, number = self.settings.toe_off_bias, message.run
+            self.run = Legs(
+                Run(number, leg, self.verdict, bias, measured=measured)
+                for leg in (side, side.other)[: 1 + self.settings.both_ankles]
+            )
             self.note_state(DiagnosticStatus.OK, f"run {message.run} goes on")
             first, self._first_event = self._first_event, None
             if first is not None and first.run == message.run:
@@ -96,17 +111,21 @@ class GaitAnalyzerNode(Participant):
         self._warn(message, "messages of another run are not analyzed", run=message.run)
         return None
 
-    def _add(self, add: Callable[[Run, Any], list[Result]], run: Run, message: Any) -> None:
+    def _add(self, add: Callable[[Run, Any], list[Result]], runs: Legs, message: Any) -> None:
         """Hand a message to the run; publish what it allows, and the rest once all is here."""
-        try:
-            self._publish_results(run, add(run, message))
-        except MessageError as error:
-            self._warn(message, f"a message cannot be and is dropped: {error}")
-        if doubts := run.new_doubts():
-            self._warn(message, "gait events are not as they should be", **doubts)
-        if run.complete:
-            assert run.end is not None
-            self._finish(run, run.end)
+        of_ankle = not isinstance(message, (msg.GaitEvent, msg.Progress)) and len(runs) > 1
+        for run in runs:
+            if of_ankle and message.side != run.side:
+                continue
+            try:
+                self._publish_results(run, add(run, message))
+            except MessageError as error:
+                self._warn(message, f"a message cannot be and is dropped: {error}")
+            if doubts := run.new_doubts():
+                self._warn(message, "gait events are not as they should be", **doubts)
+        if all(run.complete for run in runs):
+            assert runs[0].end is not None
+            self._finish(runs, runs[0].end)
 
     def _warn(self, message: Any, what: str, **values: Any) -> None:
         stamp = nanoseconds_of(message.header.stamp)
@@ -115,17 +134,18 @@ class GaitAnalyzerNode(Participant):
     def _on_finish(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Finish a run whose end was not recorded, or of which events are missing."""
         if self.run is not None:
-            self._finish(self.run, self.run.promised_until)
+            self._finish(self.run, min(run.promised_until for run in self.run))
         elif not self._latest_run:
             self.publish_counts(0, 0)  # for whoever waits for them: no run was heard
         response.success = True
         return response
 
-    def _finish(self, run: Run, end: int) -> None:
+    def _finish(self, runs: Legs, end: int) -> None:
         """Publish what was waiting: nothing more of this run will come."""
         self.run = None
-        self._publish_results(run, run.finish(end))
-        self.publish_counts(run.number, end)
+        for run in runs:
+            self._publish_results(run, run.finish(end))
+        self.publish_counts(runs.number, end)
 
     def _publish_results(self, run: Run, results: list[Result]) -> None:
         for result in results:

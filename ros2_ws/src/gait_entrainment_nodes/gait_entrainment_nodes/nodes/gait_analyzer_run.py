@@ -10,7 +10,6 @@ from typing import Any
 from gait_entrainment.conventions import Side
 from gait_entrainment.gait import Entrainment, GaitAnalyzer, PulsePhase, Stride, VerdictSettings
 from gait_entrainment.gait.analyzer import Result
-from gait_entrainment.robot import MeasuredOnsets
 from gait_entrainment_bags.holes import hole_before
 from gait_entrainment_bags.messages import (
     event_of,
@@ -22,6 +21,7 @@ from gait_entrainment_bags.messages import (
     stop_of,
 )
 from gait_entrainment_bags.truth import without_bias
+from gait_entrainment_commands.timing import MeasuredOnsets
 from gait_entrainment_msgs import msg
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.stamps import header, to_time

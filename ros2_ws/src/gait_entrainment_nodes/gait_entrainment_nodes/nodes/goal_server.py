@@ -50,14 +50,19 @@ class GoalServer:
         """Whether the client has cancelled a goal that is under way."""
         return any(goal.is_cancel_requested for goal in self._goals)
 
-    def publish_feedback(self, feedback: Any) -> None:
-        """Send feedback to the client of the first goal, if there is one."""
-        if self._goals:
-            self._goals[0].publish_feedback(feedback)
+    def publish_feedback(self, feedback: Any, side: int | None = None) -> None:
+        """Send feedback to the client of the first goal, on an ankle, if there is one."""
+        if goals := self._under_way(side):
+            goals[0].publish_feedback(feedback)
 
-    def end(self, result: Any) -> None:
-        """End the first goal that is under way with its result."""
-        self._goals.popleft().execute(lambda goal: self._execute(goal, result))
+    def end(self, result: Any, side: int | None = None) -> None:
+        """End the first goal that is under way, on an ankle, with its result."""
+        goal = self._under_way(side)[0]
+        self._goals.remove(goal)
+        goal.execute(lambda goal: self._execute(goal, result))
+
+    def _under_way(self, side: int | None) -> list[Any]:
+        return [goal for goal in self._goals if side is None or goal.request.side == side]
 
     def _on_goal(self, request: Any) -> GoalResponse:
         return GoalResponse.ACCEPT if self._accept(request) else GoalResponse.REJECT

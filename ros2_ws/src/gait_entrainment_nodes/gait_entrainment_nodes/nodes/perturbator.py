@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-perturbator: lifecycle node that holds one ankle robot and turns pulse trains into torque.
+perturbator: lifecycle node that holds the ankle robots and turns pulse trains into torque.
 
 It answers every horizon of the experiment with a torque profile and the promise that nothing in
 it will change (perturbator_run.py). It knows nothing of gait. Torque ends with deactivation, with
@@ -27,7 +27,9 @@ from gait_entrainment.robot import (
     GuardedRobot,
     LimitError,
     PlannedPulses,
+    driver_on,
     find_driver,
+    make_robots,
 )
 from gait_entrainment.robot.faults import DEADMAN_SILENT, NOT_STOPPED, OPERATOR_SILENT
 from gait_entrainment.settings import setting
@@ -43,7 +45,7 @@ from gait_entrainment_nodes.nodes.goal_server import GoalServer
 from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.parameters import texts
 from gait_entrainment_nodes.nodes.participant import Participant
-from gait_entrainment_nodes.nodes.perturbator_run import Result, Run
+from gait_entrainment_nodes.nodes.perturbator_run import Result, Run, do_with_all
 from gait_entrainment_nodes.nodes.rclpy_internals import TolerantLifecycleNode
 from gait_entrainment_nodes.nodes.stop_thread import StopThread
 
@@ -56,6 +58,7 @@ class Settings:
     """Parameters of the node, beside the limits of the robot."""
 
     side: Side = setting(Side.RIGHT, "ankle on which the robot sits: left or right")
+    both_ankles: bool = setting(False, "whether another robot sits on the other ankle")
     driver: str = setting("ideal", "name of the ankle robot driver: NAME or NAME:OPTION=VALUE,...")
     seed: int = setting(0, "seed of a driver that draws random numbers", "1", (0, 2**32 - 1))
     armed: bool = setting(
@@ -109,7 +112,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
             limits=(DeviceLimits, "limits."),
             planned=(PlannedPulses, "planned."),
         )
-        self._robot: GuardedRobot | None = None  # from configuring to cleaning up
+        self._robots: dict[Side, GuardedRobot] = {}  # from configuring to cleaning up
         self._dose = Dose()  # of everybody who was on the robot since this node was started
         self._armed_by = ""
         self._stop_latched = False  # somebody stopped while there was no robot
@@ -138,7 +141,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
     def why_fixed(self, name: str) -> str:
         """Return why a parameter cannot change now: the robot has been made with it."""
         del name
-        return "the robot is configured; clean it up first" if self._robot is not None else ""
+        return "the robot is configured; clean it up first" if self._robots else ""
 
     @property
     def hardware_id(self) -> str:
@@ -164,24 +167,25 @@ class Perturbator(Participant, TolerantLifecycleNode):
                 raise DeviceError(
                     f"driver: {driver.name} runs in real time only: use_sim_time must be off"
                 )
-            robot = driver.make(settings.side, self.limits, settings.seed, self._dose)
-            robot.configure()
+            sides = (settings.side, settings.side.other)[: 1 + settings.both_ankles]
+            made = settings.driver, sides, self.limits, settings.seed, self._dose
+            robots = make_robots(*made)
+            do_with_all(robots, GuardedRobot.configure, GuardedRobot.close)
         except (LimitError, DeviceError) as error:
             return self._refuse(error)
-        self._robot, self._reported, self._armed_by = robot, (), ""
+        self._robots, self._reported, self._armed_by = robots, (), ""
         self.note_state(DiagnosticStatus.OK, "configured")
         return TransitionCallbackReturn.SUCCESS
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Enable the robot at zero torque; refused while a stop is latched."""
-        assert self._robot is not None
         try:
-            self._robot.activate()
+            do_with_all(self._robots, GuardedRobot.activate, GuardedRobot.deactivate)
             if self.settings.armed:
                 self._arm("the parameter armed")
         except DeviceError as error:
             return self._refuse(error)
-        if not self._robot.capabilities.simulated:
+        if not self._simulated:
             self._look_at = time.monotonic()
         self.note_state(DiagnosticStatus.OK, "active")
         return super().on_activate(state)
@@ -189,10 +193,11 @@ class Perturbator(Participant, TolerantLifecycleNode):
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Bring the torque to zero, then disable the robot."""
         self._end_torque("the perturbator was deactivated")
-        if self._robot is not None:
-            self._robot.deactivate()
+        if self._robots:
+            for robot in self._robots.values():
+                robot.deactivate()
             self._report_faults()
-            if not self._robot.faults:
+            if not self._faults:
                 self.note_state(DiagnosticStatus.OK, "inactive")
         return super().on_deactivate(state)
 
@@ -221,11 +226,20 @@ class Perturbator(Participant, TolerantLifecycleNode):
             self._stop_thread.close()
 
     def _release(self) -> None:
-        """Bring the torque to zero and let go of the robot."""
-        robot, self._robot = self._robot, None
+        """Bring the torque to zero and let go of the robots."""
+        robots, self._robots = self._robots, {}
         self.run = self._look_at = None
-        if robot is not None:
+        for robot in robots.values():
             robot.close()
+
+    @property
+    def _simulated(self) -> bool:
+        return all(robot.capabilities.simulated for robot in self._robots.values())
+
+    @property
+    def _faults(self) -> tuple[Fault, ...]:
+        """What has latched the torque at zero, in order."""
+        return tuple({f: None for robot in self._robots.values() for f in robot.faults})
 
     def _refuse(self, error: Exception) -> TransitionCallbackReturn:
         self._report(DiagnosticStatus.ERROR, str(error))
@@ -235,12 +249,14 @@ class Perturbator(Participant, TolerantLifecycleNode):
 
     def _arm(self, how: str) -> None:
         """Allow torque, and say so in the record; raises DeviceError if it must not come."""
-        if self._robot is None:
+        if not self._robots:
             raise DeviceError("the perturbator is not active")
-        if not self._robot.capabilities.simulated:
-            require_proof(self.settings.driver, unproved=self.settings.unproved)
-        self._robot.arm()
-        if not self._robot.capabilities.simulated:
+        for side in self._robots if not self._simulated else ():
+            driver = driver_on(self.settings.driver, side)
+            require_proof(driver, unproved=self.settings.unproved)
+        for robot in self._robots.values():
+            robot.arm()
+        if not self._simulated:
             self._armed_by = f"{user_and_host()}, by {how}"
         if self.run is not None:
             self._publish_setup()
@@ -257,12 +273,13 @@ class Perturbator(Participant, TolerantLifecycleNode):
 
     def _stop_at_once(self) -> StopAnswer:
         """Bring the torque to zero and keep it there; from any thread."""
-        robot = self._robot
-        if robot is None:
+        robots = self._robots.values()
+        if not robots:
             self._stop_latched = True
             return StopAnswer(True, "no robot is configured; the next configuring is refused")
-        robot.stop()
-        if NOT_STOPPED in robot.faults:
+        for robot in robots:
+            robot.stop()
+        if NOT_STOPPED in self._faults:
             return StopAnswer(False, NOT_STOPPED.meaning)
         return StopAnswer(True, "the stop is latched")
 
@@ -284,8 +301,8 @@ class Perturbator(Participant, TolerantLifecycleNode):
 
     def _require_signs_of_life(self) -> None:
         """End the torque if an operator, or who holds the emergency stop, is not there."""
-        robot, settings, now = self._robot, self.settings, time.monotonic()
-        if robot is None or robot.train is None:
+        robots, settings, now = self._robots.values(), self.settings, time.monotonic()
+        if all(robot.train is None for robot in robots):
             return
         heard, wanted = self._operators_at, list(filter(None, settings.operators))
         operators = {name: heard.get(name, -math.inf) for name in wanted} or {
@@ -297,7 +314,8 @@ class Perturbator(Participant, TolerantLifecycleNode):
         ):
             silent = [name for name, at in watched.items() if timeout and now - at > timeout]
             if silent:
-                robot.stop(fault)
+                for robot in robots:
+                    robot.stop(fault)
                 names = " and ".join(silent)
                 self._report_faults(f"{names} silent for {timeout:g} s: {fault.meaning}")
 
@@ -308,11 +326,11 @@ class Perturbator(Participant, TolerantLifecycleNode):
 
     def _report_faults(self, reason: str = "") -> None:
         """Tell of faults that are new; each has ended the torque, and ends the goal."""
-        robot = self._robot
-        if robot is None or robot.faults == self._reported:
+        faults = self._faults
+        new = [fault for fault in faults if fault not in self._reported]
+        if not new:
             return
-        new = [fault for fault in robot.faults if fault not in self._reported]
-        self._reported = robot.faults
+        self._reported = faults
         for fault in new:
             what = f"latched: {fault.name}: {reason or fault.meaning}"
             self._report(DiagnosticStatus.ERROR, what, fault)
@@ -337,21 +355,23 @@ class Perturbator(Participant, TolerantLifecycleNode):
 
     def _publish_setup(self) -> None:
         """Say for the record what is driven, within which limits, and who allowed torque."""
-        settings, limits = self.settings, asdict(self.limits)
-        proof, preflight = proof_of(settings.driver), preflight_of(settings.driver)
-        setup = AnkleRobotSetup(
-            header=header(self._now),
-            run=self._latest_run,
-            side=settings.side,
-            driver=settings.driver,
-            device=self._robot.identity if self._robot is not None else "",
-            armed_by=self._armed_by,
-            watchdog=f"zero within {proof.within:g} s, {proof.at}" if proof else "",
-            preflight=f"{preflight.at}: {preflight.failed or 'passed'}" if preflight else "",
-            limit_names=list(limits),
-            limits=[float(value) for value in limits.values()],
-        )
-        self.publish(topics.ROBOT_SETUP, setup)
+        limits = asdict(self.limits)
+        for side, robot in self._robots.items():
+            driver = driver_on(self.settings.driver, side)
+            proof, preflight = proof_of(driver), preflight_of(self.settings.driver)
+            setup = AnkleRobotSetup(
+                header=header(self._now),
+                run=self._latest_run,
+                side=side,
+                driver=driver,
+                device=robot.identity,
+                armed_by=self._armed_by,
+                watchdog=f"zero within {proof.within:g} s, {proof.at}" if proof else "",
+                preflight=f"{preflight.at}: {preflight.failed or 'passed'}" if preflight else "",
+                limit_names=list(limits),
+                limits=[float(value) for value in limits.values()],
+            )
+            self.publish(topics.ROBOT_SETUP, setup)
 
     # The action
 
@@ -365,7 +385,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
         return True
 
     def _schedule(self, goal: DeliverPulseTrain.Goal) -> None:
-        if self._robot is None:
+        if not self._robots:
             raise DeviceError("the perturbator is not active")
         if self.run is None or goal.run != self.run.number:
             raise LimitError(f"run: {goal.run} is not under way")
@@ -384,13 +404,15 @@ class Perturbator(Participant, TolerantLifecycleNode):
         super().publish(topic, message)
         if topic is topics.PULSES:
             number, onset = message.number, message.header.stamp
-            self._server.publish_feedback(DeliverPulseTrain.Feedback(number=number, onset=onset))
+            feedback = DeliverPulseTrain.Feedback(number=number, onset=onset)
+            self._server.publish_feedback(feedback, message.side)
 
     def _on_horizon(self, message: Horizon) -> None:
         """Answer a horizon with the torque up to it, promised."""
-        robot = self._robot
+        robots = self._robots
         new = message.run != self._latest_run
-        if robot is None or not (robot.enabled if new else self.run is not None):
+        enabled = robots and all(robot.enabled for robot in robots.values())
+        if not robots or not (enabled if new else self.run is not None):
             return
         if new:
             self._end_torque("another run began")
@@ -402,7 +424,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
         self._now = nanoseconds_of(message.header.stamp)
         if new:
             start, publish, end = self._now, self.publish, self._server.end
-            self.run = Run(message.run, message.seal, start, robot, publish, end)
+            self.run = Run(message.run, message.seal, start, robots, publish, end)
             self._latest_run = message.run
             self._publish_setup()
         assert self.run is not None
@@ -422,7 +444,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
 
     def on_deadline(self) -> None:
         """Promise what a real robot has measured, and note its faults."""
-        if self._robot is None:
+        if not self._robots:
             return
         self._look_at = time.monotonic() + MEASURED_PERIOD
         self._require_signs_of_life()
@@ -430,7 +452,8 @@ class Perturbator(Participant, TolerantLifecycleNode):
             if self.run is not None:
                 self.run.look_after()
             else:
-                self._robot.read()
+                for robot in self._robots.values():
+                    robot.read()
         except DeviceError as error:
             self.failure = str(error)
         self._report_faults()

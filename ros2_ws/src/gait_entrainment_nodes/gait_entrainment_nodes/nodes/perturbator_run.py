@@ -10,10 +10,12 @@ without length, after which there is no torque that could be stopped.
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
+from gait_entrainment.conventions import Side
 from gait_entrainment.robot import (
+    DeviceError,
     GuardedRobot,
     LimitError,
     Pulse,
@@ -31,13 +33,28 @@ from gait_entrainment_nodes.messaging.stamps import header, to_time
 Result = DeliverPulseTrain.Result
 
 
+def do_with_all(
+    robots: Mapping[Side, GuardedRobot],
+    do: Callable[[GuardedRobot], None],
+    undo: Callable[[GuardedRobot], None],
+) -> None:
+    """Do something with all robots, or, if it raises DeviceError, with none."""
+    try:
+        for robot in robots.values():
+            do(robot)
+    except DeviceError:
+        for robot in robots.values():
+            undo(robot)
+        raise
+
+
 class Run:
     """
-    One run, from its first horizon to its closing one; all instants are [ns since 1970].
+    One run of the robot on each ankle, from its first horizon to its closing one.
 
-    Torque is promised from ``start`` on, and only who has the key of the ``seal`` gets pulses.
-    ``end_train`` takes the result of each train that was
-    scheduled. Raises DeviceError, as most methods do, if the driver fails.
+    All instants are [ns since 1970]. Torque is promised from ``start`` on, and only who has the
+    key of the ``seal`` gets pulses. ``end_train`` takes the result of each train that was
+    scheduled, and its ankle. Raises DeviceError, as most methods do, if a driver fails.
     """
 
     def __init__(
@@ -45,12 +62,69 @@ class Run:
         number: int,
         seal: str,
         start: int,
+        robots: Mapping[Side, GuardedRobot],
+        publish: Callable[[topics.Topic, Any], None],
+        end_train: Callable[[Result, Side], None],
+    ) -> None:
+        self.number, self.seal = number, seal
+        self._ankles = {
+            side: AnkleRun(number, start, robot, publish, end_train)
+            for side, robot in robots.items()
+        }
+
+    @property
+    def requested(self) -> int:
+        """Pulses of the run that were delivered or are still to come."""
+        return sum(ankle.requested for ankle in self._ankles.values())
+
+    @property
+    def closed(self) -> bool:
+        """Whether the closing horizon has been answered."""
+        return all(ankle.closed for ankle in self._ankles.values())
+
+    def schedule(self, train: PulseTrain, key: str) -> None:
+        """
+        Schedule pulses that somebody with a key asks for.
+
+        Raises LimitError if it is not the key of the run, or as the robot does.
+        """
+        if seal_of(key) != self.seal:
+            raise LimitError("key: not that of the run; only who conducts it gets pulses")
+        if train.side not in self._ankles:
+            raise LimitError(f"side: {train.side.name.lower()}; the robot sits on the other ankle")
+        self._ankles[train.side].schedule(train)
+
+    def take_horizon(self, now: int, until: int, *, last: bool) -> None:
+        """Promise torque up to a horizon, of which everything before ``now`` is known."""
+        for ankle in self._ankles.values():
+            ankle.take_horizon(now, until, last=last)
+
+    def look_after(self) -> None:
+        """Promise what real robots have measured since."""
+        for ankle in self._ankles.values():
+            ankle.look_after()
+
+    def end_torque(self, outcome: int, reason: str, *, fault: bool = False) -> None:
+        """Bring all torque to zero now; a ``fault`` is told even if no torque was due."""
+        for ankle in self._ankles.values():
+            ankle.robot.cancel()  # all robots first, whatever becomes of the messages
+        for ankle in self._ankles.values():
+            ankle.end_torque(outcome, reason, fault=fault)
+
+
+class AnkleRun:
+    """The robot on one ankle in a run."""
+
+    def __init__(
+        self,
+        number: int,
+        start: int,
         robot: GuardedRobot,
         publish: Callable[[topics.Topic, Any], None],
-        end_train: Callable[[Result], None],
+        end_train: Callable[[Result, Side], None],
     ) -> None:
         robot.begin(start)
-        self.number, self.seal, self._robot = number, seal, robot
+        self.number, self.robot = number, robot
         self._publish, self._train_ended = publish, end_train
         self.closed = False
         self._now = self._horizon = start
@@ -66,15 +140,9 @@ class Run:
         """Pulses of the run that were delivered or are still to come."""
         return self._told + sum(count for count, _ in self._under_way)
 
-    def schedule(self, train: PulseTrain, key: str) -> None:
-        """
-        Schedule pulses that somebody with a key asks for.
-
-        Raises LimitError if it is not the key of the run, or as the robot does.
-        """
-        if seal_of(key) != self.seal:
-            raise LimitError("key: not that of the run; only who conducts it gets pulses")
-        self._robot.schedule(train)
+    def schedule(self, train: PulseTrain) -> None:
+        """Schedule pulses; raises LimitError or DeviceError if the robot refuses them."""
+        self.robot.schedule(train)
         self._committed = True
         self._under_way.append((len(train.pulses), train.end))
 
@@ -86,23 +154,23 @@ class Run:
         afterwards: what it has measured is promised by ``look_after``, piece by piece.
         """
         self._now, self._horizon, self._last = now, until, last
-        self._robot.heard()
+        self.robot.heard()
         if now < until:
             self._deliver()
             return
         self._end_trains(Result.ENDED, "the run ended before the last pulse")
-        self._publish_profile(TorqueProfile(self._robot.side, (until,), (0.0,), (), until), last)
+        self._publish_profile(TorqueProfile(self.robot.side, (until,), (0.0,), (), until), last)
         self._publish_zero(until)
-        self._robot.cancel()
+        self.robot.cancel()
         self._committed = False
         self.closed = True
 
     def look_after(self) -> None:
         """Promise what a real robot has measured since."""
-        if self._robot.promised_until < self._horizon:
+        if self.robot.promised_until < self._horizon:
             self._deliver()
         else:  # the next horizon is late, and every state belongs to the record
-            for state in self._robot.read():
+            for state in self.robot.read():
                 self._publish_state(state)
 
     def end_torque(self, outcome: int, reason: str, *, fault: bool = False) -> None:
@@ -111,16 +179,16 @@ class Run:
 
         A ``fault`` is told the walker even if no torque was due.
         """
-        self._robot.cancel()  # the robot first, whatever becomes of the messages
+        self.robot.cancel()
         self._end_trains(outcome, reason)
         if self._committed or fault:
             self._committed = False
-            until = to_time(self._robot.promised_until)
+            until = to_time(self.robot.promised_until)
             self._publish_revision(header=header(self._now), valid_until=until, stop=True)
             self._publish_zero(self._now)
 
     def _deliver(self) -> None:
-        robot = self._robot
+        robot = self.robot
         first, train = robot.delivered, robot.train
         profile = robot.promise(self._horizon)
         states = robot.read()
@@ -139,9 +207,10 @@ class Run:
         """Tell the result of each train that is over at an instant [ns]; without one, of all."""
         while self._under_way and self._under_way[0][1] <= until:
             count, _ = self._under_way.popleft()
-            delivered = min(self._robot.delivered - self._told, count)
+            delivered = min(self.robot.delivered - self._told, count)
             self._told += delivered
-            self._train_ended(Result(outcome=outcome, message=message, delivered=delivered))
+            result = Result(outcome=outcome, message=message, delivered=delivered)
+            self._train_ended(result, self.robot.side)
 
     def _publish_profile(self, profile: TorqueProfile, last: bool) -> None:
         self._publish_revision(
@@ -154,7 +223,7 @@ class Run:
         )
 
     def _publish_revision(self, **values: Any) -> None:
-        side, revision = self._robot.side, self._revision
+        side, revision = self.robot.side, self._revision
         profile = msg.TorqueProfile(run=self.number, revision=revision, side=side, **values)
         self._publish(topics.TORQUE_PROFILE, profile)
         self._revision += 1
@@ -163,7 +232,7 @@ class Run:
         message = msg.TorquePulse(
             header=header(pulse.onset),
             run=self.number,
-            side=self._robot.side,
+            side=self.robot.side,
             number=number,
             torque=pulse.torque,
             duration=pulse.duration,
@@ -174,7 +243,7 @@ class Run:
         self._publish_state(RobotState(instant, 0.0, 0.0, math.nan))
 
     def _publish_state(self, state: RobotState) -> None:
-        robot = self._robot
+        robot = self.robot
         status = msg.AnkleRobotState.ACTIVE if robot.enabled else msg.AnkleRobotState.INACTIVE
         if robot.faults:
             status = msg.AnkleRobotState.FAULT

@@ -28,7 +28,7 @@ class WalkerRun:
 
     Heel strike 0, at time 0, is that of ``first_heel_strike``. There are ``sample_rate`` samples
     per second; 0 samples at the gait events, None not at all. ``variation`` and ``seed`` say how
-    its strides vary.
+    its strides vary. Torque comes for one ankle, or for ``both_ankles``.
 
     How a run is cut into stretches changes neither events nor samples: the grid of samples is
     fixed, and the walker's state is only ever computed from the last switching instant.
@@ -41,17 +41,25 @@ class WalkerRun:
         sample_rate: float | None,
         variation: Variation | None = None,
         seed: int = 0,
+        *,
+        both_ankles: bool = False,
     ) -> None:
         self._walker = Walker(parameters, first_heel_strike, variation=variation, seed=seed)
         self._sampled = sample_rate is not None
         self._period = NANOSECONDS_PER_SECOND / sample_rate if sample_rate else None
-        self.promised = 0  # torque is promised up to this instant [ns]
+        self.ankles = 1 + both_ankles  # whose torque is promised
+        self._promised: dict[Side, int] = {}  # up to which instant [ns]
         self.reached = 0  # everything up to this instant has been walked [ns]
         self.events = 0  # gait events so far
         self.samples = 0  # samples so far
         self.late = 0  # promised torque that came after its instant and was not walked [ns]
         self.starved = 0  # walked without torque for want of a promise [ns]
         self.ended = False  # whether the run is over
+
+    @property
+    def promised(self) -> int:
+        """Instant up to which all torque is promised [ns]."""
+        return min(self._promised.values()) if len(self._promised) >= self.ankles else 0
 
     @property
     def ending(self) -> Ending | None:
@@ -71,8 +79,8 @@ class WalkerRun:
         """
         if not profile.has_length:
             return 0
-        profile.check(self.promised)
-        self.promised = profile.valid_until
+        profile.check(self._promised.get(profile.side, 0))
+        self._promised[profile.side] = profile.valid_until
         late = max(min(self.reached, profile.valid_until) - profile.times[0], 0)
         self.late += late
         if profile.valid_until > self.reached:

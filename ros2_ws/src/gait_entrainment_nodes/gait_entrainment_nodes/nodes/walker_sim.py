@@ -58,6 +58,7 @@ class Settings:
         0.0, "real time: wall time minus the instant that is sent", "s", (0.0, 1.0)
     )
     acknowledged: bool = setting(False, "lock-step: keep to what a recorder has acknowledged")
+    both_ankles: bool = setting(False, "whether torque comes for both ankles")
     ground_reaction: bool = setting(True, "publish the ground reaction forces")
 
 
@@ -137,7 +138,8 @@ class WalkerSim(Participant):
         """Return the walk of a run."""
         settings = self.settings
         rate, first = settings.sample_rate, settings.first_heel_strike
-        return WalkerRun(self.walker, first, rate, self.variation, settings.seed)
+        both = settings.both_ankles
+        return WalkerRun(self.walker, first, rate, self.variation, settings.seed, both_ankles=both)
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Any:
         if self.run is not None:

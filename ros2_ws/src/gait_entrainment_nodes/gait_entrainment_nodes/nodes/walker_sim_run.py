@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
 from gait_entrainment.robot import TorqueProfile
 from gait_entrainment_msgs.msg import Progress, WalkerTiming
 from gait_entrainment_nodes.messaging.stamps import PROGRESS_PERIOD, header
@@ -50,6 +50,7 @@ class _Account:
         self.grant = 0  # number of the next progress report
         self.reproducible = True
         self.late_stretches = self.starved_stretches = 0
+        self._heard: set[Side] = set()  # ankles of which a promise is here, see _all_here
 
     @property
     def stamp(self) -> int:
@@ -63,6 +64,13 @@ class _Account:
             self.late_stretches += 1
             self.reproducible = False
         return late
+
+    def _all_here(self, profile: TorqueProfile) -> bool:
+        """Whether with a promise of one ankle those of all ankles are here; begins anew then."""
+        self._heard.add(profile.side)
+        if all_here := len(self._heard) >= self.walker.ankles:
+            self._heard.clear()
+        return all_here
 
     def stop(self, instant: int) -> None:
         """End all torque at an instant, or now if that is over."""
@@ -123,7 +131,8 @@ class LockStepRun(_Account):
         Raises ValueError if the promise before it is missing.
         """
         late = self._accept(profile)
-        self._promised.append((profile.valid_until, last))
+        if self._all_here(profile):
+            self._promised.append((profile.valid_until, last))
         return late
 
     def acknowledge(self, progress: Progress) -> None:
@@ -162,7 +171,8 @@ class RealTimeRun(_Account):
         """See `LockStepRun`."""
         late = self._accept(profile)
         # If the last promise comes late, its end is already past.
-        self._end = max(profile.valid_until, self.walker.reached) if last else None
+        ends = last and self._all_here(profile)
+        self._end = max(profile.valid_until, self.walker.reached) if ends else None
         return late
 
     @property

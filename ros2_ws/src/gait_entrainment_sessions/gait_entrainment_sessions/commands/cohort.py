@@ -13,9 +13,11 @@ from typing import Any
 
 import numpy as np
 from scipy.stats import binomtest
+from tqdm import tqdm
 
 from gait_entrainment.errors import UsageError
 from gait_entrainment.settings import Setting, settings_of
+from gait_entrainment.simulation import Simulation
 from gait_entrainment_commands.drawing import save_figure
 from gait_entrainment_sessions.findings import Findings, StudyFindings
 from gait_entrainment_sessions.rehearsal import rehearse
@@ -33,6 +35,7 @@ from gait_entrainment_studies.cohort.study import (
 from gait_entrainment_studies.cohort.subjects import SubjectDistributions, Subjects, draw_subjects
 from gait_entrainment_studies.commands import question
 from gait_entrainment_studies.locking.roots import Floats
+from gait_entrainment_studies.sweep.engine import available_cores
 
 DESCRIPTION = (
     "Draw subjects, give each its own stride-to-stride variability, conduct the experiment on "
@@ -48,6 +51,7 @@ EXAMPLES = """examples:
 """
 
 _SUBJECTS = Setting("number of subjects", int, least=2)
+_JOBS = Setting("processes", int, least=1)
 _PERIOD_OFFSET = Setting("pulse period minus measured stride period", unit="s")
 _OFFSETS = ("-0.12", "-0.1", "-0.08", "-0.06", "-0.05", "-0.04", "-0.02", "0.02", "0.05")
 _HEADLINE = -0.05
@@ -58,6 +62,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "session", nargs="?", type=Path, metavar="SESSION.yaml", help="rehearse these blocks"
     )
+    question.add_setting(parser, "jobs", _JOBS)
     experiment = parser.add_argument_group("experiment")
     question.add_setting(experiment, "subjects", _SUBJECTS, "19")
     question.add_settings(experiment, StudyPlan)
@@ -113,19 +118,39 @@ def _rehearse(options: argparse.Namespace, distributions: SubjectDistributions) 
     session = read_session(options.session)
     count = _SUBJECTS.parse("subjects", options.subjects)
     subjects = draw_subjects(distributions, count, plan.seed)
-    runs = list(rehearse(session, subjects, seed=plan.seed, hurst=plan.hurst))
+    jobs = _JOBS.parse("jobs", options.jobs) if options.jobs else available_cores()
+    rehearsed = rehearse(session, subjects, seed=plan.seed, hurst=plan.hurst, jobs=jobs)
+    tqdm.monitor_interval = 0  # no thread: see by_processes
+    total = count * len(session.blocks)
+    runs = sorted(
+        tqdm(rehearsed, total=total, unit="block", disable=None, leave=False),
+        key=lambda one: (one.place.block, one.place.person),
+    )
     findings = [one for placed in runs for one in Findings.of(placed)]
-    study = StudyFindings.of(findings)
-    blocks = {
-        block.name: dict(Counter(f.verdict for f in findings if f.placed.place.name == block.name))
-        for block in session.blocks
+    ended = {
+        (one.place.person, one.place.block)
+        for one in runs
+        if isinstance(one.run, Simulation) and one.run.ending
     }
+    study = StudyFindings.of(findings)
+    blocks: dict[str, Any] = {}
+    lines = ["| block | verdicts | pulses locked* |", "| --- | --- | --- |"]
+    for name in dict.fromkeys(one.name for one in findings):
+        own = [one for one in findings if one.name == name]
+        verdicts = Counter(one.verdict for one in own)
+        fell = len(ended & {(one.placed.place.person, one.placed.place.block) for one in own})
+        share = np.mean([one.locking.share for one in own])
+        locked = None if np.isnan(share) else float(share)
+        blocks[name] = {"verdicts": dict(verdicts), "locked": locked, "ended_early": fell}
+        told = ", ".join(f"{number} {verdict}" for verdict, number in sorted(verdicts.items()))
+        told += f"; {fell} fell or flew off" if fell else ""
+        lines.append(f"| {name} | {told} | {'-' if locked is None else f'{locked:.0%}'} |")
     outcome = {"subjects": count, "blocks": blocks, "study": dict(study.rows)}
-    lines = ["| block | verdicts |", "| --- | --- |"]
-    for name, found in blocks.items():
-        told = ", ".join(f"{number} {verdict}" for verdict, number in sorted(found.items()))
-        lines.append(f"| {name} | {told} |")
-    lines += ["", *(f"{name}: {value}" for name, value in study.rows)]
+    lines += [
+        "",
+        "* within 5 % of the stride of most of them; mean over the subjects",
+        *(f"{name}: {value}" for name, value in study.rows),
+    ]
 
     def write(folder: Path) -> list[Path]:
         tables = write_tables(runs, folder)

@@ -8,7 +8,6 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from gait_entrainment.conventions import nanoseconds
@@ -41,21 +40,20 @@ class Check:
     finding: str
 
 
-def checks_of(run: RecordedRun, bag: Path, *, sealed: bool = False) -> list[Check]:
+def checks_of(run: RecordedRun, reader: BagReader, *, sealed: bool = False) -> list[Check]:
     """Return what is known of how sound a recorded run is, and may be if it is ``sealed``."""
-    with BagReader(bag) as reader:
-        checks = [
-            _record(run),
-            _holes(run),
-            _events(run),
-            _pulses(run),
-            *_timing(run),
-            _torque(run, reader),
-            _clocks(reader, walker_timing(bag)),
-            _limits(reader),
-            _faults(reader),
-            _analysis(run),
-        ]
+    checks = [
+        _record(run),
+        _holes(run),
+        _events(run),
+        _pulses(run),
+        *_timing(run),
+        _torque(run, reader),
+        _clocks(reader, walker_timing(reader)),
+        _limits(reader),
+        _faults(reader),
+        _analysis(run),
+    ]
     return [c for c in checks if not (sealed and c.name.startswith(_TELLING))]
 
 
@@ -88,13 +86,17 @@ def _events(run: RecordedRun) -> Check:
 
 
 def _pulses(run: RecordedRun) -> Check:
-    counts, given = run.analysis.pulse_counts, len(run.onsets)
-    told = f"{counts.placed} placed in strides"
+    counts, given, placed = run.analysis.pulse_counts, len(run.onsets), len(run.analysis.pulses)
+    told, whole = f"{placed} placed in strides", True
     if run.protocol is not None:
-        told += f" of {run.protocol.planned.count} planned"
+        planned = run.protocol.planned.count
+        in_strides = sum(block.pulses.count for block in run.protocol.sequence)
+        told += f" of {in_strides} planned"
+        whole = given == planned and placed == in_strides
+        if planned != in_strides:
+            told += f"; {given} of {planned} on both legs delivered"
     if counts.without_lag:
         told += f", {counts.without_lag} without a toe-off to refer to"
-    whole = run.protocol is None or given == run.protocol.planned.count == counts.placed
     return Check("pulses", GOOD if whole and not counts.without_lag else DOUBTFUL, told)
 
 
@@ -113,9 +115,11 @@ def _torque(run: RecordedRun, reader: BagReader) -> Check:
     width = run.protocol.planned.duration
     step = max(len(run.onsets) // _COMPARED, 1)
     errors, resting, count = list[float](), 0.0, 0
-    for onset in run.onsets[::step]:
+    for side, timing in run.delivered[::step]:
+        onset = timing.commanded
         end = onset + nanoseconds(width + _AFTER)
-        states = [state_of(m) for _, m in reader.decoded([topic], onset, end)]
+        found = reader.decoded([topic], onset, end)
+        states = [state_of(m) for _, m in found if m.side == side]
         measured = [s for s in states if not math.isnan(s.measured)]
         count += bool(measured)
         late = [s for s in measured if s.commanded == 0 and s.stamp > onset + nanoseconds(width)]
@@ -168,14 +172,13 @@ def _analysis(run: RecordedRun) -> Check:
     return Check("analysis", GOOD, "repeated: the same as live to the last bit")
 
 
-def origin_of(bag: Path) -> dict[str, str]:
+def origin_of(reader: BagReader) -> dict[str, str]:
     """Return where a run comes from: versions, commit, driver, and the SHA-256 of its files."""
-    with BagReader(bag) as reader:
-        custom = reader.custom_data
+    custom = reader.custom_data
     told = {key: custom.get(key, "not told") for key in ORIGIN}
     versions = _loaded(custom.get("versions", "{}"))
     told["versions"] = ", ".join(f"{name} {number}" for name, number in versions.items())
-    for file in bag_files(bag):
+    for file in bag_files(reader.path):
         digest = hashlib.sha256()
         with file.open("rb") as data:
             while piece := data.read(1 << 20):

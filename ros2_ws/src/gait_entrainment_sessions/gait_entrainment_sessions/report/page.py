@@ -16,6 +16,7 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader
 
 from gait_entrainment.protocol import write_protocol
+from gait_entrainment_bags import BagReader
 from gait_entrainment_bags.figures import run_figures
 from gait_entrainment_bags.recorded_run import RecordedRun, read_run
 from gait_entrainment_commands.outcome import outcome_of, summary
@@ -97,7 +98,9 @@ def write_report(path: Path, out: Path) -> None:
 
 def _section(place: Place, *, drawn: bool) -> RunSection:
     run = read_run(place.bag, torques=drawn and not place.sealed)
-    checks, origin = checks_of(run, place.bag, sealed=place.sealed), origin_of(place.bag)
+    with BagReader(place.bag) as reader:
+        checks = checks_of(run, reader, sealed=place.sealed)
+        origin = origin_of(reader)
     if place.sealed:
         return RunSection(place, checks, origin, sealed=True)
     findings = Findings.of(PlacedRun(place, run))

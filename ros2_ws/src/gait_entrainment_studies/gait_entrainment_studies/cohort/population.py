@@ -15,7 +15,6 @@ Arrays have a column for each of the n walkers.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -158,15 +157,3 @@ def noise_for(
         # A walker that fell before its third stride tells nothing new.
         noise = np.where(found > 0, noise * coefficient_of_variation / found, noise)
     return noise
-
-
-def locked_runs(lags: Floats, locked_lag: float, tolerance: float) -> tuple[float, list[int]]:
-    """
-    Return the fraction of strides locked, and the lengths of the runs of them.
-
-    A stride is locked while its pulse lies within `tolerance` [s] of the lock of the walker
-    without noise.
-    """
-    near = np.abs(lags - locked_lag) <= tolerance
-    runs = [len(list(run)) for locked, run in groupby(near.tolist()) if locked]
-    return float(near.mean()) if near.size else float("nan"), runs

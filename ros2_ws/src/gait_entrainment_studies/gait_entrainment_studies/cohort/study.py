@@ -20,11 +20,11 @@ from gait_entrainment.errors import UsageError
 from gait_entrainment.gait import GaitEvent, Verdict, analyze
 from gait_entrainment.settings import Checked, setting
 from gait_entrainment.walker.variation import step_noise
+from gait_entrainment_studies.cohort.locked import locked_runs
 from gait_entrainment_studies.cohort.population import (
     Population,
     PopulationWalk,
     PulseTrains,
-    locked_runs,
     noise_for,
 )
 from gait_entrainment_studies.cohort.subjects import Subjects
@@ -117,8 +117,7 @@ def run_study(subjects: Subjects, plan: StudyPlan) -> Study:
     for offset in plan.period_offsets:
         if not abs(offset) < shortest:
             raise UsageError(f"period_offset: {offset:g} s; allowed: within {shortest:.3g} s")
-        torque = np.full(population.size, plan.torque)
-        walk, trains = conduct(population, noise, plan, offset, torque)
+        walk, trains = _conduct(population, noise, plan, offset)
         for subject, gait in enumerate(gaits):
             lock = math.nan
             if plan.solvable:
@@ -132,14 +131,14 @@ def run_study(subjects: Subjects, plan: StudyPlan) -> Study:
     return Study(tuple(trials), np.reshape(basins, (-1, 2)))
 
 
-def conduct(
-    population: Population, noise: Floats, plan: StudyPlan, offset: float, torque: Floats
+def _conduct(
+    population: Population, noise: Floats, plan: StudyPlan, offset: float
 ) -> tuple[PopulationWalk, PulseTrains]:
     """
     Walk the baseline, plan the pulses from it as a protocol does, walk all of it with them.
 
-    ``noise`` (n,) is that of each walker's push-offs (`noise_for`), ``torque`` (n,) [N m] replaces
-    the plan's, and the pulse period is ``offset`` [s] off each measured stride period.
+    ``noise`` (n,) is that of each walker's push-offs (`noise_for`); the pulse period is ``offset``
+    [s] off each measured stride period.
     """
     steps = 2 * (plan.baseline + plan.pulses + plan.washout)
     seed = (plan.seed, _TRIAL, nanoseconds(offset) % 2**64)
@@ -150,7 +149,7 @@ def conduct(
         first_onset=baseline.heel_strikes[-1] + (1 + plan.initial_phase) * measured,
         period=measured + offset,
         count=plan.pulses,
-        torque=torque,
+        torque=np.full(population.size, plan.torque),
         width=plan.width,
     )
     return population.walk(noise[:steps], trains), trains

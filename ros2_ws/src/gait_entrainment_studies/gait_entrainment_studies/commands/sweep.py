@@ -7,6 +7,7 @@ import argparse
 import re
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +17,10 @@ from tqdm import tqdm
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.settings import Setting
 from gait_entrainment_studies.commands import question
-from gait_entrainment_studies.sweep.engine import available_cores, rows_by_dask, rows_by_processes
+from gait_entrainment_studies.sweep.engine import available_cores, by_processes, rows_by_dask
 from gait_entrainment_studies.sweep.figures import draw_locked_lags, draw_tongue
 from gait_entrainment_studies.sweep.plan import Axis, SweepPlan
-from gait_entrainment_studies.sweep.row import StableInterval, exact_borders
+from gait_entrainment_studies.sweep.row import StableInterval, exact_borders, sweep_row
 from gait_entrainment_studies.sweep.store import SweepStore, read_sweep
 
 # The exact borders are drawn at this many torques or more: those of a coarse sweep are smooth too.
@@ -100,8 +101,8 @@ def _fill(plan: SweepPlan, store: SweepStore, jobs: int, scheduler: str | None) 
     if scheduler:
         rows = rows_by_dask(plan, missing, scheduler)
     else:
-        rows = rows_by_processes(plan, missing, jobs)
-    tqdm.monitor_interval = 0  # no thread: see rows_by_processes
+        rows = by_processes(partial(sweep_row, plan), missing, jobs)
+    tqdm.monitor_interval = 0  # no thread: see by_processes
     walks = plan.period_offsets.count * plan.phases
     total = plan.torque_fractions.count * walks
     with tqdm(total=total, initial=total - len(missing) * walks, unit="walk", disable=None) as bar:

@@ -13,10 +13,10 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from typing import Any
+from typing import Any, TypeVar
 
 from gait_entrainment_studies.sweep.plan import SweepError, SweepPlan
 from gait_entrainment_studies.sweep.row import Row, sweep_row
@@ -25,6 +25,7 @@ from gait_entrainment_studies.sweep.row import Row, sweep_row
 SCHEDULER_TIMEOUT = 6.0
 
 Rows = Iterator[tuple[int, Row]]
+Made = TypeVar("Made")
 
 
 def available_cores() -> int:
@@ -32,11 +33,13 @@ def available_cores() -> int:
     return len(os.sched_getaffinity(0))
 
 
-def rows_by_processes(plan: SweepPlan, indices: Sequence[int], jobs: int) -> Rows:
-    """Make rows in `jobs` processes, in any order; one job makes them in this process."""
+def by_processes(
+    make: Callable[[int], Made], indices: Sequence[int], jobs: int
+) -> Iterator[tuple[int, Made]]:
+    """Make things by number in `jobs` processes, in any order; one job: in this process."""
     if jobs == 1:
         for index in indices:
-            yield index, sweep_row(plan, index)
+            yield index, make(index)
         return
     # A fork of this process has everything loaded and starts at once, but the fork of a process
     # with threads may hang; that one gets its workers from a server.
@@ -47,13 +50,13 @@ def rows_by_processes(plan: SweepPlan, indices: Sequence[int], jobs: int) -> Row
         jobs, context, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)
     )
     try:
-        futures = {pool.submit(sweep_row, plan, index): index for index in indices}
+        futures = {pool.submit(make, index): index for index in indices}
         for future in as_completed(list(futures)):
             yield futures.pop(future), future.result()
     except BrokenProcessPool:
         raise SweepError(
             f"one of {jobs} processes was killed, perhaps because memory ran out: give the same"
-            " command again, perhaps with fewer --jobs; what is made is kept"
+            " command again, perhaps with fewer --jobs"
         ) from None
     finally:
         pool.shutdown(wait=False, cancel_futures=True)

@@ -11,10 +11,10 @@ from step_to_step import step_to_step
 
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.walker.variation import step_noise
+from gait_entrainment_studies.cohort.locked import locked_runs
 from gait_entrainment_studies.cohort.population import (
     Population,
     PulseTrains,
-    locked_runs,
     noise_for,
 )
 from gait_entrainment_studies.locking.walked import walk_under_pulses

@@ -20,7 +20,7 @@ from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment_commands import main
 from gait_entrainment_studies.locking.walked import Outcome, walk_under_pulses
 from gait_entrainment_studies.sweep import engine
-from gait_entrainment_studies.sweep.engine import rows_by_dask, rows_by_processes
+from gait_entrainment_studies.sweep.engine import by_processes, rows_by_dask
 from gait_entrainment_studies.sweep.plan import Axis, SweepError, SweepPlan
 from gait_entrainment_studies.sweep.row import exact_borders, sweep_row
 from gait_entrainment_studies.sweep.store import SweepStore, read_sweep
@@ -97,15 +97,15 @@ def test_borders_at_zero_torque_are_none_and_grow_with_it():
 
 def test_processes_make_the_same_rows_as_one():
     plan = plan_of()
-    alone = dict(rows_by_processes(plan, range(3), 1))
-    together = dict(rows_by_processes(plan, range(3), 2))
+    alone = dict(by_processes(partial(sweep_row, plan), range(3), 1))
+    together = dict(by_processes(partial(sweep_row, plan), range(3), 2))
     for index in range(3):
         same(alone[index], together[index])
 
 
 def test_a_killed_process_is_named():
     plan = plan_of(torque_fractions=Axis(0.05, 0.15, 60))
-    rows = rows_by_processes(plan, range(60), 2)
+    rows = by_processes(partial(sweep_row, plan), range(60), 2)
     next(rows)
     for process in multiprocessing.active_children():
         process.kill()

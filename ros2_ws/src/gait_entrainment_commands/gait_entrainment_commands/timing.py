@@ -12,11 +12,10 @@ crosses a fraction of the pulse's height, interpolated between two states.
 import math
 from bisect import bisect_left, insort
 from collections.abc import Sequence
-from dataclasses import dataclass
 from operator import attrgetter
 
 from gait_entrainment.conventions import nanoseconds
-from gait_entrainment.robot.contract import RobotState
+from gait_entrainment.robot import Pulse, PulseTiming, RobotState
 
 # Half the height: noise has to reach that far to be mistaken, and the instant does not depend on
 # where the flank starts to be seen.
@@ -55,26 +54,6 @@ def measured_onset(
             return index, earlier + round((stamp - earlier) * share)
         before = (stamp, level)
     return None
-
-
-@dataclass(frozen=True)
-class PulseTiming:
-    """Onsets of one pulse [ns]; None if the states do not show it."""
-
-    commanded: int
-    sent: int | None
-    measured: int | None
-    sham: bool = False  # announced without torque: no state can show it
-
-    @property
-    def onset(self) -> int:
-        """The measured onset; the commanded one if no torque shows it."""
-        return self.commanded if self.measured is None else self.measured
-
-    def late_ms(self, kind: str) -> float | None:
-        """By how many ms the "sent" or "measured" onset came after the command."""
-        onset: int | None = getattr(self, kind)
-        return None if onset is None else (onset - self.commanded) / 1e6
 
 
 class MeasuredOnsets:
@@ -175,9 +154,27 @@ class MeasuredOnsets:
         del self._states[: max(first - 1, 0)]
 
 
+def timings_of(pulses: Sequence[Pulse], states: Sequence[RobotState]) -> list[PulseTiming]:
+    """Return when the pulses of a whole run began, by all states of their robot."""
+    onsets = MeasuredOnsets()
+    onsets.add_promise([pulse.onset for pulse in pulses], 0)
+    for pulse in pulses:
+        onsets.add_pulse(pulse.onset, pulse.torque, pulse.duration)
+    for state in states:
+        onsets.add_state(state)
+    onsets.finish()
+    return onsets.timings
+
+
+def late_ms(timing: PulseTiming, kind: str) -> float | None:
+    """By how many ms the "sent" or "measured" onset came after the command."""
+    onset: int | None = getattr(timing, kind)
+    return None if onset is None else (onset - timing.commanded) / 1e6
+
+
 def lateness_ms(timings: Sequence[PulseTiming], kind: str) -> list[float]:
     """Return by how many ms pulses were "sent" or "measured" after their command, ascending."""
-    return sorted(late for timing in timings if (late := timing.late_ms(kind)) is not None)
+    return sorted(late for timing in timings if (late := late_ms(timing, kind)) is not None)
 
 
 def quantile(ascending: Sequence[float], share: float) -> float:

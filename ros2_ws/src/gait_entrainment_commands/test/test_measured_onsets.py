@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.robot import MeasuredOnsets, PulseTiming, PulseTrain, find_driver
+from gait_entrainment.robot import PulseTiming, PulseTrain, find_driver
+from gait_entrainment_commands.timing import MeasuredOnsets
 
 MS = 1_000_000
 HEIGHT, WIDTH = 10.0, 0.1

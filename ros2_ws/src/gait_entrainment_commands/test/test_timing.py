@@ -11,14 +11,12 @@ from hypothesis import strategies as st
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.robot import (
-    MeasuredOnsets,
     PulseTiming,
     PulseTrain,
     RobotState,
     find_driver,
-    measured_onset,
 )
-from gait_entrainment.robot.timing import quantile
+from gait_entrainment_commands.timing import MeasuredOnsets, measured_onset, quantile
 
 MS = 1_000_000
 
