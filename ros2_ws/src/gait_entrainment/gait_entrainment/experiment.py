@@ -292,12 +292,11 @@ class Conductor:
 
     def _begin_block(self, strike: int | None = None) -> None:
         """Begin the next block, with a strike [ns] of its leg if one has come."""
-        number = len(self.blocks)
-        plan = self.protocol.sequence[number]
-        tracker = self._legs[self.protocol.leg(plan)].tracker
-        before = max(tracker.stride_in_progress - 1, 0), tracker.counts.implausible
+        plan = self.protocol.sequence[len(self.blocks)]
         ankles = self.protocol.ankles(plan)
-        self.blocks.append(BlockRun(plan, number + 1, ankles, strike, *before))
+        tracker = self._legs[ankles[0]].tracker
+        before = max(tracker.stride_in_progress - 1, 0), tracker.counts.implausible
+        self.blocks.append(BlockRun(plan, len(self.blocks) + 1, ankles, strike, *before))
         # Periods [s] of the latest complete strides of the baseline.
         self._periods: deque[float] = deque(maxlen=max(plan.baseline - 1, 1))
 
@@ -415,8 +414,7 @@ class Conductor:
         *onsets, after = plan.onsets(first, block.pulse_period, seed)
         self._add_pulses(block.leg, onsets)
         for other in block.ankles[1:]:
-            between = [(one + next_one) // 2 for one, next_one in pairwise([*onsets, after])]
-            self._add_pulses(other, between)
+            self._add_pulses(other, [sum(pair) // 2 for pair in pairwise([*onsets, after])])
 
     def _require_plausible_baseline(self) -> None:
         """Raise GaitError if the baseline's strides are not those of one gait."""

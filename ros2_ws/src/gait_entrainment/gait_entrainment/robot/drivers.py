@@ -63,11 +63,7 @@ def driver_names() -> dict[str, str]:
 
 
 def make_robots(
-    text: str,
-    sides: Sequence[Side],
-    limits: DeviceLimits,
-    seed: int = 0,
-    dose: Dose | None = None,
+    text: str, sides: Sequence[Side], limits: DeviceLimits, seed: int = 0, dose: Dose | None = None
 ) -> dict[Side, GuardedRobot]:
     """
     Return the robots of some ankles, each as ``Driver.make``; what stops one stops both.

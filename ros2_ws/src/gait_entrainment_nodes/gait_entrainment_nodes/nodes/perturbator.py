@@ -11,7 +11,7 @@ cancelling, with the latched stop service and with the process, whatever ends th
 
 import math
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -34,10 +34,10 @@ from gait_entrainment.robot import (
 from gait_entrainment.robot.faults import DEADMAN_SILENT, NOT_STOPPED, OPERATOR_SILENT
 from gait_entrainment.settings import setting
 from gait_entrainment_bags.messages import MessageError, nanoseconds_of, train_of
-from gait_entrainment_drivers.proof import preflight_of, proof_of, require_proof
+from gait_entrainment_drivers.proof import require_proof
 from gait_entrainment_drivers.stop_channel import StopAnswer
 from gait_entrainment_msgs.action import DeliverPulseTrain
-from gait_entrainment_msgs.msg import AnkleRobotSetup, Horizon, Trouble
+from gait_entrainment_msgs.msg import Horizon, Trouble
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.environment import user_and_host
 from gait_entrainment_nodes.messaging.stamps import header
@@ -45,7 +45,7 @@ from gait_entrainment_nodes.nodes.goal_server import GoalServer
 from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.parameters import texts
 from gait_entrainment_nodes.nodes.participant import Participant
-from gait_entrainment_nodes.nodes.perturbator_run import Result, Run, do_with_all
+from gait_entrainment_nodes.nodes.perturbator_run import Result, Run, do_with_all, setups
 from gait_entrainment_nodes.nodes.rclpy_internals import TolerantLifecycleNode
 from gait_entrainment_nodes.nodes.stop_thread import StopThread
 
@@ -355,22 +355,8 @@ class Perturbator(Participant, TolerantLifecycleNode):
 
     def _publish_setup(self) -> None:
         """Say for the record what is driven, within which limits, and who allowed torque."""
-        limits = asdict(self.limits)
-        for side, robot in self._robots.items():
-            driver = driver_on(self.settings.driver, side)
-            proof, preflight = proof_of(driver), preflight_of(self.settings.driver)
-            setup = AnkleRobotSetup(
-                header=header(self._now),
-                run=self._latest_run,
-                side=side,
-                driver=driver,
-                device=robot.identity,
-                armed_by=self._armed_by,
-                watchdog=f"zero within {proof.within:g} s, {proof.at}" if proof else "",
-                preflight=f"{preflight.at}: {preflight.failed or 'passed'}" if preflight else "",
-                limit_names=list(limits),
-                limits=[float(value) for value in limits.values()],
-            )
+        for setup in setups(self._robots, self.settings.driver, self._armed_by):
+            setup.header, setup.run = header(self._now), self._latest_run
             self.publish(topics.ROBOT_SETUP, setup)
 
     # The action

@@ -10,7 +10,8 @@ without length, after which there is no torque that could be stopped.
 
 import math
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict
 from typing import Any
 
 from gait_entrainment.conventions import Side
@@ -22,8 +23,10 @@ from gait_entrainment.robot import (
     PulseTrain,
     RobotState,
     TorqueProfile,
+    driver_on,
 )
 from gait_entrainment.robot.faults import STOPPED
+from gait_entrainment_drivers.proof import preflight_of, proof_of
 from gait_entrainment_msgs import msg
 from gait_entrainment_msgs.action import DeliverPulseTrain
 from gait_entrainment_nodes.messaging import topics
@@ -46,6 +49,25 @@ def do_with_all(
         for robot in robots.values():
             undo(robot)
         raise
+
+
+def setups(
+    robots: Mapping[Side, GuardedRobot], driver: str, armed_by: str
+) -> Iterator[msg.AnkleRobotSetup]:
+    """Say of each robot what is driven, within which limits, and who allowed torque."""
+    for side, robot in robots.items():
+        proof, preflight = proof_of(driver_on(driver, side)), preflight_of(driver)
+        limits = asdict(robot.limits)
+        yield msg.AnkleRobotSetup(
+            side=side,
+            driver=driver_on(driver, side),
+            device=robot.identity,
+            armed_by=armed_by,
+            watchdog=f"zero within {proof.within:g} s, {proof.at}" if proof else "",
+            preflight=f"{preflight.at}: {preflight.failed or 'passed'}" if preflight else "",
+            limit_names=list(limits),
+            limits=[float(value) for value in limits.values()],
+        )
 
 
 class Run:
