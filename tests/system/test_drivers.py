@@ -26,6 +26,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from std_srvs.srv import Trigger
 
+from gait_entrainment.conventions import Side
 from gait_entrainment.experiment import Part
 from gait_entrainment.protocol import read_protocol
 from gait_entrainment.simulation import simulate
@@ -62,10 +63,10 @@ def entrain(domain, *arguments):
 
 
 @contextmanager
-def emulated_motor(tmp_path, *options):
+def emulated_motor(tmp_path, *options, number=0):
     """Run the emulated motor, its own watchdog on; gives the driver's text and the trace."""
-    port = 20_000 + os.getpid() % 20_000
-    trace = tmp_path / "trace"
+    port = 20_000 + (os.getpid() + number) % 20_000
+    trace = tmp_path / f"trace{number}"
     process = subprocess.Popen(
         ["ak_motor_emulator", f"--port={port}", "--timeout=0.1", f"--trace={trace}", *options],
         stdout=subprocess.PIPE,
@@ -171,6 +172,48 @@ def test_motor_on_a_bus_delivers_the_experiment_in_real_time(tmp_path, motor):
     # What the walker felt is what the motor measured.
     assert max(delivered) == pytest.approx(13.35 / 2, abs=0.3)
     assert faults == []
+
+
+SESSION = """
+study: two_ankles
+person: {{code: P01, mass: 10, leg_length: 0.25}}
+limits: {{torque: 3, rate: 100, rising: 1}}
+rest: 0
+protocol:
+  driver: "{driver}"
+  baseline: 2
+  washout: 0
+  pulses: {{count: 1, torque: 1}}
+blocks:
+  - {{name: one leg}}
+  - {{name: both legs, protocol: {{side: both}}}}
+"""
+
+
+def test_a_session_with_a_motor_on_each_ankle(tmp_path):
+    session, study = tmp_path / "session.yaml", tmp_path / "study"
+    motors = [emulated_motor(tmp_path, number=number) for number in (0, 1)]
+    with motors[0] as (left, left_trace), motors[1] as (right, right_trace):
+        options = [text.partition(":")[2].split(",") for text in (left, right)]
+        ports = [f"left.{options[0][2]}", f"right.{options[1][2]}"]
+        driver = ",".join([*left.split(",")[:2], *ports, *options[0][3:]])
+        session.write_text(SESSION.format(driver=driver))
+        done = entrain(None, "session", str(session), "--out", str(study), *ARMED)
+    assert done[::2] == (0, ""), done
+    folder = study / "sub-P01/ses-1"
+    rows = [row.split("\t") for row in (folder / "events.tsv").read_text().splitlines()]
+    pulses = [(row[3], row[7], row[8]) for row in rows if row[6] == "pulse"]
+    right, left = ("both legs", "right", "1"), ("both legs", "left", "1")
+    assert pulses == [("one leg", "right", "1"), right, left]
+    # The first pulse is half as high, on each ankle.
+    assert max(torques_of(right_trace)) == pytest.approx(0.5, abs=0.1)
+    assert max(torques_of(left_trace)) == pytest.approx(0.5, abs=0.1)
+    recorded = read_run(folder / "bags/block-02")
+    assert recorded.differences == ()
+    assert [(side, timing.measured is None) for side, timing in recorded.delivered] == [
+        (Side.RIGHT, False),
+        (Side.LEFT, False),
+    ]
 
 
 def test_killed_perturbator_leaves_zero_torque_by_the_motors_own_watchdog(tmp_path, motor):

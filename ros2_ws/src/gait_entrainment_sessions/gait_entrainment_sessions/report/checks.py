@@ -153,10 +153,12 @@ def _limits(reader: BagReader) -> Check:
         return Check("limits", DOUBTFUL, "the robot did not tell them")
     last = setups[-1]
     limits = ", ".join(f"{n} {v:g}" for n, v in zip(last.limit_names, last.limits, strict=True))
-    told = f"{last.driver} {last.device}".strip()
-    armed = f"; armed by {last.armed_by}" if last.armed_by else ""
-    proofs = "".join(f"; {text}" for text in (last.watchdog, last.preflight) if text)
-    return Check("limits", GOOD, f"{told}{armed}{proofs}; {limits}")
+    told = []
+    for robot in {setup.side: setup for setup in setups}.values():
+        armed = f"armed by {robot.armed_by}" if robot.armed_by else ""
+        known = f"{robot.driver} {robot.device}".strip(), armed, robot.watchdog, robot.preflight
+        told += filter(None, known)
+    return Check("limits", GOOD, "; ".join([*told, limits]))
 
 
 def _faults(reader: BagReader) -> Check:
