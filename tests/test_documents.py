@@ -10,6 +10,7 @@ from pathlib import Path
 
 from gait_entrainment.protocol import DEFAULT_PROTOCOL, FIELDS
 from gait_entrainment_nodes.messaging import topics
+from gait_entrainment_sensors.sources import ENCODER, FOOT, SHANK, SWITCH
 
 ROOT = Path(__file__).parents[1]
 SOURCES = ROOT / "ros2_ws/src"
@@ -39,6 +40,7 @@ def type_name(message_type):
 
 def test_topics_have_the_type_and_quality_that_the_page_says():
     named = [t if type(t) is tuple else (t,) for t in vars(topics).values()]
+    named += map(topics.sensor_topics, (SWITCH, FOOT, SHANK, ENCODER))
     actual = {
         topic.name: (type_name(topic.type), topic.qos)
         for group in named

@@ -16,7 +16,6 @@ TESTS = Path(__file__).parents[2] / "ros2_ws/src/gait_entrainment_sensors/test"
 sys.path.insert(0, str(TESTS))
 
 from public_data import belt, children, foot_rates, foot_reference  # noqa: E402
-from scoring import score  # noqa: E402
 
 from gait_entrainment.conventions import EventKind, Side  # noqa: E402
 from gait_entrainment.experiment import GaitError  # noqa: E402
@@ -29,6 +28,7 @@ from gait_entrainment_sensors.emulated import EmulatedSensor  # noqa: E402
 from gait_entrainment_sensors.offline import detect, number  # noqa: E402
 from gait_entrainment_sensors.recording import Stream  # noqa: E402
 from gait_entrainment_sensors.rehearsal import Sensors, rehearse  # noqa: E402
+from gait_entrainment_sensors.scoring import score  # noqa: E402
 
 pytestmark = pytest.mark.benchmark
 

@@ -6,24 +6,20 @@ The names of the topics, without ROS: for the nodes that publish them and for re
 
 Names are relative, so that a namespace or a remapping moves a whole experiment, except for those
 that others expect at the root. Types and quality of service are in
-``gait_entrainment_nodes/messaging/topics.py``.
+``gait_entrainment_nodes/messaging/topics.py``; those of sensors have their names in
+``gait_entrainment_sensors/sources.py``.
 """
 
 # Of the walker.
 JOINT_STATES = "joint_states"
 GAIT_EVENTS = "gait_events"
 ANKLE_TORQUE = "ankle_torque"
-GROUND_REACTION = ("ground_reaction/left", "ground_reaction/right")
 WALKER_PROGRESS = "walker/progress"
 WALKER_PROGRESS_BEFORE = "walker_sim/progress"  # its name in bags of earlier versions
 WALKER_TIMING = "walker_sim/timing"
 CLOCK = "/clock"
 
-# Of sensors on a person, or on the simulated walker: then its exact events are beside them.
-FOOT_SWITCH = ("foot_switch/left", "foot_switch/right")
-FOOT_IMU = ("imu/left_foot", "imu/right_foot")
-SHANK_IMU = ("imu/left_shank", "imu/right_shank")
-ANKLE_ENCODER = ("ankle_encoder/left", "ankle_encoder/right")
+# The exact events of a walker that is seen through sensors.
 TRUE_EVENTS = "truth/gait_events"
 TRUE_PROGRESS = "truth/progress"
 

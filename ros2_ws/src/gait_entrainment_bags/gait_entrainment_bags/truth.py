@@ -5,7 +5,6 @@
 
 import math
 import statistics
-from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -15,10 +14,11 @@ from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
 from gait_entrainment.gait import Analysis, GaitEvent
 from gait_entrainment.settings import Setting
 from gait_entrainment_commands.outcome import final_phase_lag
+from gait_entrainment_sensors.scoring import score
 
 TOE_OFF_BIAS = Setting("by how much toe-offs are detected late", unit="s", least=-0.2, most=0.2)
-# An event is found if one of its kind and side was detected within this share of a stride.
-WINDOW = 0.25
+# An event is found if one of its kind and side was detected within this share of a step.
+WINDOW = 0.5
 
 
 def without_bias(events: Iterable[GaitEvent], bias: float) -> list[GaitEvent]:
@@ -52,34 +52,27 @@ def lag_shift(detected: Analysis, exact: Analysis) -> dict[str, float | None]:
 def _errors_of(
     kind: EventKind, detected: Sequence[GaitEvent], truth: Sequence[GaitEvent]
 ) -> dict[str, Any]:
-    errors: list[float] = []
-    events = false = 0
+    start = min((e.stamp for e in truth), default=0)
+
+    def times(events: Sequence[GaitEvent], *sides: Side) -> list[float]:
+        stamps = sorted(e.stamp for e in events if e.kind is kind and e.side in sides)
+        return [(stamp - start) / NANOSECONDS_PER_SECOND for stamp in stamps]
+
+    steps = [b - a for a, b in pairwise(times(truth, *Side))]
+    window = WINDOW * statistics.median(steps) if steps else 0.0
+    feet = []
     for side in Side:
-        found, real = (
-            sorted(e.stamp for e in events if (e.kind, e.side) == (kind, side))
-            for events in (detected, truth)
-        )
-        if len(real) < 2 or not found:
-            continue
-        window = WINDOW * statistics.median(b - a for a, b in pairwise(real))
-        real = [stamp for stamp in real if found[0] - window <= stamp <= found[-1] + window]
-        events += len(real)
-        taken: set[int] = set()
-        for stamp in found:
-            place = bisect_left(real, stamp)
-            near = min(real[max(place - 1, 0) : place + 1], key=lambda true: abs(stamp - true))
-            if near in taken or abs(stamp - near) > window:
-                false += 1
-                continue
-            taken.add(near)
-            errors.append((stamp - near) / NANOSECONDS_PER_SECOND)
+        if found := times(detected, side):
+            first, last = found[0] - window, found[-1] + window
+            feet.append(([t for t in times(truth, side) if first <= t <= last], found))
+    told = score(feet, window)
     return {
-        "events": events,
-        "found": len(errors),
-        "missed": events - len(errors),
-        "false": false,
-        "bias": statistics.fmean(errors) if errors else None,
-        "deviation": statistics.stdev(errors) if len(errors) > 1 else None,
+        "events": told.reference,
+        "found": told.found,
+        "missed": told.missed,
+        "false": told.false,
+        "bias": told.bias if told.errors else None,
+        "deviation": told.deviation if len(told.errors) > 1 else None,
     }
 
 

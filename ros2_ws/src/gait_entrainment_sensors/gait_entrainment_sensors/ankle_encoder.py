@@ -4,18 +4,13 @@
 """The ankle angle that the robot's encoder measures: the fallback where there is nothing else."""
 
 import math
-import statistics
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.settings import setting
-from gait_entrainment_sensors.detection import Detection, Detector, DetectorSettings
-
-# Strides whose median period and range are the person's own.
-_OWN_STRIDES = 7
+from gait_entrainment_sensors.detection import Detection, Detector, DetectorSettings, OwnMedian
 
 
 @dataclass(frozen=True)
@@ -55,8 +50,7 @@ class AnkleEncoderDetector(Detector):
 
     def __init__(self, side: Side, settings: Any = None) -> None:
         super().__init__(side, settings)
-        self._periods: deque[float] = deque(maxlen=_OWN_STRIDES)
-        self._ranges: deque[float] = deque(maxlen=_OWN_STRIDES)
+        self._period, self._range = OwnMedian(), OwnMedian()
         self._unlikely = 0
         self._restart()
 
@@ -98,10 +92,7 @@ class AnkleEncoderDetector(Detector):
         if extreme != extreme or (angle > extreme) == self._rising:
             self._extreme, self._at = angle, time
             return found
-        least = self.settings.least_range
-        if self._ranges:
-            least = max(least, 0.5 * statistics.median(self._ranges))
-        if abs(angle - extreme) < least:
+        if abs(angle - extreme) < max(self.settings.least_range, 0.5 * self._range.value):
             return found
         if self._rising:
             self._take_peak(extreme, self._at)
@@ -114,9 +105,9 @@ class AnkleEncoderDetector(Detector):
     def _take_peak(self, angle: float, at: float) -> None:
         """Take a peak of plantarflexion; foresee the strike after it."""
         if angle - self._trough >= self.settings.least_range:
-            self._ranges.append(angle - self._trough)
+            self._range.add(angle - self._trough)
         period = at - self._peak
         self._peak = at
         if 0.3 <= period <= 5.0:
-            self._periods.append(period)
-            self._strike = at + self.settings.strike_share * statistics.median(self._periods)
+            self._period.add(period)
+            self._strike = at + self.settings.strike_share * self._period.value

@@ -9,7 +9,9 @@ of other packages are found under the entry point ``gait_entrainment.detectors``
 """
 
 import math
+import statistics
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import entry_points
@@ -25,6 +27,8 @@ ENTRY_POINTS = "gait_entrainment.detectors"
 _LONG_ENOUGH = 10.0
 # A signal that moves and reads the same for so long has met the end of its range [s].
 _HELD = 0.05
+# Of the person's own stances, swings, peaks: so many make the median.
+_OWN_STEPS = 7
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +40,21 @@ class Detection:
     time: float  # estimated instant of the event
     detected_at: float  # time of the sample that decided it
     uncertainty: float  # standard deviation of ``time`` [s]
+
+
+class OwnMedian:
+    """The median of what the person's own latest steps show; 0 before there are so many."""
+
+    def __init__(self, known: int = 1) -> None:
+        self._known = known
+        self._latest: deque[float] = deque(maxlen=_OWN_STEPS)
+        self.value = 0.0
+
+    def add(self, value: float) -> None:
+        """Take what one step shows."""
+        self._latest.append(value)
+        if len(self._latest) >= self._known:
+            self.value = statistics.median(self._latest)
 
 
 @dataclass(frozen=True)

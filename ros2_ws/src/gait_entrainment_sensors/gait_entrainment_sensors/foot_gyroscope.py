@@ -69,7 +69,7 @@ class FootGyroscopeDetector(GyroscopeDetector):
         if rate < _FALLEN * self._peak:
             fall, peak = self._fall, self._peak
             self._peak, self._fall = 0.0, math.nan
-            if self._pushes.add(peak):
+            if self._pushes.is_step(peak):
                 found = self._found(EventKind.TOE_OFF, fall, time)
                 self._begin_swing(time)
         return found
@@ -105,7 +105,7 @@ class FootGyroscopeDetector(GyroscopeDetector):
         strike, peak = self._turn if turned else self._rest, self._peak
         self._enter(swinging=False, time=time)
         self._peak, self._fall = 0.0, math.nan
-        if not self._swings.add(peak):
+        if not self._swings.is_step(peak):
             self.counts.rejected += 1
             return []
         return self._found(EventKind.HEEL_STRIKE, strike, time)

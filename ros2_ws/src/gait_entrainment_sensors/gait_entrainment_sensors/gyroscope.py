@@ -8,20 +8,16 @@ Rates count positive where the toes turn down and the shank leans forward. So sw
 """
 
 import math
-import statistics
 from abc import abstractmethod
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.settings import setting
-from gait_entrainment_sensors.detection import Detection, Detector, DetectorSettings
+from gait_entrainment_sensors.detection import Detection, Detector, DetectorSettings, OwnMedian
 from gait_entrainment_sensors.mounting import Mounting, find_mounting
 
-# Steps whose median peak is the person's own.
-_OWN_STEPS = 7
 # Lean of the axis of swing from which on the toes turn in [rad]: 9 degrees.
 _TOES_IN = 0.15
 # Time constant of one of two poles with -3 dB at one hertz [s].
@@ -52,20 +48,23 @@ class GyroscopeSettings(DetectorSettings):
         return self.axis_x / length, self.axis_y / length, self.axis_z / length
 
 
-class Peaks:
+class Peaks(OwnMedian):
     """Peaks of the person's own steps, and the threshold that follows from them."""
 
     def __init__(self, least: float, share: float) -> None:
+        super().__init__()
         self._least, self._share = least, share
-        self._own: deque[float] = deque(maxlen=_OWN_STEPS)
-        self.threshold = least
 
-    def add(self, peak: float) -> bool:
+    @property
+    def threshold(self) -> float:
+        """What the peak of a step exceeds."""
+        return max(self._least, self._share * self.value)
+
+    def is_step(self, peak: float) -> bool:
         """Take a peak; whether it is that of a step. Also one that is none moves the median."""
         step = peak >= self.threshold
         if peak >= self._least:
-            self._own.append(peak)
-            self.threshold = max(self._least, self._share * statistics.median(self._own))
+            self.add(peak)
         return step
 
 

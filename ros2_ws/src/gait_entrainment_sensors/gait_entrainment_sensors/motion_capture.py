@@ -3,8 +3,10 @@
 
 """Recordings of a motion laboratory: C3D files with force plates and markers."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -17,22 +19,24 @@ from gait_entrainment_sensors.recording import RecordingError
 
 Floats = NDArray[np.float64]
 
-# Names of markers in the usual sets, by what they are here; the pelvis is the mean of those there.
+# Names of markers in the usual sets, in capitals and without the signs between, by what they are
+# here; where there are several, it is their mean.
+_HEEL = ("HEE", "HEEL", "CAL", "FCC")
+_TOE = ("TOE", "MT1", "MT2", "MT5", "MTH2", "FM1", "FM2", "FM5")
+_PELVIS = ("SACR", "SACRUM", "VSAC", "LPSI", "RPSI", "LPSIS", "RPSIS", "LIPS", "RIPS")
 MARKERS: dict[str, tuple[str, ...]] = {
-    "left_heel": ("LHEE", "L_HEE", "LCAL", "L_FCC", "LFCC", "LHEEL"),
-    "right_heel": ("RHEE", "R_HEE", "RCAL", "R_FCC", "RFCC", "RHEEL"),
-    "left_toe": ("LTOE", "L_TOE", "LMT2", "LFM2", "L_FM2"),
-    "right_toe": ("RTOE", "R_TOE", "RMT2", "RFM2", "R_FM2"),
-    "pelvis": ("SACR", "SACRUM", "LPSI", "RPSI", "LPSIS", "RPSIS", "L_IPS", "R_IPS"),
-}
+    f"{side.name.lower()}_{what}": tuple(side.name[0] + name for name in names)
+    for side in Side
+    for what, names in (("heel", _HEEL), ("toe", _TOE))
+} | {"pelvis": _PELVIS}
 # A foot whose middle is further from the centre of pressure does not press there [m].
 _REACH = 0.25
+# A foot that swings is faster, also in slow walking [m/s].
+_STANDING = 0.3
 # Standard deviation of events from markers: 94 % were within 16.7 ms (Zeni 2008) [s].
 _MARKER_UNCERTAINTY = 0.009
 # What a foot travels at least, relative to the pelvis, in a step [m]; and for how long [s].
 _LEAST_TRAVEL, _LEAST_STRIDE = 0.1, 0.4
-# How high a foot on the ground holds its markers above their lowest [m].
-_LOW = 0.05
 
 
 @dataclass(frozen=True)
@@ -61,11 +65,11 @@ def read_c3d(
     path: Path, names: Mapping[str, str] | None = None, *, plates: bool = True
 ) -> MotionCapture:
     """
-    Read a C3D file.
+    Read a C3D file; its times count from the first frame that it holds.
 
     ``names`` says which of its markers is left_heel, right_toe, ..., pelvis; ``plates`` whether
-    its force plates are wanted. The sign of vertical forces is taken such that feet press the
-    plates down. Raises RecordingError if it is none, or lacks a marker that is named.
+    its force plates are wanted. Raises RecordingError if it is none, holds nothing, or lacks a
+    marker that is named.
     """
     import ezc3d  # for this alone: it takes a quarter of a second to load
 
@@ -76,15 +80,22 @@ def read_c3d(
         raise RecordingError(f"{path}: cannot be read as C3D: {reason}") from None
     # Some systems put the subject's name and a colon before each.
     labels = [label.rpartition(":")[2] for label in file["parameters"]["POINT"]["LABELS"]["value"]]
+    plain = [re.sub(r"[\W_]", "", label).upper() for label in labels]
     unit = _unit(path, file["parameters"]["POINT"].get("UNITS", {"value": ["mm"]})["value"])
     points = np.moveaxis(np.asarray(file["data"]["points"][:3], float), 0, -1) * unit
+    points[~points.any(axis=-1)] = np.nan  # hidden, as some systems write it
+    seen = np.any(np.isfinite(points).all(axis=-1), axis=-1).tolist()
     rate = float(file["header"]["points"]["frame_rate"])
+    if not rate:
+        raise RecordingError(f"{path}: holds no frame")
     markers = {}
     for what, usual in MARKERS.items():
-        wanted = (names[what],) if names and what in names else usual
-        found = [points[labels.index(name)] for name in wanted if name in labels]
-        if found:
-            markers[what] = np.mean(found, axis=0)
+        wanted, known = usual, plain
+        if names and what in names:
+            wanted, known = (names[what],), labels
+        found = [known.index(name) for name in wanted if name in known]
+        if found := [place for place in found if seen[place]]:
+            markers[what] = np.mean(points[found], axis=0)
         elif names and what in names:
             raise RecordingError(
                 f"{path}: has no marker {names[what]}, which is to be {what}; it has: "
@@ -100,7 +111,10 @@ def read_c3d(
 def _unit(path: Path, units: Sequence[str]) -> float:
     """Return the length [m] of a unit."""
     known = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
-    if (name := str(units[0] if units else "mm").strip().lower()) not in known:
+    name = str(units[0] if units else "mm").strip().lower() or "mm"
+    if name.startswith("met"):  # ezc3d keeps four letters
+        name = "m"
+    if name not in known:
         raise RecordingError(f"{path}: POINT:UNITS: {name!r}; allowed: {', '.join(known)}")
     return known[name]
 
@@ -118,9 +132,6 @@ def _vertical(platforms: Sequence[Mapping[str, Any]]) -> int:
 def _plate(path: Path, platform: Mapping[str, Any], rate: float, up: int) -> Plate:
     """Return a plate whose force was sampled at a rate [Hz]."""
     force = np.asarray(platform["force"][up], float)
-    loaded = force[np.abs(force) > 0.5 * np.max(np.abs(force), initial=0.0)]
-    if loaded.size and np.median(loaded) < 0.0:
-        force = -force
     unit = _unit(path, [str(platform.get("unit_position", "mm"))])
     corners = np.asarray(platform["corners"], float) * unit
     pressure = np.asarray(platform["center_of_pressure"], float).T * unit
@@ -141,9 +152,9 @@ def events_on_plates(
     """
     told: list[str] = []
     found: list[Detection] = []
-    wanted = ("left_heel", "left_toe", "right_heel", "right_toe")
-    missing = [name for name in wanted if name not in capture.markers]
-    if sides is None and missing:
+    feet = [_markers_of(capture, side) for side in Side]
+    if sides is None and not all(feet):
+        missing = [name for name in MARKERS if name not in capture.markers and name != "pelvis"]
         raise RecordingError(
             f"{capture.path}: nothing tells whose foot is on which plate: it lacks markers "
             f"{', '.join(missing)}; name them with --marker, or the feet with --plates"
@@ -152,25 +163,27 @@ def events_on_plates(
         raise RecordingError(
             f"{capture.path}: holds {len(capture.plates)} plates; --plates names {len(sides)}"
         )
+    contacts: list[list[Detection]] = []
     for index, plate in enumerate(capture.plates):
-        detector = chosen.detector(Side.LEFT if sides is None else sides[index], chosen.settings)
-        events: list[Detection] = []
-        for time, force in zip(plate.times.tolist(), plate.force.tolist(), strict=True):
-            events += detector.add(time, (force,))
-        if sides is None:
-            events, doubtful = _of_their_feet(capture, plate, events)
-            if doubtful:
-                told.append(f"plate {index + 1}: {doubtful} contacts of both feet or of neither")
-        else:
+        times, samples = plate.times.tolist(), plate.force[:, np.newaxis].tolist()
+        settings = chosen.detector.calibrated(chosen.settings, times, samples)
+        detector = chosen.detector(Side.LEFT if sides is None else sides[index], settings)
+        events = [e for t, v in zip(times, samples, strict=True) for e in detector.add(t, v)]
+        if sides is not None:
+            found += events
             told += detector.troubles()
-        found += events
-    return found, tuple(told)
+            continue
+        ours, doubtful = _of_their_feet(capture, plate, events)
+        contacts += ours
+        if doubtful:
+            told.append(f"plate {index + 1}: {doubtful} contacts of both feet or of neither")
+    return found + _merged(contacts), tuple(told)
 
 
 def _of_their_feet(
     capture: MotionCapture, plate: Plate, events: Sequence[Detection]
-) -> tuple[list[Detection], int]:
-    """Return a plate's events with the side of the foot, and how many contacts were nobody's."""
+) -> tuple[list[list[Detection]], int]:
+    """Return a plate's contacts with the side of the foot, and how many were nobody's."""
     contacts: list[list[Detection]] = []
     for event in events:
         if event.kind is EventKind.HEEL_STRIKE or not contacts:
@@ -186,28 +199,49 @@ def _of_their_feet(
             end = min(start + 0.3, float(plate.times[-1]))
         side = _whose(capture, plate, start, end)
         doubtful += side is None
-        found += [] if side is None else [replace(event, side=side) for event in contact]
+        found += [] if side is None else [[replace(event, side=side) for event in contact]]
     return found, doubtful
+
+
+def _merged(contacts: Sequence[Sequence[Detection]]) -> list[Detection]:
+    """Return the events of contacts; of a foot on two plates at once the first and the last."""
+    found: list[Detection] = []
+    for side in Side:
+        own = sorted((list(c) for c in contacts if c[0].side is side), key=lambda c: c[0].time)
+        for before, after in pairwise(own):
+            if after[0].time < before[-1].time:  # a strike is not the foot's first, nor a toe-off
+                after[:] = [before[0], max(before[-1], after[-1], key=lambda e: e.time)]
+                before.clear()
+        found += [event for contact in own for event in contact]
+    return found
+
+
+def _markers_of(capture: MotionCapture, side: Side) -> list[Floats]:
+    """Return the markers of a foot that are there, (m, 3) [m] each."""
+    names = (f"{side.name.lower()}_{what}" for what in ("heel", "toe"))
+    return [capture.markers[name] for name in names if name in capture.markers]
 
 
 def _whose(capture: MotionCapture, plate: Plate, start: float, end: float) -> Side | None:
     """Return the foot that presses on a plate between two instants [s]; None if doubtful."""
     across = [axis for axis in range(3) if axis != capture.up]
     during = (capture.times >= start) & (capture.times <= end)
-    middle = np.argmin(np.abs(plate.times - 0.5 * (start + end)))
-    near: list[Side] = []
+    times = capture.times[during]
+    pressure = np.stack([np.interp(times, plate.times, p) for p in plate.pressure.T[across]], 1)
+    away, stands = [], []
     for side in Side:
-        leg = side.name.lower()
-        heel, toe = capture.markers[f"{leg}_heel"], capture.markers[f"{leg}_toe"]
-        centre = 0.5 * (heel + toe)
-        at = np.argmin(np.abs(capture.times - plate.times[middle]))
-        away = np.linalg.norm((centre[at] - plate.pressure[middle])[across])
-        height = np.minimum(heel[:, capture.up], toe[:, capture.up])
-        low = height < np.nanmin(height) + _LOW
-        inside = np.all((centre > plate.low)[:, across] & (centre < plate.high)[:, across], axis=1)
-        if (low[at] and away <= _REACH) or np.mean((low & inside)[during]) > 0.2:
-            near.append(side)
-    return near[0] if len(near) == 1 else None
+        foot = np.array(_markers_of(capture, side))  # (markers, m, 3)
+        speed = np.linalg.norm(np.gradient(foot, capture.times, axis=1), axis=-1)[:, during]
+        points = foot[:, during][..., across]
+        inside = (points > plate.low[across]) & (points < plate.high[across])
+        # A marker that is hidden neither stands nor is near.
+        stands.append(np.mean(np.any((speed < _STANDING) & inside.all(axis=-1), axis=0)))
+        distance = np.linalg.norm(points - pressure, axis=-1)
+        distance = distance[np.isfinite(distance)]
+        away.append(float(np.median(distance)) if distance.size else np.inf)
+    side = Side(int(np.argmin(away)))
+    both = stands[side.other] > 0.2
+    return None if both or away[side] > _REACH else side
 
 
 def events_of_markers(capture: MotionCapture) -> list[Detection]:
@@ -226,9 +260,10 @@ def events_of_markers(capture: MotionCapture) -> list[Detection]:
             f"{capture.path}: lacks markers {', '.join(missing)}; name them with --marker"
         )
     seen = {name: _without_gaps(points) for name, points in capture.markers.items()}
-    foot = np.mean([seen[f"{s}_toe"] - seen[f"{s}_heel"] for s in ("left", "right")], axis=(0, 1))
-    foot[capture.up] = 0.0
-    forward = foot / max(np.linalg.norm(foot), 1e-9)
+    # Where the feet point, at each instant: people turn round.
+    feet = np.mean([seen[f"{s}_toe"] - seen[f"{s}_heel"] for s in ("left", "right")], axis=0)
+    feet[:, capture.up] = 0.0
+    forward = feet / np.maximum(np.linalg.norm(feet, axis=1, keepdims=True), 1e-9)
     end = float(capture.times[-1])
     step = float(capture.times[1])
     found = []
@@ -238,7 +273,8 @@ def events_of_markers(capture: MotionCapture) -> list[Detection]:
             (EventKind.HEEL_STRIKE, "heel", 1.0),
             (EventKind.TOE_OFF, "toe", -1.0),
         ):
-            ahead = sign * (seen[f"{leg}_{marker}"] - seen["pelvis"]) @ forward
+            away = seen[f"{leg}_{marker}"] - seen["pelvis"]
+            ahead = sign * np.sum(away * forward, axis=1)
             peaks, _ = find_peaks(
                 ahead, prominence=_LEAST_TRAVEL, distance=max(_LEAST_STRIDE / step, 1)
             )

@@ -5,26 +5,20 @@
 Signals that were recorded elsewhere: a table with named columns.
 
 A column is named by side and signal, in SI units: ``left_force_z``, ``right_foot_gyro_y``. One in
-degrees, or degrees per second, says so: ``right_foot_gyro_y_deg``. ``SIGNALS`` lists all.
+degrees, or degrees per second, says so: ``right_foot_gyro_y_deg``.
 """
 
 import csv
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.errors import UsageError
+from gait_entrainment_sensors.detection import ChosenDetector
+from gait_entrainment_sensors.sources import source_of
 
-# What each detector reads, in the order of its signals; the first that is recorded is taken.
-SIGNALS: dict[str, tuple[str, ...]] = {
-    "vertical_force": ("force_z",),
-    "foot_switch": ("heel", "toe"),
-    "foot_gyroscope": ("foot_gyro_x", "foot_gyro_y", "foot_gyro_z"),
-    "shank_gyroscope": ("shank_gyro_x", "shank_gyro_y", "shank_gyro_z"),
-    "ankle_encoder": ("ankle_angle", "ankle_torque"),
-}
 IN_DEGREES = "_deg"
 
 
@@ -84,17 +78,15 @@ def column_numbers(path: Path, name: str, texts: Sequence[str]) -> list[float]:
 
 def read_streams(
     path: Path,
-    detector: str | None = None,
-    signals: Sequence[str] = (),
+    detectors: Iterable[ChosenDetector],
     columns: Mapping[str, str] | None = None,
     rate: float | None = None,
-) -> tuple[str, list[Stream]]:
+) -> tuple[ChosenDetector, list[Stream]]:
     """
-    Return the detector that fits a table, and what it reads of each foot.
+    Return the first of some detectors that fits a table, and what it reads of each foot.
 
-    ``detector`` chooses one; without, the first of `SIGNALS` whose columns are there. ``signals``
-    names what a detector of another package reads. ``columns`` says which column of the file is
-    meant by a name; ``rate`` [Hz] stands for a column ``time`` [s].
+    ``columns`` says which column of the file is meant by a name; ``rate`` [Hz] stands for a
+    column ``time`` [s].
     Raises RecordingError if the file cannot be read or columns are missing.
     """
     table = read_table(path)
@@ -106,18 +98,20 @@ def read_streams(
             )
         table[name] = table[column]
     times = _times(path, table, rate)
-    wanted = {detector: SIGNALS.get(detector, tuple(signals))} if detector else SIGNALS
-    for name, signals_read in wanted.items():
+    needed = []
+    for chosen in detectors:
+        signals = chosen.detector.signals
+        names = [source_of(chosen.name, signals).column + signal for signal in signals]
         streams = [
             Stream(side, times, values)
             for side in Side
-            if (values := _values(path, table, side, signals_read)) is not None
+            if (values := _values(path, table, side, names)) is not None
         ]
         if streams:
-            return name, streams
-    needed = " or ".join(" and ".join(f"SIDE_{s}" for s in names) for names in wanted.values())
+            return chosen, streams
+        needed.append(" and ".join(f"SIDE_{name}" for name in names))
     raise RecordingError(
-        f"{path}: lacks columns {needed}, or --column; it has: {', '.join(table)}"
+        f"{path}: lacks columns {' or '.join(needed)}, or --column; it has: {', '.join(table)}"
     )
 
 

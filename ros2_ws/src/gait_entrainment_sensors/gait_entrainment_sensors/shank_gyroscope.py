@@ -102,7 +102,7 @@ class ShankGyroscopeDetector(GyroscopeDetector):
             return []
         peak, self._peak = self._peak, 0.0
         self._enter(swinging=False, time=time)
-        if not self._swings.add(peak):
+        if not self._swings.is_step(peak):
             self.counts.rejected += 1
             return []
         return self._found(EventKind.HEEL_STRIKE, self._at, time)

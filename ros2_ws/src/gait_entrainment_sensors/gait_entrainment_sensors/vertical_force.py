@@ -4,19 +4,17 @@
 """The vertical force under one foot: force plate, belt of an instrumented treadmill, insole."""
 
 import math
-import statistics
-from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
+
+import numpy as np
 
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.settings import SettingError, setting
-from gait_entrainment_sensors.detection import Detection, Detector, DetectorSettings
+from gait_entrainment_sensors.detection import Detection, Detector, DetectorSettings, OwnMedian
 
-# Stances and swings whose median is the person's own.
-_OWN_STEPS = 7
-# From so many on it is known.
+# Steps from which on the person's own stances and swings are known.
 _KNOWN_STEPS = 3
 
 
@@ -24,6 +22,7 @@ _KNOWN_STEPS = 3
 class VerticalForceSettings(DetectorSettings):
     """What the detector can be told."""
 
+    sign: float = setting(1.0, "-1: the foot's force on the ground is measured", "1", (-1, 1))
     strike_force: float = setting(40.0, "force that a foot on the ground exceeds", "N", (1, 500))
     toe_off_force: float = setting(20.0, "force at both events", "N", (0.5, 500.0))
     refractory: float = setting(0.1, "after toe-off no strike for", "s", (0.0, 1.0))
@@ -70,18 +69,33 @@ class VerticalForceDetector(Detector):
     impossible = 10_000.0
     reached = 100.0
     suspicion = (
-        "the force of the ground on the foot is expected in N, upwards positive: not in kN or "
-        "body weights"
+        "the force of the ground on the foot is expected in N, upwards positive (else set "
+        "sign=-1): not in kN or body weights"
     )
     uncertainty = (0.003, 0.003)
 
     def __init__(self, side: Side, settings: Any = None) -> None:
         super().__init__(side, settings)
-        self._stances: deque[float] = deque(maxlen=_OWN_STEPS)
-        self._swings: deque[float] = deque(maxlen=_OWN_STEPS)
+        self._stances, self._swings = OwnMedian(_KNOWN_STEPS), OwnMedian(_KNOWN_STEPS)
+        self._sign = math.copysign(1.0, self.settings.sign)
         self._zero = 0.0  # [N]
         self._downwards = 0  # samples that press the foot down
         self._restart()
+
+    @classmethod
+    def calibrated(
+        cls,
+        settings: Any,
+        times: Sequence[float],  # noqa: ARG003
+        samples: Sequence[Sequence[float]],
+    ) -> Any:
+        """Return settings with the sign that a recording tells: feet press the ground down."""
+        force = np.array([values[0] for values in samples])
+        force = force[np.isfinite(force)]
+        if not force.size:
+            return settings
+        loaded = np.abs(force) >= 0.5 * np.quantile(np.abs(force), 0.99)
+        return replace(settings, sign=math.copysign(1.0, np.median(force[loaded])))
 
     @property
     def latency(self) -> float:
@@ -107,7 +121,7 @@ class VerticalForceDetector(Detector):
     def _take(self, time: float, values: Sequence[float]) -> list[Detection]:
         self._watch(time, values[0])
         settings, before = self.settings, self._force
-        force = self._force = values[0] - self._zero
+        force = self._force = self._sign * values[0] - self._zero
         lower = settings.toe_off_force
         if self._on:
             if force >= lower:
@@ -115,17 +129,15 @@ class VerticalForceDetector(Detector):
             return self._leave(time, before, force)
         if force < lower:
             self._on, self._rise = False, math.nan
-            if force > -lower:
-                interval = time - self._before
-                self._zero += force * interval / (settings.zeroing_time + interval)
-            elif force < -100.0:
-                self._downwards += 1
-            return []
-        if before < lower:
+            self._downwards += force < -100.0
+        elif before < lower:
             self._rise = time - (time - self._before) * (force - lower) / (force - before)
-        if force < settings.strike_force:
-            return []
-        return self._meet(time)
+        if force >= settings.strike_force:
+            return self._meet(time)
+        if force > -settings.strike_force:  # in the air, however the sensor was zeroed
+            interval = time - self._before
+            self._zero += force * interval / (settings.zeroing_time + interval)
+        return []
 
     def _meet(self, time: float) -> list[Detection]:
         """Begin a contact; a strike if it is this foot's own."""
@@ -136,10 +148,10 @@ class VerticalForceDetector(Detector):
         if not seen_off:
             self._strike = math.nan
             return []
-        least = max(self.settings.refractory, self._bound(self._swings, self.settings.least_share))
+        least = max(self.settings.refractory, self.settings.least_share * self._swings.value)
         self._own = not swing < least
         if self.settings.refractory <= swing < self.settings.longest_stance:
-            self._swings.append(swing)
+            self._swings.add(swing)
         if not self._own:
             self.counts.rejected += 1
             return []
@@ -151,8 +163,8 @@ class VerticalForceDetector(Detector):
         lower = settings.toe_off_force
         toe_off = time - (time - self._before) * (lower - force) / (before - force)
         stance = toe_off - self._strike
-        least = max(settings.shortest_stance, self._bound(self._stances, settings.least_share))
-        most = self._bound(self._stances, settings.most_share) or math.inf
+        least = max(settings.shortest_stance, settings.least_share * self._stances.value)
+        most = settings.most_share * self._stances.value or math.inf
         walks = stance < settings.longest_stance  # else somebody stood
         # Of a contact that was there at the start the strike is not known.
         believed = self._own and not stance < least and not (walks and stance > most)
@@ -160,7 +172,7 @@ class VerticalForceDetector(Detector):
         if self._own:  # else the swing in progress goes on
             self._toe_off = toe_off if believed else math.nan
         if self._own and walks and stance >= settings.shortest_stance:
-            self._stances.append(stance)
+            self._stances.add(stance)
         if not believed:
             self.counts.rejected += 1
             return []
@@ -176,8 +188,3 @@ class VerticalForceDetector(Detector):
                 self._on = None
             self._on_since, self._lowest = time, math.inf
         return []
-
-    @staticmethod
-    def _bound(own: deque[float], share: float) -> float:
-        """Return a share of the own median [s]; zero before that is known."""
-        return share * statistics.median(own) if len(own) >= _KNOWN_STEPS else 0.0

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from public_data import foot_rates, foot_reference
-from scoring import score
 from walks import OFFSET, STANCE, STRIDE, fed, foot_rate, sampled, times
 
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment_sensors.detection import find_detector
 from gait_entrainment_sensors.foot_gyroscope import FootGyroscopeDetector
 from gait_entrainment_sensors.offline import detect
+from gait_entrainment_sensors.scoring import score
 
 STRIKE, TOE_OFF = EventKind
 UPRIGHT = FootGyroscopeDetector.Settings(axis_y=1.0)

@@ -24,17 +24,22 @@ LABELS = ["LHEE", "LTOE", "RHEE", "RTOE", "SACR"]
 
 
 def feet(side, time):
-    """Return heel and toe [mm] of a foot that steps on its plate, else is in the air."""
+    """Return heel and toe [mm] of a foot: it swings to its plate close to the ground, and on."""
     plate, _, strike, toe_off = next(c for c in CONTACTS if c[1] is side)
-    on = strike - 0.05 <= time <= toe_off + 0.05
-    middle = 300.0 + 600.0 * plate
-    x = middle if on else middle + 600.0 * (1 if time > toe_off else -1)
-    y, height = (150.0 if side is Side.LEFT else 250.0), (30.0 if on else 200.0)
+    swung = max(strike - 0.05 - time, 0.0) - max(time - toe_off - 0.05, 0.0)  # [s]
+    x = 300.0 + 600.0 * plate - 2000.0 * swung
+    y, height = (150.0 if side is Side.LEFT else 250.0), (60.0 if swung else 30.0)
     return [x - 100.0, y, height], [x + 100.0, y, height]
 
 
-def write(path, *, sign=-1.0, wrong=False, units="mm", labels=LABELS, plates=2, points=None):
-    """Write two plates, and feet on them; ``wrong``: the left foot on the right foot's, too."""
+def write(
+    path, *, sign=-1.0, wrong=False, units="mm", labels=LABELS, plates=2, points=None, border=False
+):
+    """
+    Write two plates, and feet on them.
+
+    ``wrong``: the left foot on the right foot's, too; ``border``: all 0.25 m further ahead.
+    """
     file = ezc3d.c3d()
     point, analog, plate = (file["parameters"][n] for n in ("POINT", "ANALOG", "FORCE_PLATFORM"))
     point["LABELS"]["value"], point["UNITS"]["value"] = labels, [units]
@@ -44,6 +49,8 @@ def write(path, *, sign=-1.0, wrong=False, units="mm", labels=LABELS, plates=2, 
         left, right = (feet(side, frame / RATE) for side in Side)
         if wrong:
             left = [[x, 330.0 - y, z] for x, y, z in right]
+        if border:
+            right = [[x + 250.0, y, z] for x, y, z in right]
         data[:3, :, frame] = np.array([*left, *right, [0.0, 0.0, 900.0]]).T
     file["data"]["points"] = data if points is None else points
     file["data"]["analogs"] = np.zeros((1, 6 * plates, FRAMES * PER_FRAME))
@@ -57,6 +64,8 @@ def write(path, *, sign=-1.0, wrong=False, units="mm", labels=LABELS, plates=2, 
     for place, _, strike, toe_off in CONTACTS[:plates]:
         loaded = 800.0 * np.sin(np.pi * np.clip((time - strike) / (toe_off - strike), 0, 1))
         file["data"]["analogs"][0, 6 * place + 2] = sign * loaded
+        if border:  # the centre of pressure is at the border, too [N mm]
+            file["data"]["analogs"][0, 6 * place + 4] = sign * loaded * (500.0 * place - 250.0)
     corners = np.array([[0, 600, 600, 0], [0, 0, 400, 400], [0, 0, 0, 0]], float)
     plate["USED"]["value"] = np.array([plates])
     plate["TYPE"]["value"] = np.full(plates, 2)
@@ -83,6 +92,20 @@ def test_a_contact_of_both_feet_is_nobody_s_and_told(tmp_path):
     found, told = events_on_plates(read_c3d(write(tmp_path / "a.c3d", wrong=True)), FORCE)
     assert found == []
     assert "plate 1: 1 contacts of both feet" in told[0]
+
+
+def test_a_foot_on_two_plates_at_once_strikes_once(tmp_path, monkeypatch):
+    """The right foot comes down across the border of the plates, the heel first."""
+    monkeypatch.setattr(
+        f"{__name__}.CONTACTS",
+        [(0, Side.RIGHT, 1.0, 1.5), (1, Side.RIGHT, 1.2, 1.7), (1, Side.LEFT, 9.0, 9.5)],
+    )
+    found, _ = events_on_plates(read_c3d(write(tmp_path / "a.c3d", border=True)), FORCE)
+    assert [(d.kind, d.side) for d in found] == [(STRIKE, Side.RIGHT), (TOE_OFF, Side.RIGHT)]
+    assert [d.time for d in found] == [
+        pytest.approx(1.0, abs=0.012),
+        pytest.approx(1.7, abs=0.012),
+    ]
 
 
 def test_belts_are_named_where_there_are_no_markers(tmp_path):

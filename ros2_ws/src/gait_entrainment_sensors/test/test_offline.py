@@ -35,9 +35,14 @@ def walk(tmp_path):
     return path
 
 
+def streams_of(path, **options):
+    return read_streams(
+        path, map(find_detector, ("vertical_force", "foot_gyroscope", "ankle_encoder")), **options
+    )
+
+
 def events_of(path, **options):
-    name, streams = read_streams(path, **options)
-    return detect(find_detector(name), streams)
+    return detect(*streams_of(path, **options))
 
 
 def test_a_table_goes_through_and_comes_back(walk, tmp_path):
@@ -73,8 +78,8 @@ def test_columns_of_other_names_and_units_are_read(walk, tmp_path):
     columns = {"time": "t", "left_force_z": "Fz1", "right_force_z": "Fz2"}
     assert events_of(theirs, columns=columns) == events_of(walk)
     theirs.write_text("left_ankle_angle_deg\n180\n90\n")
-    name, (stream,) = read_streams(theirs, rate=100.0)
-    assert (name, stream.times) == ("ankle_encoder", [0.0, 0.01])
+    chosen, (stream,) = streams_of(theirs, rate=100.0)
+    assert (chosen.name, stream.times) == ("ankle_encoder", [0.0, 0.01])
     assert stream.values[0] == pytest.approx((3.14159265, 0.0))
 
 
@@ -102,7 +107,7 @@ def test_a_refused_table_is_named_with_its_column(tmp_path, text, words):
     path = tmp_path / "bad.csv"
     path.write_text(text)
     with pytest.raises(RecordingError) as refused:
-        read_streams(path)
+        streams_of(path)
     assert str(refused.value).startswith(f"{path}: ")
     assert words in str(refused.value)
     assert "\n" not in str(refused.value)

@@ -6,7 +6,6 @@
 from dataclasses import replace
 
 import pytest
-from scoring import score
 
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.gait import Verdict
@@ -14,6 +13,7 @@ from gait_entrainment.parameters import Variation
 from gait_entrainment.protocol import Protocol
 from gait_entrainment_sensors.detection import find_detector
 from gait_entrainment_sensors.rehearsal import Sensors, rehearse
+from gait_entrainment_sensors.scoring import score
 
 CHAINS = [
     ("treadmill_force", "vertical_force"),

@@ -5,7 +5,7 @@
 
 import argparse
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from gait_entrainment.conventions import EventKind, Side
@@ -32,6 +32,8 @@ EXAMPLES = """examples:
   entrain detect trial.c3d --detector markers --marker left_heel=L_FCC ...
 columns: docs/sensors.md
 """
+# Detectors in the order in which their signals are looked for.
+TRIED = ("vertical_force", "foot_switch", "foot_gyroscope", "shank_gyroscope", "ankle_encoder")
 # What is no detector: it needs the whole recording.
 BY_MARKERS = "markers"
 
@@ -95,26 +97,22 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
+def _chosen(options: argparse.Namespace) -> Iterator[ChosenDetector]:
+    """Yield the detector that was chosen, or those that are tried in order."""
+    return map(find_detector, [options.detector] if options.detector else TRIED)
+
+
 def _of_table(
     path: Path, options: argparse.Namespace
 ) -> tuple[list[DetectedEvent], tuple[str, ...]]:
-    chosen = find_detector(options.detector) if options.detector else None
-    name, streams = read_streams(
-        path,
-        chosen.name if chosen else None,
-        chosen.detector.signals if chosen else (),
-        _pairs("column", options.column),
-        options.rate,
-    )
-    return detect(chosen or find_detector(name), streams)
+    columns = _pairs("column", options.column)
+    return detect(*read_streams(path, _chosen(options), columns, options.rate))
 
 
 def _of_bag(
     path: Path, options: argparse.Namespace
 ) -> tuple[list[DetectedEvent], tuple[str, ...]]:
-    chosen = find_detector(options.detector) if options.detector else None
-    name, streams = read_signals(path, chosen.name if chosen else None)
-    return detect(chosen or find_detector(name), streams)
+    return detect(*read_signals(path, _chosen(options)))
 
 
 def _of_c3d(

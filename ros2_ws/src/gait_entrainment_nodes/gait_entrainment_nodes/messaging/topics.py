@@ -13,16 +13,18 @@ nothing is lost without an error; what tells a late-comer how things stand is tr
 from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import WrenchStamped
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock as ClockMessage
-from sensor_msgs.msg import Imu, JointState
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, String
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
 from gait_entrainment_bags import topic_names
 from gait_entrainment_msgs import msg
+from gait_entrainment_nodes.messaging.raw_messages import message_class
+from gait_entrainment_sensors import sources
+from gait_entrainment_sensors.sources import Source
 
 
 def quality(
@@ -71,18 +73,19 @@ class Topic(NamedTuple):
     qos: QoSProfile = EVERY_MESSAGE
 
 
+def sensor_topics(source: Source) -> tuple[Topic, ...]:
+    """Return the topics of a kind of sensor, [left, right]."""
+    return tuple(Topic(name, message_class(source.type)) for name in source.topics)
+
+
 JOINT_STATES = Topic(topic_names.JOINT_STATES, JointState)
 GAIT_EVENTS = Topic(topic_names.GAIT_EVENTS, msg.GaitEvent)
 ANKLE_TORQUE = Topic(topic_names.ANKLE_TORQUE, msg.AnkleTorque)
-GROUND_REACTION = tuple(Topic(name, WrenchStamped) for name in topic_names.GROUND_REACTION)
+GROUND_REACTION = sensor_topics(sources.FORCE)
 WALKER_PROGRESS = Topic(topic_names.WALKER_PROGRESS, msg.Progress)
 WALKER_TIMING = Topic(topic_names.WALKER_TIMING, msg.WalkerTiming)
 CLOCK = Topic(topic_names.CLOCK, ClockMessage)
 
-FOOT_SWITCH = tuple(Topic(name, msg.FootSwitch) for name in topic_names.FOOT_SWITCH)
-FOOT_IMU = tuple(Topic(name, Imu) for name in topic_names.FOOT_IMU)
-SHANK_IMU = tuple(Topic(name, Imu) for name in topic_names.SHANK_IMU)
-ANKLE_ENCODER = tuple(Topic(name, JointState) for name in topic_names.ANKLE_ENCODER)
 TRUE_EVENTS = Topic(topic_names.TRUE_EVENTS, msg.GaitEvent)
 TRUE_PROGRESS = Topic(topic_names.TRUE_PROGRESS, msg.Progress)
 

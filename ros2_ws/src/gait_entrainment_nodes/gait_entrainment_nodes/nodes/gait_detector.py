@@ -24,7 +24,6 @@ from gait_entrainment_bags.messages import nanoseconds_of
 from gait_entrainment_msgs import msg
 from gait_entrainment_msgs.srv import StartRun
 from gait_entrainment_nodes.messaging import topics
-from gait_entrainment_nodes.messaging.sensors import reader_of, source_of
 from gait_entrainment_nodes.messaging.stamps import (
     LOCK_STEP_START,
     PROGRESS_PERIOD,
@@ -35,6 +34,7 @@ from gait_entrainment_nodes.nodes.gait_detector_run import Run
 from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.participant import STATE_PERIOD, Participant
 from gait_entrainment_sensors import Detection, find_detector
+from gait_entrainment_sensors.sources import source_of
 
 # A sensor that was not heard for so long is not there [s].
 _ABSENT = 1.0
@@ -108,12 +108,12 @@ class GaitDetector(Participant):
         """Subscribe to the sensor of one foot; return its topic."""
         detector = self._detectors[side]
         source = source_of(detector.name, detector.signals)
-        topic = source.topics[side]
+        topic = topics.sensor_topics(source)[side]
         if given := getattr(self.settings, f"{side.name.lower()}_topic"):
             topic = topic._replace(name=given)
         if not self.settings.simulated:  # of a driver, whatever it offers
             topic = topic._replace(qos=topics.FROM_A_DRIVER)
-        read = reader_of(source, detector.signals)
+        read = source.reader(detector.signals)
         self.subscribe(topic, partial(self._on_sample, side, read))
         return topic
 

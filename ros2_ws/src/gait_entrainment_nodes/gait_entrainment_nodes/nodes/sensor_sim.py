@@ -19,13 +19,14 @@ from gait_entrainment.settings import setting
 from gait_entrainment_bags.messages import nanoseconds_of
 from gait_entrainment_msgs import msg
 from gait_entrainment_nodes.messaging import topics
-from gait_entrainment_nodes.messaging.sensors import SensorWriter, source_of
+from gait_entrainment_nodes.messaging.sensors import SensorWriter
 from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.walker_run import Stretch, WalkerRun
 from gait_entrainment_nodes.nodes.walker_sim import WalkerSim
 from gait_entrainment_nodes.nodes.walker_sim_run import Run
 from gait_entrainment_sensors.emulated import KINDS, EmulatedSensor
 from gait_entrainment_sensors.kinds import find_sensor
+from gait_entrainment_sensors.sources import source_of
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ class SensorSim(WalkerSim):
         signals = KINDS[self._kind][0]
         source = source_of(self._kind, signals)
         self._writers = [SensorWriter(source, side, signals) for side in Side]
-        self._sampled += [self.offer(topic) for topic in source.topics]
+        self._sampled += [self.offer(topic) for topic in topics.sensor_topics(source)]
 
     def offer_start(self) -> None:
         """Offer nothing: who is sensed is not asked to start, gait_detector is."""
