@@ -25,7 +25,8 @@ LABELS = ["LHEE", "LTOE", "RHEE", "RTOE", "SACR"]
 
 def feet(side, time):
     """Return heel and toe [mm] of a foot: it swings to its plate close to the ground, and on."""
-    plate, _, strike, toe_off = next(c for c in CONTACTS if c[1] is side)
+    own = [contact for contact in CONTACTS if contact[1] is side]
+    plate, strike, toe_off = own[0][0], own[0][2], own[-1][3]
     swung = max(strike - 0.05 - time, 0.0) - max(time - toe_off - 0.05, 0.0)  # [s]
     x = 300.0 + 600.0 * plate - 2000.0 * swung
     y, height = (150.0 if side is Side.LEFT else 250.0), (60.0 if swung else 30.0)
@@ -65,7 +66,7 @@ def write(
         loaded = 800.0 * np.sin(np.pi * np.clip((time - strike) / (toe_off - strike), 0, 1))
         file["data"]["analogs"][0, 6 * place + 2] = sign * loaded
         if border:  # the centre of pressure is at the border, too [N mm]
-            file["data"]["analogs"][0, 6 * place + 4] = sign * loaded * (500.0 * place - 250.0)
+            file["data"]["analogs"][0, 6 * place + 4] = sign * loaded * (250.0 - 500.0 * place)
     corners = np.array([[0, 600, 600, 0], [0, 0, 400, 400], [0, 0, 0, 0]], float)
     plate["USED"]["value"] = np.array([plates])
     plate["TYPE"]["value"] = np.full(plates, 2)
