@@ -3,6 +3,7 @@
 
 """Detectors beside public data and beside the simulated walker, and what a sample costs."""
 
+import statistics
 import sys
 import time
 from collections import Counter
@@ -46,7 +47,7 @@ CHAINS = [
 
 def told(kind, of):
     return (
-        f"{kind.name.lower():11} {of.found:3} of {of.reference}, {of.false} false, "
+        f"{kind.name.lower():11} {of.found:3} of {of.events}, {of.false} false, "
         f"bias {of.bias * 1e3:+5.1f} ms, SD {of.deviation * 1e3:4.1f} ms"
     )
 
@@ -135,7 +136,7 @@ def test_the_default_protocol_through_sensors(kind, detector):
             )
             errors[event] += found.errors
             if event is EventKind.HEEL_STRIKE:
-                sizes.append(found.median_size)
+                sizes.append(statistics.median(map(abs, found.errors)))
         pairs = zip(run.analysis.pulses[-1:], run.true_analysis.pulses[-1:], strict=False)
         shifts += [a.phase_lag - b.phase_lag for a, b in pairs if seen == exact == "entrained"]
     print(

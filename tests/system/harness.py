@@ -298,12 +298,12 @@ class Session:
         participants: Sequence[str] = (),
         strangers: bool = False,
         recorded: bool = True,
-        walker: str = "simulated",
+        **walker: str,
     ) -> None:
         self.bag, self.domain = folder / "bag", domain
         self.protocol = protocol_of(*options)
         bag = self.bag if recorded else None
-        given = parameters(self.protocol, bag, real_time=real_time, walker=walker)
+        given = parameters(self.protocol, bag, real_time=real_time, **walker)
         del given["bag_recorder"]["publishers"]  # it records until it is stopped
         if participants:
             given["experiment"]["participants"] = list(participants)
@@ -345,16 +345,17 @@ def session(
     real_time: bool = True,
     participants: Sequence[str] = (),
     strangers: bool = False,
-    walker: str = "simulated",
+    **walker: str,
 ) -> Iterator[Session]:
     """
     Start nodes in a domain of their own; stop them in the end.
 
-    If ``strangers`` may ask for pulses, the perturbator knows no protocol that these must be of.
+    ``walker`` and ``detector`` are those of `parameters`. If ``strangers`` may ask for pulses,
+    the perturbator knows no protocol that these must be of.
     """
     with claimed_domain() as domain:
-        told = (options, real_time, participants, strangers, RECORDER in nodes, walker)
-        running = Session(folder, domain, *told)
+        told = (options, real_time, participants, strangers, RECORDER in nodes)
+        running = Session(folder, domain, *told, **walker)
         try:
             running.start(*nodes)
             yield running

@@ -165,7 +165,9 @@ class Feet:
 
 
 def test_what_sensors_do_wrong_is_told_by_name(tmp_path):
-    with session(tmp_path, nodes=("gait_detector",), walker="person") as nodes:
+    detector = "vertical_force:longest_constant=0.3"
+    nodes = ("gait_detector",)
+    with session(tmp_path, nodes=nodes, walker="person", detector=detector) as nodes:
         probe = nodes.probe
         heard, events = probe.listen(DIAGNOSTICS), probe.listen(GAIT_EVENTS)
         probe.client.service(StartRun, "walker/start")
@@ -196,8 +198,13 @@ def test_what_sensors_do_wrong_is_told_by_name(tmp_path):
         feet.until(lambda: len(events) > 8, "events")
         assert {e.run for e in events} == {1}
         assert [e.step for e in events] == sorted(e.step for e in events)
-        feet.value = float("nan")
-        feet.until(lambda: said("samples are not numbers"), "what is told of NaN")
+        for value, told in (
+            (float("nan"), "samples are not numbers"),
+            (500.0, "times the signal did not change"),
+            (8e4, "cannot be: the force"),
+        ):
+            feet.value = value
+            feet.until(lambda told=told: said(told), f"what is told of {value}")
         feet.value = None
         feet.silent = {Side.RIGHT}
         feet.until(
@@ -207,3 +214,6 @@ def test_what_sensors_do_wrong_is_told_by_name(tmp_path):
         feet.silent = set()
         feet.until(lambda: len(events) > count + 8, "events after all that")
         assert all(b.step >= a.step for a, b in pairwise(events))
+        feet.ahead = -SECOND // 4
+        jumped = "left: the clock of the sensor jumped back.*right: the clock"
+        feet.until(lambda: said(jumped), "what is told of a clock that jumps")

@@ -24,6 +24,7 @@ from gait_entrainment_commands.drawing import (
 )
 from gait_entrainment_commands.outcome import (
     distribution,
+    from_strikes,
     holes_of,
     timing_outcome,
     timing_summary,
@@ -146,13 +147,14 @@ def _phase_lag(run: RecordedRun) -> Any:
     places, lags, stances = np.array(rows).reshape(-1, 3).T
     shade = {"color": BLUE, "alpha": 0.15, "lw": 0, "label": "double stance"}
     axes.fill_between(places, -stances, 0, **shade)
-    axes.axhline(0, color=GREY, ls="--", lw=1.2, label="toe-off")
+    zero = "heel strike" if from_strikes(run.analysis) else "toe-off"
+    axes.axhline(0, color=GREY, ls="--", lw=1.2, label=zero)
     axes.plot(places, lags, label="pulse onset", **_DOTTED_LINE)
     _shade_holes(axes, run)
     for last in (entrainment for _, part in _parts(run) for entrainment in part.entrainments[-1:]):
         if since := last.entrained_since_stride:
             axes.axvline(since, color=GREEN, lw=1.2, label="from here near its final lag")
-    axes.set(xlabel="stride", ylabel="onset minus toe-off [ms]")
+    axes.set(xlabel="stride", ylabel=f"onset minus {zero} [ms]")
     _add_percent(run, axes.secondary_yaxis, "right")
     _add_legend_below(figure, axes)
     return figure

@@ -6,14 +6,14 @@
 import math
 import statistics
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from itertools import pairwise
 from typing import Any
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side, nanoseconds
 from gait_entrainment.gait import Analysis, GaitEvent
 from gait_entrainment.settings import Setting
-from gait_entrainment_commands.outcome import final_phase_lag
+from gait_entrainment_commands.outcome import final_phase_lag, from_strikes
 from gait_entrainment_sensors.scoring import score
 
 TOE_OFF_BIAS = Setting("by how much toe-offs are detected late", unit="s", least=-0.2, most=0.2)
@@ -44,8 +44,10 @@ def detector_errors(
 
 
 def lag_shift(detected: Analysis, exact: Analysis) -> dict[str, float | None]:
-    """Return by how much the final phase lag is shifted [s]; None if either has none."""
+    """Return by how much the final phase lag is shifted [s]; None if they do not compare."""
     shift = final_phase_lag(detected) - final_phase_lag(exact)
+    if from_strikes(detected):
+        shift = math.nan
     return {"phase_lag_shift": None if math.isnan(shift) else shift}
 
 
@@ -65,15 +67,9 @@ def _errors_of(
         if found := times(detected, side):
             first, last = found[0] - window, found[-1] + window
             feet.append(([t for t in times(truth, side) if first <= t <= last], found))
-    told = score(feet, window)
-    return {
-        "events": told.reference,
-        "found": told.found,
-        "missed": told.missed,
-        "false": told.false,
-        "bias": told.bias if told.errors else None,
-        "deviation": told.deviation if len(told.errors) > 1 else None,
-    }
+    told = asdict(score(feet, window))
+    del told["errors"]
+    return told
 
 
 def _errors_line(errors: dict[str, Any]) -> str:

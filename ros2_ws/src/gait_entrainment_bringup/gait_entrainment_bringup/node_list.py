@@ -204,7 +204,7 @@ def _add_detection(
         "delivery": DELIVERY,
     }
     if walker == "sensed":
-        from gait_entrainment_sensors.kinds import USUAL, find_sensor
+        from gait_entrainment_sensors.emulated import USUAL, find_sensor
 
         sensor = sensor or USUAL.get(chosen.name, chosen.name)
         _, quality = find_sensor(sensor)

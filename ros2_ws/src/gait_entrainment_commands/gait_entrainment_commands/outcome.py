@@ -90,7 +90,7 @@ def _judgement(analysis: Analysis, events: Sequence[GaitEvent]) -> dict[str, Any
     verdict = last.verdict if last else Verdict.UNDECIDED
     reason = last.reason if last else Reason.FEW_PULSES
     entrained = verdict is Verdict.ENTRAINED
-    placed = [p for p in analysis.pulses if p.toe_off is not None]  # the others have no lag
+    placed = [p for p in analysis.pulses if p.has_lag]
     uncertainty = max((p.phase_lag_uncertainty for p in placed[-FINAL_PULSES:]), default=0.0)
     return {
         "verdict": verdict.name.lower(),
@@ -99,14 +99,20 @@ def _judgement(analysis: Analysis, events: Sequence[GaitEvent]) -> dict[str, Any
         "entrained_since_stride": last.entrained_since_stride if last and entrained else None,
         "final_phase_lag": final_phase_lag(analysis),
         **({"final_phase_lag_uncertainty": uncertainty} if uncertainty else {}),
+        **({"phase_lag_from": "heel_strike"} if from_strikes(analysis) else {}),
         "double_stance": _double_stance(events, placed[-1].toe_off if placed else None),
     }
 
 
 def final_phase_lag(analysis: Analysis) -> float:
     """Return the median lag of the last pulses [s]; NaN if none has one."""
-    lags = [p.phase_lag for p in analysis.pulses if p.toe_off is not None][-FINAL_PULSES:]
+    lags = [p.phase_lag for p in analysis.pulses if p.has_lag][-FINAL_PULSES:]
     return statistics.median(lags) if lags else math.nan
+
+
+def from_strikes(analysis: Analysis) -> bool:
+    """Whether lags count from heel strikes, since no toe-offs were detected."""
+    return any(p.has_lag and p.toe_off is None for p in analysis.pulses)
 
 
 def _parameters(protocol: Protocol) -> dict[str, Any]:
@@ -160,7 +166,10 @@ def summary(outcome: dict[str, Any]) -> str:
     lines += _doubt_lines(outcome)
     lag, double_stance = outcome["final_phase_lag"], outcome["double_stance"]
     if lag is not None and outcome["entrained"]:
-        lines.append(f"final phase lag  {lag * 1e3:+.1f} ms: {_place(lag, double_stance)}")
+        place = _place(lag, double_stance)
+        if "phase_lag_from" in outcome:
+            place = "from the nearest heel strike, since no toe-off was detected"
+        lines.append(f"final phase lag  {lag * 1e3:+.1f} ms: {place}")
     return "\n".join(lines)
 
 

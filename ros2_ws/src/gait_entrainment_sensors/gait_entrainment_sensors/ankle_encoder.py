@@ -21,6 +21,7 @@ class AnkleEncoderSettings(DetectorSettings):
     strike_share: float = setting(
         0.38, "strides from the plantarflexion peak to heel strike", "1", (0.0, 0.9)
     )
+    decision: float = setting(0.15, "for which a pulse may hide the peak", "s", (0.0, 0.5))
     blank_torque: float = setting(
         1.0, "torque from which on the angle is not read", "N m", (0, 30)
     )
@@ -37,7 +38,8 @@ class AnkleEncoderDetector(Detector):
     toe-offs, since the lag of a pulse must not rest on a share that was assumed. Pulses move the
     very angle; it is not read while the robot delivers more than ``blank_torque``.
 
-    Latency: none: the strike is foreseen, and told once its time has come.
+    Latency: ``decision``: a strike is foreseen, and told once its time has come; but while a pulse
+    hides the peak, nothing can be foreseen.
     Uncertainty: 50 ms.
     Fails: pulses near toe-off hide or shift the peak, so with pulses even the period is doubtful.
     """
@@ -56,8 +58,8 @@ class AnkleEncoderDetector(Detector):
 
     @property
     def latency(self) -> float:
-        """None: the strike is foreseen."""
-        return 0.0
+        """As long as a pulse may hide the peak."""
+        return float(self.settings.decision)
 
     def _restart(self) -> None:
         self._rising = True

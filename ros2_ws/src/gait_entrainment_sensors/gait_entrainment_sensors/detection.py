@@ -27,6 +27,9 @@ ENTRY_POINTS = "gait_entrainment.detectors"
 _LONG_ENOUGH = 10.0
 # A signal that moves and reads the same for so long has met the end of its range [s].
 _HELD = 0.05
+# Samples in a row that cannot be, of which four good ones make up for one, after which the unit is
+# doubted, and with it every event: a glitch is shorter, and in degrees a third of the samples are.
+_DOUBTED = 20
 # Of the person's own stances, swings, peaks: so many make the median.
 _OWN_STEPS = 7
 
@@ -81,7 +84,7 @@ class SignalCounts:
     dropouts: int = 0  # gaps longer than the longest gap: begun anew
     constant: int = 0  # times that the signal did not change for too long
     held: int = 0  # times that a moving signal stayed at one value: the end of its range
-    impossible: int = 0  # samples beyond what a person can do: units, or the wrong sensor
+    impossible: int = 0  # samples left out: beyond what a person can do: units, wrong sensor
     rejected: int = 0  # events that were found and not believed
 
 
@@ -121,6 +124,8 @@ class Detector(ABC):
     # Magnitude that every walk reaches.
     reached: ClassVar[float] = 0.0
     suspicion: ClassVar[str] = "check the units"
+    # Whether sensors on the wrong feet show.
+    tells_sides: ClassVar[bool] = False
     # Standard deviation of heel strikes and toe-offs [s].
     uncertainty: ClassVar[tuple[float, float]]
 
@@ -137,6 +142,7 @@ class Detector(ABC):
         self._held_from = -math.inf  # since when it is so [s]
         self._told_constant = self._told_held = False
         self._longest_gap = self.settings.longest_gap
+        self._doubt = 0.0  # that the signals are what they should be
 
     @classmethod
     def calibrated(
@@ -172,13 +178,17 @@ class Detector(ABC):
         total = 0.0
         for value in values:
             total += value if value >= 0.0 else -value
-        if not total < self.impossible:
-            if not total < math.inf:  # nor is what is not a number
-                self.counts.not_finite += 1
-                return []
-            self.counts.impossible += 1
+        if not total < math.inf:  # nor is what is not a number
+            self.counts.not_finite += 1
+            return []
         if total > self._largest:
             self._largest = total
+        if total >= self.impossible:
+            self.counts.impossible += 1
+            self._doubt = min(self._doubt + 1.0, 2.0 * _DOUBTED)
+            return []
+        if self._doubt > 0.0:
+            self._doubt -= 0.25
         self._before, self._time = self._time, time
         if total != self._total:
             self._total, self._constant_from, self._told_constant = total, time, False
@@ -209,8 +219,8 @@ class Detector(ABC):
         return True
 
     def _found(self, kind: EventKind, event: float, now: float) -> list[Detection]:
-        """Return the event of an instant [s] that is decided now; none if it comes too late."""
-        if now - event > self.latency + (now - self._before):
+        """Return the event of an instant [s] that is decided now; none if late or doubted."""
+        if self._doubt > _DOUBTED or now - event > self.latency + (now - self._before):
             self.counts.rejected += 1
             return []
         bias = self.settings.heel_strike_bias, self.settings.toe_off_bias

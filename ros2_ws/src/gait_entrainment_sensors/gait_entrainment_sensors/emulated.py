@@ -25,14 +25,16 @@ foot's belt; the centre of pressure.
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
+from gait_entrainment.errors import UsageError
 from gait_entrainment.gait import GaitEvent
+from gait_entrainment.robot.drivers import read_options, split_options
 from gait_entrainment.settings import Checked, setting
 from gait_entrainment.walker import Samples
 
@@ -91,6 +93,26 @@ KINDS: dict[str, tuple[tuple[str, ...], EmulatedSettings]] = {
         EmulatedSettings(noise=1e-3, resolution=1.5e-3, full_scale=7.0),
     ),
 }
+
+
+# The emulated sensor of a detector, where the two have different names.
+USUAL = {"vertical_force": "treadmill_force"}
+# They show no toe-off: the walker's knee does not bend.
+NO_TOE_OFF = ("shank_gyroscope",)
+
+
+def find_sensor(text: str) -> tuple[str, EmulatedSettings]:
+    """
+    Return kind and settings of the emulated sensor that a text names: KIND:OPTION=VALUE,...
+
+    Raises UsageError if there is no such kind, LimitError for a wrong option.
+    """
+    kind, _, options = text.partition(":")
+    if kind not in KINDS:
+        raise UsageError(f"sensor: {kind!r} is unknown; allowed: {', '.join(KINDS)}")
+    read = read_options(f"sensor: {kind}", EmulatedSettings, options)
+    given = {part.partition("=")[0] for part in split_options(options)}
+    return kind, replace(KINDS[kind][1], **{name: getattr(read, name) for name in given})
 
 
 class EmulatedSensor:

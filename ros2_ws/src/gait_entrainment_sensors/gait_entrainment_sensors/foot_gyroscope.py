@@ -40,7 +40,7 @@ class FootGyroscopeDetector(GyroscopeDetector):
 
     name = "foot_gyroscope"
     uncertainty = (0.006, 0.006)
-    foot = True
+    foot = tells_sides = True
 
     def __init__(self, side: Side, settings: Any = None) -> None:
         super().__init__(side, settings)

@@ -136,7 +136,7 @@ class GyroscopeDetector(Detector):
         if found is None or given is None:
             return told
         if self.foot and given[1] > 0.9 and found.toes_out(self.side) < -_TOES_IN:
-            told = (*told, f"{where}: the toes turn in: are the sensors on the right feet?")
+            told = (*told, f"{where}: if x points forward, the toes turn in: on the right feet?")
         agreement = sum(a * b for a, b in zip(found.axis, given, strict=True))
         if agreement < -0.5:
             return (*told, f"{where}: put on the other way round: set {found.text}")

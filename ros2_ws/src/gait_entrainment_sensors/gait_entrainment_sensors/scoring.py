@@ -3,8 +3,8 @@
 
 """How well detected events agree with a reference."""
 
-import bisect
 import statistics
+from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -16,35 +16,17 @@ TOLERANCE = 0.1
 class Score:
     """Detected events of one kind beside a reference."""
 
-    reference: int  # events in the reference
+    events: int  # in the reference
     found: int  # of those, the ones that were detected
+    missed: int
     false: int  # detected between the first and the last of the reference, and not in it
+    bias: float | None  # mean error [s]; None without one
+    deviation: float | None  # standard deviation of the errors [s]; None with fewer than two
     errors: tuple[float, ...]  # detected minus reference [s]
-
-    @property
-    def missed(self) -> int:
-        """Events of the reference that were not detected."""
-        return self.reference - self.found
-
-    @property
-    def bias(self) -> float:
-        """Mean error [s]; NaN without events."""
-        return statistics.fmean(self.errors) if self.errors else float("nan")
-
-    @property
-    def median_size(self) -> float:
-        """Median of the sizes of the errors [s]; NaN without events."""
-        sizes = [abs(error) for error in self.errors]
-        return statistics.median(sizes) if sizes else float("nan")
-
-    @property
-    def deviation(self) -> float:
-        """Standard deviation of the errors [s]; NaN with fewer than two events."""
-        return statistics.stdev(self.errors) if len(self.errors) > 1 else float("nan")
 
 
 def score(
-    sides: Iterable[tuple[Sequence[float], Sequence[float]]], tolerance: float = TOLERANCE
+    feet: Iterable[tuple[Sequence[float], Sequence[float]]], tolerance: float = TOLERANCE
 ) -> Score:
     """
     Hold detected events against a reference: pairs (reference, detected) of times [s], one a foot.
@@ -52,12 +34,12 @@ def score(
     Each event of the reference takes the nearest detected one within the tolerance, if no other
     has it. Nothing is said of what was detected before or after the reference.
     """
-    total, false, errors = 0, 0, list[float]()
-    for reference, detected in sides:
+    events, false, errors = 0, 0, list[float]()
+    for reference, detected in feet:
         times, taken = sorted(detected), set[int]()
-        total += len(reference)
+        events += len(reference)
         for instant in sorted(reference):
-            place = bisect.bisect_left(times, instant)
+            place = bisect_left(times, instant)
             near = [i for i in (place - 1, place) if 0 <= i < len(times) and i not in taken]
             best = min(near, key=lambda i: abs(times[i] - instant), default=None)
             if best is not None and abs(times[best] - instant) <= tolerance:
@@ -65,6 +47,8 @@ def score(
                 errors.append(times[best] - instant)
         if reference:
             first, last = min(reference) - tolerance, max(reference) + tolerance
-            inside = [i for i, t in enumerate(times) if first <= t <= last]
-            false += sum(i not in taken for i in inside)
-    return Score(total, len(errors), false, tuple(errors))
+            false += sum(first <= t <= last and i not in taken for i, t in enumerate(times))
+    bias = statistics.fmean(errors) if errors else None
+    deviation = statistics.stdev(errors) if len(errors) > 1 else None
+    found = len(errors)
+    return Score(events, found, events - found, false, bias, deviation, tuple(errors))

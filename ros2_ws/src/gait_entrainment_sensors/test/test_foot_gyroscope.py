@@ -35,7 +35,7 @@ def test_a_walk_beside_motion_capture(text):
         return score((reference[kind, s], times(by_side[s], kind)) for s in Side)
 
     strikes, toe_offs = scored(STRIKE), scored(TOE_OFF)
-    assert (strikes.reference, toe_offs.reference) == (59, 57)
+    assert (strikes.events, toe_offs.events) == (59, 57)
     assert (strikes.found >= 58, toe_offs.found >= 56) == (True, True)
     assert (strikes.false, toe_offs.false) == (0, 0)
     assert abs(strikes.bias) < 5e-3

@@ -68,7 +68,9 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("side", "the perturbed leg", words=_SIDES),
         Column("onset", f"commanded onset {_FROM_START}", "s"),
         Column("phase", "place of the onset in its stride, 0 to below 1", "1"),
-        Column("phase_lag", "onset minus the nearest toe-off of the perturbed leg", "s"),
+        Column(
+            "phase_lag", "onset minus the nearest toe-off (heel strike if none was detected)", "s"
+        ),
         Column("unwrapped_lag", "the same, followed across its wraps", "s"),
         Column("sent_late", "sent onset minus the commanded one", "s"),
         Column("measured_late", "measured onset minus the commanded one", "s"),

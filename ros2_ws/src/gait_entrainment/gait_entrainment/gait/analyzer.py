@@ -72,6 +72,7 @@ class GaitAnalyzer:
         self._strides_before = strides_before  # of the leg in the run, which are of no interest
         self._test = EntrainmentTest(settings or VerdictSettings())
         self._lags = LagFollower()
+        self._toe_offs = False  # whether a stride has shown one; settled by the first pulse
         self._unperturbed = UnperturbedPeriod()
         self._pause = self._unperturbed  # strides since the latest pulse
         self._strides: deque[Stride] = deque()  # closed, pulses not placed yet
@@ -169,6 +170,9 @@ class GaitAnalyzer:
             self._unperturbed = self._pause
             self._unperturbed.settle(_ANYBODY)
         unperturbed = self._unperturbed
+        if self._numbers.number == 0:
+            self._toe_offs |= stride.toe_off is not None
+            self._lags = LagFollower(from_strikes=not self._toe_offs)
         pulses: list[PulsePhase] = []
         judged = 0  # the first of them that neither a hole nor another train comes after
         for onset in onsets:
@@ -185,7 +189,7 @@ class GaitAnalyzer:
             placed = self._numbers.number, onset, stride, before, after, unperturbed.mean
             pulse = self._lags.place(*placed)
             self.pulse_counts.placed += 1
-            self.pulse_counts.without_lag += pulse.toe_off is None
+            self.pulse_counts.without_lag += not pulse.has_lag
             pulses.append(pulse)
         unseen = any(s < stride.end and stride.start < e for s, e in self._unknown)
         if onsets or (unseen and self._numbers.number):
@@ -202,7 +206,7 @@ class GaitAnalyzer:
     def _begin_anew(self, hole: Hole | None, *, another_train: bool = False) -> None:
         """Follow lags and form verdicts anew: after a hole, known already if None, or a train."""
         self.holes += [hole] if hole else []
-        self._lags = LagFollower()
+        self._lags = LagFollower(from_strikes=not self._toe_offs)
         self._test.restart(hole=not another_train)
 
 

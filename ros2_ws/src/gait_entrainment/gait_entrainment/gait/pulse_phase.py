@@ -20,10 +20,17 @@ class PulsePhase:
     onset: int  # [ns]
     stride: int  # stride in which the pulse began
     phase: float  # (onset - heel strike) / stride period, in [0, 1)
-    phase_lag: float  # onset minus the nearest toe-off [s]; NaN if that toe-off is missing
+    # Onset minus the nearest toe-off [s]; NaN if that is missing. From the nearest heel strike of
+    # the leg, and ``toe_off`` is None, where no stride up to the first pulse has shown a toe-off.
+    phase_lag: float
     unwrapped_lag: float  # the same, followed across wraps from the first lag on [s]
     toe_off: int | None  # the toe-off that the lag refers to [ns]
-    phase_lag_uncertainty: float = 0.0  # standard deviation, that of the toe-off [s]; 0: exact
+    phase_lag_uncertainty: float = 0.0  # standard deviation, that of the event [s]; 0: exact
+
+    @property
+    def has_lag(self) -> bool:
+        """Whether the event that the lag refers to was detected."""
+        return not math.isnan(self.phase_lag)
 
 
 def depends_on_next_toe_off(onset: int, stride: Stride) -> bool:
@@ -94,14 +101,15 @@ class PulseNumbers:
 
 class LagFollower:
     """
-    Follows the phase lag across its wraps.
+    Follows the phase lag across its wraps, from toe-offs or ``from_strikes``.
 
     Pulse n is compared with the toe-off n strides after that of the first pulse. That may lie in
     the future, so the strides T between are counted: unwrapped lag = lag + (m - n) T after m
     strides and n pulses. Presumes one train, with one pulse a stride, and no hole.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, from_strikes: bool = False) -> None:
+        self._from_strikes = from_strikes
         self._first: tuple[int, int] | None = None  # stride of the toe-off, number of the pulse
 
     def place(
@@ -109,7 +117,11 @@ class LagFollower:
     ) -> PulsePhase:
         """Place one pulse; as in ``nearest_toe_off``, and the unperturbed period [s]."""
         phase = (onset - stride.start) / (stride.end - stride.start)
-        nearest = nearest_toe_off(onset, stride, before, after)
+        if self._from_strikes:
+            bounds = (stride.start, stride.number), (stride.end, stride.number + 1)
+            nearest: tuple[int, int] | None = min(bounds, key=lambda bound: abs(onset - bound[0]))
+        else:
+            nearest = nearest_toe_off(onset, stride, before, after)
         if nearest is None:
             return PulsePhase(number, onset, stride.number, phase, math.nan, math.nan, None)
         toe_off, toe_off_stride = nearest
@@ -120,8 +132,8 @@ class LagFollower:
         # Without a wrap the lag stands as it is, even if T is unknown (NaN).
         unwrapped = lag + ahead * period if ahead else lag
         uncertainty = next(
-            s.toe_off_uncertainty for s in (stride, before, after) if s and s.toe_off == toe_off
+            (s.toe_off_uncertainty for s in (before, after) if s and s.toe_off == toe_off),
+            stride.toe_off_uncertainty,
         )
-        return PulsePhase(
-            number, onset, stride.number, phase, lag, unwrapped, toe_off, uncertainty
-        )
+        off = None if self._from_strikes else toe_off
+        return PulsePhase(number, onset, stride.number, phase, lag, unwrapped, off, uncertainty)

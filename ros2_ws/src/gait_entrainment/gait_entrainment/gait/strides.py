@@ -52,7 +52,7 @@ class Stride:
     end: int  # heel strike that closes it [ns]
     toe_off: int | None  # toe-off of the leg within it [ns]; None if it is missing
     step_periods: tuple[float, float]  # [s], in order; NaN if the strike between is missing
-    toe_off_uncertainty: float = 0.0  # standard deviation of its stamp [s]
+    toe_off_uncertainty: float = 0.0  # standard deviation of its stamp [s]; without, of ``end``
 
     @property
     def period(self) -> float:
@@ -186,7 +186,7 @@ class StrideTracker:
         first, second = middle - start, event.stamp - middle
         step_periods = first / NANOSECONDS_PER_SECOND, second / NANOSECONDS_PER_SECOND
         toe_off = self._stamps.get(event.place - 1)
-        uncertainty = self._toe_off.uncertainty if self._toe_off else 0.0
+        uncertainty = (self._toe_off or event).uncertainty
         return Stride(closed, self.side, start, event.stamp, toe_off, step_periods, uncertainty)
 
 

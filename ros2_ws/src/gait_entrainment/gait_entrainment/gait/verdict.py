@@ -168,7 +168,7 @@ class EntrainmentTest:
         self, stride: Stride, pulses: Sequence[PulsePhase], unperturbed: UnperturbedPeriod
     ) -> Entrainment | None:
         """Take one stride with its pulses; returns None if none of them has a lag."""
-        placed = [pulse for pulse in pulses if pulse.toe_off is not None]
+        placed = [pulse for pulse in pulses if pulse.has_lag]
         if not placed:
             return None
         for position, pulse in enumerate(placed, start=len(self._strides)):

@@ -232,3 +232,26 @@ def test_a_lag_is_as_uncertain_as_its_toe_off() -> None:
     for pulse in pulses:
         (step,) = {event.step for event in events if event.stamp == pulse.toe_off}
         assert pulse.phase_lag_uncertainty == 0.001 * step
+
+
+def test_without_toe_offs_lags_count_from_heel_strikes() -> None:
+    """A detector may find none: the gait is locked or not at any event of the stride."""
+    events, onsets = noisy_walk(np.random.default_rng(3), locks, white, 0.01)
+    strikes = [
+        dataclasses.replace(e, uncertainty=0.05) for e in events if e.kind is EventKind.HEEL_STRIKE
+    ]
+    exact, analysis = (analyze(walk, onsets, Side.RIGHT) for walk in (events, strikes))
+    verdicts = [a.entrainments[-1].verdict for a in (exact, analysis)]
+    assert verdicts == [Verdict.ENTRAINED] * 2
+    stamps = np.array([e.stamp for e in strikes if e.side is Side.RIGHT])
+    for pulse in analysis.pulses:
+        nearest = stamps[np.argmin(np.abs(pulse.onset - stamps))]
+        assert pulse.phase_lag == (pulse.onset - nearest) / SECOND
+        assert (pulse.toe_off, pulse.phase_lag_uncertainty) == (None, 0.05)
+
+
+def test_toe_offs_that_go_missing_after_the_first_pulse_leave_lags_unknown() -> None:
+    events = regular_walk([STRIDE] * 8)
+    found = [e for e in events if e.kind is EventKind.HEEL_STRIKE or e.stamp < 6 * SECOND]
+    pulses = analyze(found, [4 * SECOND, 9 * SECOND], Side.RIGHT).pulses
+    assert [pulse.has_lag for pulse in pulses] == [True, False]

@@ -91,6 +91,8 @@ def run(options: argparse.Namespace) -> int:
         return 0
     print(f"detector  {detector}")
     print(f"events    {', '.join(f'{n} {what}' for what, n in counts.items())}".replace("_", " "))
+    if path.suffix.lower() != ".c3d" and not find_detector(detector).detector.tells_sides:
+        print("sides     as named: these signals cannot tell a left foot from a right one")
     for trouble in troubles:
         print(f"trouble   {trouble}")
     print(f"written   {out}")

@@ -83,6 +83,7 @@ class GaitDetector(Participant):
         self._left_out = [0, 0]  # of them, those whose stamps cannot be
         self._age = [0.0, 0.0]  # of the latest such sample [s]
         self._heard_at = [-1e9, -1e9]  # on steady time [s]
+        self._jumped = [False, False]  # in this run, the clock of the sensor
         self._found: list[Detection] = []  # lock-step: not numbered yet
         self._truth: msg.Progress | None = None  # lock-step: not answered yet
         self._readings = 0  # lock-step: samples of this run
@@ -125,7 +126,7 @@ class GaitDetector(Participant):
         self._heard_at[side] = time.monotonic()
         if not self.real_time:
             self._readings += 1
-        elif not self._timely(side, stamp):
+        elif self._jumped[side] or not self._timely(side, stamp):
             return
         try:
             values = read(message)
@@ -133,7 +134,11 @@ class GaitDetector(Participant):
             self._left_out[side] += 1
             return
         seconds = (stamp - self._epoch) / NANOSECONDS_PER_SECOND
-        self._found += self._detectors[side].add(seconds, values)
+        detector = self._detectors[side]
+        jumps = detector.counts.clock_jumps
+        self._found += detector.add(seconds, values)
+        # When its events happen is not known any more: as if the sensor were silent.
+        self._jumped[side] = self.run is not None and detector.counts.clock_jumps > jumps
         if self.real_time and self._found:
             self._publish_found()
         elif self._truth is not None:
@@ -175,7 +180,7 @@ class GaitDetector(Participant):
             first = self.settings.first_heel_strike
             side = Side[first.upper()] if first else None
             self.run = Run(request.run, start, self.latency, self._epoch, side)
-            self._readings, self._walked = 0, True
+            self._readings, self._walked, self._jumped = 0, True, [False, False]
             self._progress_at = time.monotonic() + START_DELAY / NANOSECONDS_PER_SECOND
             self.note_state(DiagnosticStatus.OK, f"run {request.run} goes on")
             response.success, response.start = True, to_time(start)
@@ -252,6 +257,12 @@ class GaitDetector(Participant):
             for side in Side
             if self._left_out[side]
         ]
+        told += [
+            f"{side.name.lower()}: the clock of the sensor jumped back: nothing of it is taken in "
+            "this run; synchronize it"
+            for side in Side
+            if self._jumped[side]
+        ]
         if run is not None:
             told += run.numbering.troubles()
             if run.late:
@@ -279,7 +290,8 @@ class GaitDetector(Participant):
                 for side in Side
             }
             self._counted = (self._heard[0], self._heard[1])
-            self.note_state(level, told or "hears both feet", latest=self._latest, **rates)
+            said = {"latest": self._latest, "samples": sum(self._heard), **rates}
+            self.note_state(level, told or "hears both feet", **said)
 
     def on_stop(self) -> None:
         """End of the process: say so if a run goes on."""

@@ -5,9 +5,9 @@
 sensor_sim: the simulated walker as sensors see it, for the rehearsal of an experiment on a person.
 
 The walker of walker_sim, its steps unnumbered: what emulated sensors on both feet would measure is
-published as a person's sensors would publish it, a device's buffer at a time, which is as long as
-the time between two samples of the walker. The exact events go to `truth/gait_events`. It begins
-to walk when the first torque profile of a run comes, as a person does when told to.
+published as a person's sensors would publish it, a device's buffer at a time. The exact events go
+to `truth/gait_events`. It begins to walk when the first torque profile of a run comes, as a person
+does when told to.
 """
 
 from dataclasses import dataclass
@@ -24,8 +24,7 @@ from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.walker_run import Stretch, WalkerRun
 from gait_entrainment_nodes.nodes.walker_sim import WalkerSim
 from gait_entrainment_nodes.nodes.walker_sim_run import Run
-from gait_entrainment_sensors.emulated import KINDS, EmulatedSensor
-from gait_entrainment_sensors.kinds import find_sensor
+from gait_entrainment_sensors.emulated import KINDS, EmulatedSensor, find_sensor
 from gait_entrainment_sensors.sources import source_of
 
 
@@ -36,6 +35,9 @@ class SensorSettings:
     sensor: str = setting(
         "treadmill_force",
         "emulated sensor on both feet, KIND or KIND:OPTION=VALUE,... of " + ", ".join(KINDS),
+    )
+    buffer: float = setting(
+        0.002, "real time: for how long the device holds samples back", "s", (5e-4, 0.1)
     )
 
 
@@ -49,10 +51,15 @@ class Measured(Stretch):
 class SensedWalk(WalkerRun):
     """A walk with sensors on both feet."""
 
-    def __init__(self, *of_walk: Any, sensors: list[EmulatedSensor]) -> None:
+    def __init__(self, *of_walk: Any, sensors: list[EmulatedSensor], buffer: float) -> None:
         super().__init__(*of_walk)
-        self._sensors = sensors
+        self._sensors, self._buffer = sensors, nanoseconds(buffer)
         self.readings = 0  # of all sensors together, so far
+
+    @property
+    def next_sample(self) -> int:
+        """When a sample of the walker is due next, or the device sends its buffer [ns]."""
+        return min(super().next_sample, (self.reached // self._buffer + 1) * self._buffer)
 
     def advance(self, until: int, last: bool = False) -> Measured:
         """See `WalkerRun`; the stretch holds what the sensors measured, too."""
@@ -89,7 +96,8 @@ class SensorSim(WalkerSim):
         settings = self.settings
         sensors = [EmulatedSensor(self._kind, side, self._quality, settings.seed) for side in Side]
         rate, first = settings.sample_rate, settings.first_heel_strike
-        return SensedWalk(self.walker, first, rate, self.variation, settings.seed, sensors=sensors)
+        of_walk = self.walker, first, rate, self.variation, settings.seed
+        return SensedWalk(*of_walk, sensors=sensors, buffer=self.sensors.buffer)
 
     def run_of(self, message: Any) -> Run | None:
         """Return the run of a message; the first torque profile of a run begins it."""
