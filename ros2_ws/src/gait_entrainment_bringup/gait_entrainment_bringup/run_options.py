@@ -5,7 +5,6 @@
 
 import argparse
 import itertools
-import math
 import os
 import sys
 import tempfile
@@ -13,7 +12,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from gait_entrainment.conventions import EventKind
 from gait_entrainment.errors import UsageError
 from gait_entrainment.protocol import Protocol
 from gait_entrainment.robot import LimitError, driver_on, find_driver, make_robots
@@ -136,17 +134,15 @@ def check_walker(walker: str, detector: str, *, real_time: bool) -> None:
         raise UsageError("--walker: a person walks in real time only; add --real-time")
     if walker != "simulated":
         from gait_entrainment_sensors import find_detector
-        from gait_entrainment_sensors.emulated import NO_TOE_OFF
 
         chosen = find_detector(detector)
-        straight = walker == "sensed" and chosen.name in NO_TOE_OFF
-        if straight or math.isnan(chosen.detector.uncertainty[EventKind.TOE_OFF]):
-            whose = " of the simulated walker, whose knee does not bend" if straight else ""
-            print(
-                f"{chosen.name} detects no toe-offs{whose}: phase lags will count from heel "
-                "strikes, and where in double stance a pulse lies will not be known",
-                file=sys.stderr,
-            )
+        lacks = chosen.detector.lacks
+        if walker == "sensed":
+            from gait_entrainment_sensors.emulated import NO_TOE_OFF
+
+            lacks = NO_TOE_OFF.get(chosen.name, lacks)
+        if lacks:
+            print(f"{chosen.name}: {lacks}", file=sys.stderr)
 
 
 def check_numbers(options: argparse.Namespace) -> None:

@@ -24,6 +24,7 @@ from gait_entrainment_bringup.node_list import (
     replay_parameters,
     settings_file,
 )
+from gait_entrainment_bringup.run_options import check_walker
 from gait_entrainment_nodes.messaging.environment import shared_file
 from gait_entrainment_nodes.nodes.bag_player import BagPlayer
 from gait_entrainment_nodes.nodes.bag_recorder import BagRecorder
@@ -138,6 +139,22 @@ def test_parameters_are_given_to_every_node(real_time):
     assert sides == {"right"} == {walker["first_heel_strike"]}
     assert set(given["bag_recorder"]["publishers"]) == set(NODES) - {"bag_recorder"}
     assert "experiment" not in given["experiment"]["participants"]
+
+
+@pytest.mark.parametrize(
+    ("walker", "detector", "told"),
+    [
+        ("sensed", "shank_gyroscope", "shank_gyroscope: no toe-offs on the simulated walker"),
+        ("person", "shank_gyroscope", ""),
+        ("person", "ankle_encoder:decision=0.1", "no entrainment verdict can rest on them"),
+        ("simulated", "ankle_encoder", ""),
+    ],
+)
+def test_what_a_detector_lacks_is_told_before_a_run(walker, detector, told, capsys):
+    check_walker(walker, detector, real_time=True)
+    error = capsys.readouterr().err
+    assert told in error
+    assert bool(error) == bool(told)
 
 
 @pytest.mark.parametrize("walker", WALKERS)

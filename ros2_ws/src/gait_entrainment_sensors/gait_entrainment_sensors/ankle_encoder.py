@@ -49,6 +49,10 @@ class AnkleEncoderDetector(Detector):
     Settings: ClassVar[type[DetectorSettings]] = AnkleEncoderSettings
     impossible = 200.0  # the magnitude of the torque is in it
     uncertainty = (0.05, math.nan)
+    lacks = (
+        "a fallback: no toe-offs, and heel strikes to some 50 ms, from an angle that pulses move: "
+        "phase lags count from these, and no entrainment verdict can rest on them"
+    )
 
     def __init__(self, side: Side, settings: Any = None) -> None:
         super().__init__(side, settings)
@@ -73,8 +77,7 @@ class AnkleEncoderDetector(Detector):
         where = f"{self.side.name.lower()} {self.name}"
         told = (
             *super().troubles(now),
-            f"{where}: a fallback: heel strikes are inferred to some 50 ms, there are no "
-            "toe-offs, so no phase lag can be told",
+            f"{where}: {self.lacks}",
         )
         if not self._unlikely:
             return told

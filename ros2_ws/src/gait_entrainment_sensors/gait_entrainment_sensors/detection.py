@@ -126,6 +126,8 @@ class Detector(ABC):
     suspicion: ClassVar[str] = "check the units"
     # Whether sensors on the wrong feet show.
     tells_sides: ClassVar[bool] = False
+    # What its events cannot answer: told before a run.
+    lacks: ClassVar[str] = ""
     # Standard deviation of heel strikes and toe-offs [s].
     uncertainty: ClassVar[tuple[float, float]]
 

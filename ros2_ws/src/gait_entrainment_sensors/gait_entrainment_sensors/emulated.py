@@ -97,8 +97,11 @@ KINDS: dict[str, tuple[tuple[str, ...], EmulatedSettings]] = {
 
 # The emulated sensor of a detector, where the two have different names.
 USUAL = {"vertical_force": "treadmill_force"}
-# They show no toe-off: the walker's knee does not bend.
-NO_TOE_OFF = ("shank_gyroscope",)
+# What a detector lacks on this walker alone.
+NO_TOE_OFF = {
+    "shank_gyroscope": "no toe-offs on the simulated walker, whose knee does not bend: phase lags "
+    "count from heel strikes"
+}
 
 
 def find_sensor(text: str) -> tuple[str, EmulatedSettings]:
