@@ -16,6 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from gait_entrainment.conventions import Side
 from gait_entrainment.protocol import Protocol, read_protocol, write_protocol
 from gait_entrainment.simulation import simulate
 from gait_entrainment_bags import BagReader
@@ -31,7 +32,8 @@ from gait_entrainment_msgs.action import RunProtocol
 from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.client import Client
 from gait_entrainment_nodes.messaging.domain import CLAIMS, claimed_domain
-from gait_entrainment_nodes.messaging.topics import STRIDES, Topic
+from gait_entrainment_nodes.messaging.stamps import header
+from gait_entrainment_nodes.messaging.topics import GROUND_REACTION, STRIDES, Topic
 
 # Long enough for a machine whose two cores are shared; nothing waits for it to pass.
 PATIENCE = 60.0
@@ -142,6 +144,39 @@ class Probe:
         answer = self.client.result(handle, PATIENCE)
         assert answer, "waited in vain for a result"
         return answer
+
+
+class Feet:
+    """Two force sensors of one's own, on each of which a person stands half of the time."""
+
+    def __init__(self, probe: Probe) -> None:
+        self.probe = probe
+        self.publishers = [
+            probe.node.create_publisher(topic.type, topic.name, 10) for topic in GROUND_REACTION
+        ]
+        self.silent: set[Side] = set()
+        self.value: float | None = None
+        self.ahead = 0  # [ns]
+
+    def tick(self) -> None:
+        """Publish a sample of each foot, 200 a second."""
+        now = time.time_ns()
+        for side in set(Side) - self.silent:
+            phase = (now / 1e9 + 0.5 * side) % 1.0
+            force = 800.0 if phase < 0.6 else 0.0
+            message = GROUND_REACTION[side].type(header=header(now + self.ahead))
+            message.wrench.force.z = force if self.value is None else self.value
+            self.publishers[side].publish(message)
+        time.sleep(0.005)  # the rate of the samples, not a wait
+
+    def until(self, condition: Callable[[], Any], what: str) -> Any:
+        """Publish until a condition holds; return its value."""
+
+        def met() -> Any:
+            self.tick()
+            return condition()
+
+        return self.probe.until(met, what)
 
 
 @contextmanager

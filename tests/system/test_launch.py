@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 from ament_index_python.packages import get_package_share_directory
-from harness import Started, alive, probe, stamp_of
+from harness import Feet, Started, alive, probe, stamp_of
 from lifecycle_msgs.msg import State
 from lifecycle_msgs.srv import GetState
 
@@ -22,7 +22,7 @@ from gait_entrainment.protocol import read_protocol
 from gait_entrainment.simulation import simulate
 from gait_entrainment_bags import BagReader
 from gait_entrainment_bags.recorded_run import read_run
-from gait_entrainment_bringup.node_list import NODES
+from gait_entrainment_bringup.node_list import NODES, nodes_for
 from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 from gait_entrainment_nodes.messaging.player_services import srv
@@ -112,6 +112,30 @@ def test_experiment_ends_the_launch_with_success(tmp_path):
     assert {"/clock", "/joint_states", "/gait/strides", "/rosout"} <= topics
     run = read_run(bag)
     assert (run.lost, run.differences) == (0, ())
+
+
+@pytest.mark.parametrize("walker", ["sensed", "person"])
+def test_a_walker_seen_through_sensors(walker, tmp_path):
+    bag = tmp_path / "bag"
+    arguments = [
+        *(f"protocol:={short_protocol(tmp_path, walker, 3)}", f"bag:={bag}", f"walker:={walker}"),
+        f"real_time:={str(walker == 'person').lower()}",
+    ]
+    with (
+        claimed_domain() as domain,
+        launched("experiment.launch.py", tmp_path / "out", domain, *arguments) as launch,
+        probe(domain) as listener,
+    ):
+        if walker == "person":
+            Feet(listener).until(lambda: not alive(launch.process.pid), "the end")
+        assert launch.wait() == 0, launch.text
+    assert launch.text.count("started in ROS domain") == len(nodes_for(walker))
+    run = read_run(bag)
+    assert (run.lost, len(run.strides)) == (0, 9)
+    assert bool(run.detector_errors) == (walker == "sensed")
+    with BagReader(bag) as reader:
+        events = [message for _, message in reader.decoded(["/gait_events"])]
+    assert {event.detector for event in events} == {"vertical_force"}
 
 
 def test_somebody_else_may_record_a_run_that_begins_later(tmp_path):

@@ -8,13 +8,12 @@ import re
 import signal
 import subprocess
 import sys
-import time
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from geometry_msgs.msg import WrenchStamped
 from harness import (
+    Feet,
     entrain_run,
     events_since_start,
     protocol_of,
@@ -32,8 +31,7 @@ from gait_entrainment_bringup.node_list import nodes_for
 from gait_entrainment_commands.outcome import outcome_of
 from gait_entrainment_msgs.srv import Ready, StartRun
 from gait_entrainment_nodes.messaging.domain import claimed_domain
-from gait_entrainment_nodes.messaging.stamps import header
-from gait_entrainment_nodes.messaging.topics import DIAGNOSTICS, GAIT_EVENTS, GROUND_REACTION
+from gait_entrainment_nodes.messaging.topics import DIAGNOSTICS, GAIT_EVENTS
 from gait_entrainment_sensors import find_detector
 from gait_entrainment_sensors.rehearsal import Sensors, rehearse
 
@@ -134,36 +132,6 @@ def test_a_walker_from_outside_plays_the_role(tmp_path, monkeypatch):
     assert outcome["final_phase_lag_uncertainty"] == 0.001
 
 
-class Feet:
-    """Two force sensors of one's own, on each of which a person stands half of the time."""
-
-    def __init__(self, nodes):
-        self.nodes, self.probe = nodes, nodes.probe
-        self.publishers = [
-            self.probe.node.create_publisher(WrenchStamped, topic.name, 10)
-            for topic in GROUND_REACTION
-        ]
-        self.silent, self.value, self.ahead = set(), None, 0
-
-    def tick(self):
-        """Publish a sample of each foot, 200 a second."""
-        now = time.time_ns()
-        for side in set(Side) - self.silent:
-            phase = (now / SECOND + 0.5 * side) % 1.0
-            force = 800.0 if phase < 0.6 else 0.0
-            message = WrenchStamped(header=header(now + self.ahead))
-            message.wrench.force.z = force if self.value is None else self.value
-            self.publishers[side].publish(message)
-        time.sleep(0.005)  # the rate of the samples, not a wait
-
-    def until(self, condition, what):
-        def met():
-            self.tick()
-            return condition()
-
-        return self.probe.until(met, what)
-
-
 def test_what_sensors_do_wrong_is_told_by_name(tmp_path):
     detector = "vertical_force:longest_constant=0.3"
     nodes = ("gait_detector",)
@@ -188,7 +156,7 @@ def test_what_sensors_do_wrong_is_told_by_name(tmp_path):
             refused = probe.client.call(StartRun, "walker/start", StartRun.Request(run=1))
             assert not refused.success
             assert "gait_detector waits for ground_reaction/left" in refused.message
-        feet = Feet(nodes)
+        feet = Feet(probe)
         feet.ahead = -3 * SECOND  # clocks that nobody has synchronized
         feet.until(lambda: "stamps are 3 s behind" in waits_for(), "the wrong clock")
         feet.ahead = 0

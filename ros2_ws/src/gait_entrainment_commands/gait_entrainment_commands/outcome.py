@@ -10,7 +10,7 @@ from dataclasses import asdict
 from typing import Any
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind
-from gait_entrainment.gait import Analysis, GaitEvent, Hole, Reason, Verdict
+from gait_entrainment.gait import Analysis, GaitEvent, Hole, PulsePhase, Reason, Verdict
 from gait_entrainment.protocol import Protocol, content_of
 from gait_entrainment.robot import PulseTiming
 from gait_entrainment.run import Run
@@ -90,7 +90,7 @@ def _judgement(analysis: Analysis, events: Sequence[GaitEvent]) -> dict[str, Any
     verdict = last.verdict if last else Verdict.UNDECIDED
     reason = last.reason if last else Reason.FEW_PULSES
     entrained = verdict is Verdict.ENTRAINED
-    placed = [p for p in analysis.pulses if p.has_lag]
+    placed = _placed(analysis)
     uncertainty = max((p.phase_lag_uncertainty for p in placed[-FINAL_PULSES:]), default=0.0)
     return {
         "verdict": verdict.name.lower(),
@@ -106,13 +106,18 @@ def _judgement(analysis: Analysis, events: Sequence[GaitEvent]) -> dict[str, Any
 
 def final_phase_lag(analysis: Analysis) -> float:
     """Return the median lag of the last pulses [s]; NaN if none has one."""
-    lags = [p.phase_lag for p in analysis.pulses if p.has_lag][-FINAL_PULSES:]
+    lags = [p.phase_lag for p in _placed(analysis)][-FINAL_PULSES:]
     return statistics.median(lags) if lags else math.nan
+
+
+def _placed(analysis: Analysis) -> list[PulsePhase]:
+    """Return the pulses that have a lag."""
+    return [p for p in analysis.pulses if not math.isnan(p.phase_lag)]
 
 
 def from_strikes(analysis: Analysis) -> bool:
     """Whether lags count from heel strikes, since no toe-offs were detected."""
-    return any(p.has_lag and p.toe_off is None for p in analysis.pulses)
+    return any(p.toe_off is None for p in _placed(analysis))
 
 
 def _parameters(protocol: Protocol) -> dict[str, Any]:

@@ -75,10 +75,7 @@ class AnkleEncoderDetector(Detector):
     def troubles(self, now: float | None = None) -> tuple[str, ...]:
         """Say that this is the fallback, and which angles cannot be."""
         where = f"{self.side.name.lower()} {self.name}"
-        told = (
-            *super().troubles(now),
-            f"{where}: {self.lacks}",
-        )
+        told = (*super().troubles(now), f"{where}: {self.lacks}")
         if not self._unlikely:
             return told
         return (*told, f"{where}: {self._unlikely} angles beyond 2 rad: in degrees?")

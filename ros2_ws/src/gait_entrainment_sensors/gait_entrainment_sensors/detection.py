@@ -48,9 +48,9 @@ class Detection:
 class OwnMedian:
     """The median of what the person's own latest steps show; 0 before there are so many."""
 
-    def __init__(self, known: int = 1) -> None:
+    def __init__(self, known: int = 1, latest: int = _OWN_STEPS) -> None:
         self._known = known
-        self._latest: deque[float] = deque(maxlen=_OWN_STEPS)
+        self._latest: deque[float] = deque(maxlen=latest)
         self.value = 0.0
 
     def add(self, value: float) -> None:

@@ -265,7 +265,7 @@ def events_of_markers(capture: MotionCapture) -> list[Detection]:
     feet[:, capture.up] = 0.0
     forward = feet / np.maximum(np.linalg.norm(feet, axis=1, keepdims=True), 1e-9)
     end = float(capture.times[-1])
-    step = float(capture.times[1])
+    step = end / max(len(capture.times) - 1, 1) or 1.0
     found = []
     for side in Side:
         leg = side.name.lower()

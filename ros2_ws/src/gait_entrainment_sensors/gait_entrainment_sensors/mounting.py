@@ -26,8 +26,6 @@ class Mounting:
     """The axis about which the toes turn down and the shank leans forward."""
 
     axis: tuple[float, float, float]  # of unit length, in the frame of the sensor
-    share: float  # of the variance that is about it
-    skewness: float  # of what decides the sign; far from zero
     swing: tuple[float, float, float]  # the axis of the swing itself, before it was put along
 
     @property
@@ -77,4 +75,4 @@ def find_mounting(
     if np.max(np.abs(axis)) > _ALONG:
         axis = np.sign(axis) * (np.abs(axis) > _ALONG)
     x, y, z = axis.tolist()
-    return Mounting((x, y, z), share, abs(skewness), tuple(swing.tolist()))
+    return Mounting((x, y, z), tuple(swing.tolist()))

@@ -11,13 +11,11 @@ doubled one finds its place taken, and neither moves the number of any other eve
 """
 
 import math
-import statistics
-from collections import deque
 from dataclasses import dataclass
 
 from gait_entrainment.conventions import EventKind, Side, nanoseconds
 from gait_entrainment.gait import GaitEvent, GaitLimits
-from gait_entrainment_sensors.detection import Detection
+from gait_entrainment_sensors.detection import Detection, OwnMedian
 
 # Heel strike and toe-off of each leg; a kind and side comes back after so many places.
 _PLACES = 4
@@ -59,7 +57,7 @@ class Numbering:
         self.counts = NumberingCounts()
         self._even = first_side  # the side whose strikes have even numbers
         self._known: dict[int, float] = {}  # remembered events: place -> time [s]
-        self._strides: deque[float] = deque(maxlen=_OWN_STRIDES)
+        self._strides = OwnMedian(_KNOWN_STRIDES, _OWN_STRIDES)
         # Time of the latest detection of each kind and side [s], and its place; None if refused.
         self._previous: list[tuple[float, int | None]] = [(-math.inf, None)] * _PLACES
         self._latest = -1  # place
@@ -67,8 +65,8 @@ class Numbering:
 
     @property
     def period(self) -> float:
-        """The person's own stride period [s]; NaN before it is known."""
-        return statistics.median(self._strides) if self._known_period() else math.nan
+        """The person's own stride period [s]; 0 before it is known."""
+        return self._strides.value
 
     def add(self, detection: Detection) -> GaitEvent | None:
         """Return the event, numbered, or None if it can have no place in the gait."""
@@ -94,19 +92,6 @@ class Numbering:
         stamp, sure = nanoseconds(detection.time), detection.uncertainty
         return GaitEvent(stamp, detection.kind, detection.side, step, sure)
 
-    def stopped(self, now: float) -> str:
-        """Return why nobody seems to walk at a time [s], or an empty text."""
-        if self._latest < 0:
-            return ""
-        stride = self.period if self._known_period() else self.limits.stride_most
-        silent = now - self._known[self._latest]
-        if silent <= self.limits.silence * stride:
-            return ""
-        return (
-            f"the gait has stopped: no event of either foot for {silent:.2f} s; allowed: "
-            f"{self.limits.silence:g} strides of {stride:.3g} s"
-        )
-
     def troubles(self) -> tuple[str, ...]:
         """Return what a person should know, each in one line; empty if all is well."""
         counts = self.counts
@@ -121,9 +106,6 @@ class Numbering:
         if counts.restarts:
             told.append(f"the count was begun anew {counts.restarts} times")
         return tuple(told)
-
-    def _known_period(self) -> bool:
-        return len(self._strides) >= _KNOWN_STRIDES
 
     def _begin(self, detection: Detection) -> int:
         """Return the place of the first heel strike."""
@@ -148,7 +130,7 @@ class Numbering:
         if before < 0:  # earlier than all that is remembered
             return "implausible", first
         place = before + 1 + (first - before - 1) % _PLACES  # the next of the kind and side
-        if self._known_period():
+        if self.period:
             # From the latest event, a quarter of a stride a place: the error is one place at most.
             strides = (time - self._known[before]) / self.period
             place = first + _PLACES * round((before - first) / _PLACES + strides)
@@ -169,7 +151,7 @@ class Numbering:
         (before, known), self._previous[first] = self._previous[first], (time, place)
         strides = 1 if place is None or known is None else max((place - known) // _PLACES, 1)
         if self.limits.stride_least <= (time - before) / strides <= self.limits.stride_most:
-            self._strides.append((time - before) / strides)
+            self._strides.add((time - before) / strides)
 
     def _accept(self, detection: Detection, place: int) -> None:
         """Remember an event."""
@@ -186,11 +168,11 @@ class Numbering:
     def _restart(self, detection: Detection) -> int:
         """Believe the detections rather than the model; return the place to go on from."""
         elapsed = detection.time - self._known[self._latest]
-        passed = max(round(_PLACES * elapsed / self.period), 0) if self._known_period() else 0
+        passed = max(round(_PLACES * elapsed / self.period), 0) if self.period else 0
         place = self._latest + passed + 1
         place += (self._first_place(detection) - place) % _PLACES
         self._known = {}
         self._refused = [0] * _PLACES
-        self._strides.clear()
+        self._strides = OwnMedian(_KNOWN_STRIDES, _OWN_STRIDES)
         self.counts.restarts += 1
         return place

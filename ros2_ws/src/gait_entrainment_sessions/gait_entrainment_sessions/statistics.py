@@ -71,7 +71,7 @@ class Border:
 
 def last_pulses(analysis: Analysis) -> tuple[PulsePhase, ...]:
     """Return the pulses with a lag of the last stretch: of one train, after the latest hole."""
-    placed = [pulse for pulse in analysis.pulses if pulse.has_lag]
+    placed = [pulse for pulse in analysis.pulses if not math.isnan(pulse.phase_lag)]
     if analysis.entrainments:
         last = analysis.entrainments[-1].stretch
         first = next(e.stride for e in analysis.entrainments if e.stretch == last)

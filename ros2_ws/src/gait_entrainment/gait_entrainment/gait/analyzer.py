@@ -189,7 +189,7 @@ class GaitAnalyzer:
             placed = self._numbers.number, onset, stride, before, after, unperturbed.mean
             pulse = self._lags.place(*placed)
             self.pulse_counts.placed += 1
-            self.pulse_counts.without_lag += not pulse.has_lag
+            self.pulse_counts.without_lag += math.isnan(pulse.phase_lag)
             pulses.append(pulse)
         unseen = any(s < stride.end and stride.start < e for s, e in self._unknown)
         if onsets or (unseen and self._numbers.number):

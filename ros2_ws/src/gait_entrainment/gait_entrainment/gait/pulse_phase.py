@@ -20,17 +20,10 @@ class PulsePhase:
     onset: int  # [ns]
     stride: int  # stride in which the pulse began
     phase: float  # (onset - heel strike) / stride period, in [0, 1)
-    # Onset minus the nearest toe-off [s]; NaN if that is missing. From the nearest heel strike of
-    # the leg, and ``toe_off`` is None, where no stride up to the first pulse has shown a toe-off.
-    phase_lag: float
+    phase_lag: float  # onset minus the nearest toe-off [s], or strike: `LagFollower`; NaN: missing
     unwrapped_lag: float  # the same, followed across wraps from the first lag on [s]
     toe_off: int | None  # the toe-off that the lag refers to [ns]
     phase_lag_uncertainty: float = 0.0  # standard deviation, that of the event [s]; 0: exact
-
-    @property
-    def has_lag(self) -> bool:
-        """Whether the event that the lag refers to was detected."""
-        return not math.isnan(self.phase_lag)
 
 
 def depends_on_next_toe_off(onset: int, stride: Stride) -> bool:
@@ -101,7 +94,7 @@ class PulseNumbers:
 
 class LagFollower:
     """
-    Follows the phase lag across its wraps, from toe-offs or ``from_strikes``.
+    Follows the phase lag across its wraps; ``from_strikes`` of the leg where no toe-off is found.
 
     Pulse n is compared with the toe-off n strides after that of the first pulse. That may lie in
     the future, so the strides T between are counted: unwrapped lag = lag + (m - n) T after m
@@ -117,11 +110,10 @@ class LagFollower:
     ) -> PulsePhase:
         """Place one pulse; as in ``nearest_toe_off``, and the unperturbed period [s]."""
         phase = (onset - stride.start) / (stride.end - stride.start)
+        nearest = nearest_toe_off(onset, stride, before, after)
         if self._from_strikes:
-            bounds = (stride.start, stride.number), (stride.end, stride.number + 1)
-            nearest: tuple[int, int] | None = min(bounds, key=lambda bound: abs(onset - bound[0]))
-        else:
-            nearest = nearest_toe_off(onset, stride, before, after)
+            strikes = (stride.start, stride.number), (stride.end, stride.number + 1)
+            nearest = min(strikes, key=lambda strike: abs(onset - strike[0]))
         if nearest is None:
             return PulsePhase(number, onset, stride.number, phase, math.nan, math.nan, None)
         toe_off, toe_off_stride = nearest

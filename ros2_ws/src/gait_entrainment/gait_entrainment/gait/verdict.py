@@ -168,7 +168,7 @@ class EntrainmentTest:
         self, stride: Stride, pulses: Sequence[PulsePhase], unperturbed: UnperturbedPeriod
     ) -> Entrainment | None:
         """Take one stride with its pulses; returns None if none of them has a lag."""
-        placed = [pulse for pulse in pulses if pulse.has_lag]
+        placed = [pulse for pulse in pulses if not math.isnan(pulse.phase_lag)]
         if not placed:
             return None
         for position, pulse in enumerate(placed, start=len(self._strides)):
