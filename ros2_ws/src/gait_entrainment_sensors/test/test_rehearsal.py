@@ -58,3 +58,17 @@ def test_steps_have_the_numbers_of_the_walker():
     assert rehearsal.train is not None
     planned = set(rehearsal.train.onsets)
     assert set(rehearsal.onsets) <= planned
+
+
+def test_where_no_toe_off_is_found_the_verdict_rests_on_heel_strikes():
+    protocol = replace(Protocol(), variation=Variation(0.0))
+    chain = Sensors("shank_gyroscope", find_detector("shank_gyroscope"), protocol.side, seed=5)
+    rehearsal = rehearse(protocol, chain)
+    assert EventKind.TOE_OFF not in {event.kind for event in rehearsal.events}
+    assert rehearsal.analysis.entrainments[-1].verdict is Verdict.ENTRAINED
+    last = rehearsal.analysis.pulses[-1]
+    strikes = [stride.end for stride in rehearsal.true_analysis.strides]
+    lags = [(last.onset - strike) / 1e9 for strike in strikes]
+    # Its heel strikes are 23 ms late there (docs/sensors.md).
+    assert last.phase_lag == pytest.approx(min(lags, key=abs), abs=0.03)
+    assert last.toe_off is None
