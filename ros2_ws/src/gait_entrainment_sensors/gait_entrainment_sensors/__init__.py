@@ -11,6 +11,8 @@ Gait events from the signals of sensors: detectors, numbering, emulated sensors,
     numbering       step numbers for what was detected on both feet
     emulated        what sensors on the simulated walker would measure
     rehearsal       a simulated experiment, seen through emulated sensors and detectors
+    sources         topics, fields of messages and columns of tables of each kind of sensor
+    scoring         detected events beside a reference
 """
 
 from gait_entrainment_sensors.detection import Detection, Detector, find_detector
