@@ -13,7 +13,7 @@ import statistics
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, field, fields
 from importlib.metadata import entry_points
 from typing import Any, ClassVar
 
@@ -74,30 +74,26 @@ class DetectorSettings(Checked):
     )
 
 
+def _counted(told: str) -> Any:
+    """Return a count that a person is told of in these words."""
+    return field(default=0, metadata={"told": told})
+
+
 @dataclass(slots=True)
 class SignalCounts:
     """What was wrong with the samples, and with what was found in them."""
 
-    not_finite: int = 0  # samples left out: not a number, or infinite
-    clock_back: int = 0  # samples left out: not later than the one before
-    clock_jumps: int = 0  # the clock went back by more than the longest gap: begun anew
-    dropouts: int = 0  # gaps longer than the longest gap: begun anew
-    constant: int = 0  # times that the signal did not change for too long
-    held: int = 0  # times that a moving signal stayed at one value: the end of its range
+    not_finite: int = _counted("samples are not numbers, left out")
+    clock_back: int = _counted("samples are not later than the one before, left out")
+    # By more than the longest gap: begun anew, as after a dropout.
+    clock_jumps: int = _counted("times the clock jumped back: synchronize the clocks")
+    dropouts: int = _counted("dropouts: see the cable or the radio link")
+    constant: int = _counted(
+        "times the signal did not change: sensor dead, not worn, or nobody walks"
+    )
+    held: int = _counted("times the signal stuck while it moved: raise the range of the sensor")
+    rejected: int = _counted("events were found and not believed")
     impossible: int = 0  # samples left out: beyond what a person can do: units, wrong sensor
-    rejected: int = 0  # events that were found and not believed
-
-
-# What a person is told of each count.
-_MEANINGS = {
-    "not_finite": "samples are not numbers, left out",
-    "clock_back": "samples are not later than the one before, left out",
-    "clock_jumps": "times the clock jumped back: synchronize the clocks",
-    "dropouts": "dropouts: see the cable or the radio link",
-    "constant": "times the signal did not change: sensor dead, not worn, or nobody walks",
-    "held": "times the signal stuck while it moved: raise the range of the sensor",
-    "rejected": "events were found and not believed",
-}
 
 
 class Detector(ABC):
@@ -244,9 +240,9 @@ class Detector(ABC):
         """
         where = f"{self.side.name.lower()} {self.name}"
         told = [
-            f"{where}: {n} {_MEANINGS[kind]}"
-            for kind, n in asdict(self.counts).items()
-            if n and kind in _MEANINGS
+            f"{where}: {n} {count.metadata['told']}"
+            for count in fields(self.counts)
+            if (n := getattr(self.counts, count.name)) and count.metadata
         ]
         if self.counts.impossible:
             told.append(
