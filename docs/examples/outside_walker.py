@@ -76,7 +76,8 @@ def answer(_, response):
 
 
 if __name__ == "__main__":
-    with rclpy.init(), suppress(KeyboardInterrupt, ExternalShutdownException):
+    rclpy.init()
+    with suppress(KeyboardInterrupt, ExternalShutdownException):
         walker = OutsideWalker("outside_walker")
         names = {msg.GaitEvent: "gait_events", msg.Progress: "walker/progress"}
         names[msg.PublishedCounts] = "published_counts"

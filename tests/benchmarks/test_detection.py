@@ -14,9 +14,10 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 
 from gait_entrainment.conventions import Side
+from gait_entrainment.gait import GaitEvent
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.walker import Walker
-from gait_entrainment_msgs.msg import GaitEvent
+from gait_entrainment_msgs import msg
 from gait_entrainment_msgs.srv import StartRun
 from gait_entrainment_nodes.messaging.client import Client
 from gait_entrainment_nodes.messaging.domain import claimed_domain
@@ -25,7 +26,6 @@ from gait_entrainment_nodes.messaging.topics import (
     DIAGNOSTICS,
     EVERY_MESSAGE_IN_REAL_TIME,
     GAIT_EVENTS,
-    Topic,
     sensor_topics,
 )
 from gait_entrainment_sensors.detection import detector_names
@@ -42,7 +42,7 @@ DETECTOR = "from gait_entrainment_nodes.nodes.gait_detector import main; raise S
 def play(domain):
     """Publish what all emulated sensors measure, each sample at its instant; print how many."""
     walker = Walker(WalkerParameters())
-    walker.advance(SECONDS * SECOND)
+    events = [GaitEvent(t.stamp, t.kind, t.side, t.step) for t in walker.advance(SECONDS * SECOND)]
     rclpy.init(domain_id=domain)
     node = rclpy.create_node("sensors")
     due = []  # instant, what makes the message, its publisher, and the values
@@ -55,7 +55,7 @@ def play(domain):
             offered = f"{name}/{topic.name}"
             publisher = node.create_publisher(topic.type, offered, EVERY_MESSAGE_IN_REAL_TIME)
             instants = sensor.due(SECONDS * SECOND)
-            measured = sensor.measure(instants, walker.sample(instants), ())
+            measured = sensor.measure(instants, walker.sample(instants), events)
             due += [
                 (instant, writer, publisher, values)
                 for instant, (_, values) in zip(instants.tolist(), measured, strict=True)
@@ -95,7 +95,7 @@ def test_events_come_soon_after_the_sample_that_decides():
             stack.callback(process.wait)
             stack.callback(process.terminate)
 
-            def note(event: GaitEvent, name: str = name) -> None:
+            def note(event: msg.GaitEvent, name: str = name) -> None:
                 at = event.detected_at
                 delays[name].append(time.time_ns() - at.sec * SECOND - at.nanosec)
 
@@ -105,7 +105,7 @@ def test_events_come_soon_after_the_sample_that_decides():
                     if "samples" in values:
                         heard[status.name] = int(values["samples"])
 
-            client.subscribe(Topic(f"{name}/{GAIT_EVENTS.name}", GaitEvent, GAIT_EVENTS.qos), note)
+            client.subscribe(GAIT_EVENTS._replace(name=f"{name}/{GAIT_EVENTS.name}"), note)
             client.subscribe(DIAGNOSTICS, note_samples)
         player = subprocess.Popen(
             [sys.executable, __file__, str(domain)], stdout=subprocess.PIPE, text=True
@@ -113,7 +113,8 @@ def test_events_come_soon_after_the_sample_that_decides():
         for name in names:
             service = f"{name}/walker/start"
             client.service(StartRun, service)
-            client.call(StartRun, service, StartRun.Request(run=1), period=0.5)
+            begun = StartRun.Request(run=1)
+            client.call(StartRun, service, begun, accept=lambda r: r.success, period=0.5)
         client.wait(lambda: player.poll() is not None, SECONDS + 60.0)
         sent, late = player.stdout.read().split()
     print(f"\n{sent} samples sent, {late} ms late (99 %); {sum(heard.values())} heard")
