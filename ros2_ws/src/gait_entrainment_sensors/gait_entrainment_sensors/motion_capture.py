@@ -226,6 +226,8 @@ def _whose(capture: MotionCapture, plate: Plate, start: float, end: float) -> Si
     """Return the foot that presses on a plate between two instants [s]; None if doubtful."""
     across = [axis for axis in range(3) if axis != capture.up]
     during = (capture.times >= start) & (capture.times <= end)
+    if not during.any():
+        return None
     times = capture.times[during]
     pressure = np.stack([np.interp(times, plate.times, p) for p in plate.pressure.T[across]], 1)
     away, stands = [], []
