@@ -5,7 +5,9 @@
 
 import os
 import re
+import shutil
 import subprocess
+import sys
 
 from harness import entrain_run
 from test_drivers import entrain
@@ -38,6 +40,15 @@ def test_stop_is_sent_before_anything_of_the_project_is_loaded():
     assert len(listener.requests()) == 1
     subprocess.run(["entrain", "stop", "--help"], capture_output=True, check=True)
     assert not listener.requests()
+    listener.close()
+
+
+def test_stop_is_sent_where_there_is_no_perl(tmp_path):
+    (tmp_path / "python3").symlink_to(sys.executable)
+    bare = {"PATH": str(tmp_path), "PYTHONPATH": os.pathsep.join(sys.path)}
+    listener = StopListener("somebody")
+    subprocess.run([shutil.which("entrain"), "stop"], capture_output=True, env=bare, check=False)
+    assert len(listener.requests()) == 1
     listener.close()
 
 
