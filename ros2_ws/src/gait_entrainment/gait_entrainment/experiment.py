@@ -181,10 +181,8 @@ class Conductor:
         """
         Take one gait event, and plan the pulses that it lets be planned.
 
-        One that is stamped later than ``now`` [ns] is not believed.
-
-        Raises ProtocolError if they would overlap at the resulting period, GaitError if the
-        baseline is not one to measure a period by.
+        One stamped after ``now`` [ns] is not believed. Raises ProtocolError if they would overlap
+        at the resulting period, GaitError if the baseline is not one to measure a period by.
         """
         for leg in self._legs.values():
             strike, stride = leg.tracker.latest_strike, leg.tracker.add(event, now)

@@ -100,12 +100,8 @@ class StrideTracker:
         self._rival: StrideTracker | None = None  # of dropped events that fit together
 
     def add(self, event: GaitEvent, now: float = math.inf) -> Stride | None:
-        """
-        Take one event; return the stride that it closes, if it closes one.
-
-        One that is stamped later than ``now`` [ns] has not happened: it never convinces.
-        """
-        if event.stamp > now:
+        """Take one event, none stamped after ``now`` [ns]; return the stride that it closes."""
+        if event.stamp > now:  # has not happened, so it never convinces
             self.counts.implausible += 1
             return None
         fate = self._fate(event)
