@@ -153,7 +153,7 @@ def _limits(reader: BagReader) -> Check:
         return Check("limits", DOUBTFUL, "the robot did not tell them")
     last = setups[-1]
     limits = ", ".join(f"{n} {v:g}" for n, v in zip(last.limit_names, last.limits, strict=True))
-    told = []
+    told: list[str] = []
     for robot in {setup.side: setup for setup in setups}.values():
         armed = f"armed by {robot.armed_by}" if robot.armed_by else ""
         known = f"{robot.driver} {robot.device}".strip(), armed, robot.watchdog, robot.preflight
