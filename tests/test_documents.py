@@ -74,6 +74,7 @@ def test_fields_of_a_protocol_are_all_there_with_their_defaults():
     for name in fields:
         default = attrgetter(name)(DEFAULT_PROTOCOL)
         told = default.name.lower() if isinstance(default, Enum) else default
+        told = str(told).lower() if isinstance(told, bool) else told
         told = "" if told is None else f"{told:g}" if isinstance(told, float) else str(told)
         assert said[name].removesuffix(" s") == told, name
 

@@ -10,13 +10,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gait_entrainment.conventions import Side
+from gait_entrainment.gait import Verdict
+from gait_entrainment.protocol import Protocol
 from gait_entrainment.robot import (
     PulseTiming,
     PulseTrain,
     RobotState,
     find_driver,
 )
-from gait_entrainment_commands.timing import MeasuredOnsets, measured_onset, quantile
+from gait_entrainment.simulation import simulate
+from gait_entrainment_commands.timing import MeasuredOnsets, measured_onset, quantile, timings_of
 
 MS = 1_000_000
 
@@ -91,3 +94,31 @@ def test_a_pulse_that_never_came_is_told_as_missing():
 @pytest.mark.parametrize(("share", "value"), [(0.5, 2), (0.51, 3), (1.0, 4), (0.0, 1)])
 def test_quantile_is_the_nearest_rank(share, value):
     assert quantile([1, 2, 3, 4], share) == value
+
+
+@pytest.fixture(scope="module")
+def default():
+    return simulate(Protocol(), timings_of=timings_of)
+
+
+def test_a_device_of_realistic_bandwidth_still_entrains(default):
+    """Its pulses come later, so the gait locks with them commanded earlier by as much."""
+    emulated = simulate(Protocol(driver="emulated"), timings_of=timings_of)
+    assert emulated.analysis.entrainments[-1].verdict is Verdict.ENTRAINED
+    late = [(t.measured - t.commanded) / 1e9 for t in emulated.timings]
+    assert len(late) == 50
+    assert min(late) > 0.005
+    assert max(late) < 0.020
+    lag, ideal = (s.analysis.pulses[-1].phase_lag for s in (emulated, default))
+    assert lag < ideal - 0.005
+    # Seen from the torque that was measured, the lag is nearer to the ideal robot's.
+    seen = simulate(Protocol(driver="emulated"), timings_of=timings_of, measured_onsets=True)
+    assert seen.events == emulated.events
+    assert abs(seen.analysis.pulses[-1].phase_lag - ideal) < abs(lag - ideal) / 2
+
+
+def test_the_ideal_robot_is_on_time_to_the_nanosecond(default):
+    assert [(t.sent, t.measured) for t in default.timings] == [
+        (t.commanded, t.commanded) for t in default.timings
+    ]
+    assert tuple(t.commanded for t in default.timings) == default.onsets

@@ -37,7 +37,7 @@ from gait_entrainment.robot.faults import (
 )
 from gait_entrainment.robot.limits import DeviceLimits, Dose
 from gait_entrainment.robot.profile import ProfileError, TorqueProfile
-from gait_entrainment.robot.pulse_train import Pulse, PulseTrain
+from gait_entrainment.robot.pulse_train import PulseTrain
 
 # How often the watchdog looks whether the experiment has fallen silent [s].
 _WATCH_PERIOD = 0.01
@@ -199,9 +199,9 @@ class GuardedRobot:
             raise DeviceError(f"the device {why}; see that all is well, then arm it")
         before = self.train
         self.limits.check(train, before.pulses if before else ())
-        ankles = [robot for robot in (self, self.partner) if robot is not None]
-        pending = [pulse for robot in ankles for pulse in robot.pending]
-        self.limits.check_dose(self.dose, [*pending, *train.pulses])
+        both = [(r.train.pulses, r.promised_until) for r in (self, self.partner) if r and r.train]
+        coming = [pulse for pulses, until in both for pulse in pulses if pulse.onset >= until]
+        self.limits.check_dose(self.dose, [*coming, *train.pulses])
         peak = self.capabilities.peak_torque
         largest = max((pulse.torque for pulse in train.pulses), key=abs)
         if abs(largest) > peak:
@@ -225,12 +225,6 @@ class GuardedRobot:
         if self.faults:  # a stop from another thread came in between
             self.stop()
             self._refuse_latched()
-
-    @property
-    def pending(self) -> list[Pulse]:
-        """Pulses that were accepted and are still to come."""
-        pulses = self.train.pulses if self.train else ()
-        return [pulse for pulse in pulses if pulse.onset >= self.promised_until]
 
     def cancel(self) -> None:
         """Forget the train: torque is zero from now on."""
