@@ -140,10 +140,7 @@ def test_a_walker_seen_through_sensors(walker, tmp_path):
 
 def test_somebody_else_may_record_a_run_that_begins_later(tmp_path):
     file = short_protocol(tmp_path, "theirs", 4)
-    free = tmp_path / "free.yaml"
-    free.write_text("/**/operator_page: {ros__parameters: {port: 0}}")
-    shown = ("page:=true", f"params_file:={free}")
-    arguments = (f"protocol:={file}", "recorder:=none", "start_delay:=3", *shown)
+    arguments = (f"protocol:={file}", "recorder:=none", "start_delay:=3")
     others = [name for name in NODES if name != "bag_recorder"]
     with (
         claimed_domain() as domain,
@@ -157,7 +154,6 @@ def test_somebody_else_may_record_a_run_that_begins_later(tmp_path):
         launch.find_nodes(others)
         assert launch.wait() == 0, launch.text
     assert "\nbag  " not in launch.text
-    assert "page: http://127.0.0.1:" in launch.text
     assert events[0].step == 0
 
 
@@ -240,17 +236,18 @@ def test_two_experiments_run_side_by_side(tmp_path):
 
 @pytest.mark.parametrize("node", ["gait_analyzer", "experiment"])
 def test_death_of_a_node_fails_the_launch_and_ends_everything(node, tmp_path):
-    bag = tmp_path / "bag"
+    bag, free = tmp_path / "bag", tmp_path / "free.yaml"
+    free.write_text("/**/operator_page: {ros__parameters: {port: 0}}")
+    words = (f"bag:={bag}", "real_time:=true", "page:=true", f"params_file:={free}")
     with (
         claimed_domain() as domain,
-        launched(
-            "experiment.launch.py", tmp_path / "out", domain, f"bag:={bag}", "real_time:=true"
-        ) as launch,
+        launched("experiment.launch.py", tmp_path / "out", domain, *words) as launch,
         probe(domain) as listener,
     ):
         strides = listener.listen(STRIDES)
         launch.find_nodes()
         listener.until(lambda: strides or not alive(launch.process.pid), "strides")
+        listener.until(lambda: "page: http://127.0.0.1:" in launch.text, "the page")
         os.kill(launch.nodes[node], signal.SIGKILL)
         assert launch.wait() == 1, launch.text
         assert f"{node} ended with exit code -9" in launch.text

@@ -52,7 +52,7 @@ def lag_chart(view: View) -> Options:
     values = [lag for _, lag in lags] + [0.0]
     if not math.isnan(stance):
         values.append(-stance)
-        series[0]["markArea"] = _shade({"yAxis": -stance}, {"yAxis": 0})
+        series[0]["markArea"] = _shade({"yAxis": -stance}, {"yAxis": 0}, "insideBottomLeft")
     low, high = _range(values, least=100.0)
     chart = _chart("stride", "ms", series, (low, high))
     if not math.isnan(view.period):
@@ -72,13 +72,14 @@ def torque_chart(view: View) -> Options:
     series = [_line("commanded", commanded, BLACK, "dashed", step="end")]
     if measured or not commanded:
         name = "computed (simulated robot)" if view.simulated else "measured"
-        series.append(_line(name, measured, BLUE, step=False))
+        # What is computed is told where it changes.
+        series.append(_line(name, measured, BLUE, step="end" if view.simulated else False))
         series[-1]["lineStyle"]["width"] = 3
     else:
         series[0]["name"] = "commanded (this robot measures none)"
     if view.torque and view.toe_off > 0 and view.double_stance > 0:
-        shade = _shade({"xAxis": view.toe_off - view.double_stance}, {"xAxis": view.toe_off})
-        series[0]["markArea"] = shade
+        begin, end = view.toe_off - view.double_stance, view.toe_off
+        series[0]["markArea"] = _shade({"xAxis": begin}, {"xAxis": end}, "top")
     values = [y for line in series for _, y in line["data"]] + [0.0]
     chart = _chart("s from heel strike", "N m", series, _range(values, least=2.0))
     chart["xAxis"] |= {"min": 0, "max": round(view.torque[-1][0], 3) if view.torque else 1}
@@ -91,8 +92,8 @@ def _line(name: str, data: Points, color: str, dash: str = "solid", **more: Any)
     return series | {"itemStyle": {"color": color}, "animation": False} | more
 
 
-def _shade(begin: Options, end: Options) -> Options:
-    label = {"show": True, "position": "insideBottomLeft", "color": _DARK_GREEN, "fontSize": _FONT}
+def _shade(begin: Options, end: Options, position: str) -> Options:
+    label = {"show": True, "position": position, "color": _DARK_GREEN, "fontSize": _FONT}
     area = [{"name": "double stance", **begin}, end]
     style = {"color": GREEN, "opacity": 0.18}
     return {"silent": True, "itemStyle": style, "label": label, "data": [area]}

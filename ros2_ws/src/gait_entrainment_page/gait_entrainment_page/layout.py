@@ -180,11 +180,11 @@ class Shown:
         with ui.element("div").classes("panels"):
             if not self.page.view().blinded:
                 self._gait()
-            with self._panel("Legs", "w4"):
+            with self._panel("Legs", "w3"):
                 ui.html('<canvas class="legs"></canvas>', sanitize=False).style(
                     "flex:1; display:flex"
                 )
-            self._table("robot", "Ankle robot", "w3")
+            self._table("robot", "Ankle robot", "w4")
             self._table("sensors", "Gait events", "w3")
             self._table("record", "Record", "w4")
             with self._panel("Operator", "w5 first"):
