@@ -63,10 +63,10 @@ class OutsideWalker(Node):
             self.send(msg.PublishedCounts, until, node="/gait_detector", **counts)
             self.run = 0
 
-    def send(self, kind, stamp, **fields):
-        message = kind(run=self.run, **fields)
+    def send(self, message_type, stamp, **fields):
+        message = message_type(run=self.run, **fields)
         message.header.stamp = to_time(stamp)
-        self.offered[kind].publish(message)
+        self.offered[message_type].publish(message)
 
 
 def answer(_, response):

@@ -64,6 +64,7 @@ def play(domain):
     publishers = {id(publisher): publisher for _, _, publisher, _ in due}.values()
     while not all(publisher.get_subscription_count() for publisher in publishers):
         time.sleep(0.01)
+    print("begins", flush=True)
     start, late = time.time_ns() + SECOND // 10, []
     for instant, writer, publisher, values in due:
         early = start + instant - time.time_ns()
@@ -110,6 +111,8 @@ def test_events_come_soon_after_the_sample_that_decides():
         player = subprocess.Popen(
             [sys.executable, __file__, str(domain)], stdout=subprocess.PIPE, text=True
         )
+        stack.callback(player.kill)
+        player.stdout.readline()
         for name in names:
             service = f"{name}/walker/start"
             client.service(StartRun, service)
