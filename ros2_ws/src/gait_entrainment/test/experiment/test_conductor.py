@@ -9,7 +9,7 @@ import math
 import statistics
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from gait_entrainment import experiment
@@ -105,6 +105,7 @@ def test_the_end_lies_behind_everything_promised_and_behind_the_last_stride(peri
 
 @settings(derandomize=True, deadline=None, max_examples=200)
 @given(baseline=st.integers(2, 30), period=st.floats(0.9, 1.6), start=st.floats(0, 1))
+@example(baseline=2, period=1.012214016417482, start=0.0)
 def test_first_pulse_of_a_constant_gait_is_never_before_the_stride_after_the_baseline(
     baseline, period, start
 ):
