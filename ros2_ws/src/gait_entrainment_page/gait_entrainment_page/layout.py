@@ -327,8 +327,8 @@ class Shown:
             self._set("figures", figures)
             self._set("lag", f"lag {view.lag()}")
         alarm = state.message if view.part == "failed" else ""
-        if view.robot is not None and view.robot.faults:
-            alarm = f"Robot: {', '.join(view.robot.faults)}. {view.measured()} measured. {alarm}"
+        if faults := view.faults():
+            alarm = f"Robot: {faults}. {view.measured()} measured. {alarm}"
         self._set("alarm", alarm)
         if bag is not None:
             self._set("instant", _clock((view.now - bag.start) / NANOSECONDS_PER_SECOND))

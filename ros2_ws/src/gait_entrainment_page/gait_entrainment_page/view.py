@@ -100,7 +100,7 @@ class View:
         # The latest double stances before a toe-off of the perturbed leg [s].
         self.stances: deque[float] = deque(maxlen=_EVENTS_COUNTED)
         self.verdict: Any = None  # latest Entrainment
-        self.robot: Any = None  # latest AnkleRobotState
+        self.robots: dict[Side, Any] = {}  # latest AnkleRobotState of each ankle that has one
         self.setup: Any = None  # latest AnkleRobotSetup
         self.simulated = False  # the robot: what it measures is computed
         self.legs: tuple[float, ...] = ()  # hips and ankles, left and right [rad]
@@ -190,11 +190,15 @@ class View:
             self.stances.append(passed / NANOSECONDS_PER_SECOND)
 
     def _on_robot(self, message: Any) -> None:
-        self.robot, reading = message, state_of(message)
-        self._readings.append((reading.stamp, reading.commanded, reading.measured))
+        side, reading = Side(message.side), state_of(message)
+        self.robots[side] = message
+        if self.side in (None, side):
+            self._readings.append((reading.stamp, reading.commanded, reading.measured))
 
     def _on_setup(self, message: Any) -> None:
-        self.setup, self.side = message, Side(message.side)
+        self.setup = message
+        if self.side is None:
+            self.side = Side(message.side)
         with contextlib.suppress(DeviceError):  # a driver that is not installed here
             self.simulated = find_driver(message.driver).simulated
 
@@ -282,7 +286,8 @@ class View:
     @property
     def pushes(self) -> bool:
         """Whether torque is commanded now."""
-        return not self.blinded and self.robot is not None and self.robot.commanded_torque != 0
+        asked = [state.commanded_torque for state in self.robots.values()]
+        return not self.blinded and any(torque != 0 for torque in asked)
 
     def measured(self) -> str:
         """
@@ -290,24 +295,37 @@ class View:
 
         A blinded operator learns it once the robot is stopped or has a fault: whether it falls.
         """
-        if self.robot is None:
-            return "nothing heard of the robot"
-        if self.blinded and self.robot.status == _ACTIVE and not self.robot.faults:
+        return self._of_each(self._measured) or "nothing heard of the robot"
+
+    def _measured(self, robot: Any) -> str:
+        if self.blinded and robot.status == _ACTIVE and not self.faults():
             return "hidden"
-        torque = self.robot.measured_torque
+        torque = robot.measured_torque
         if math.isnan(torque):
             return "not measured"
         return _torque(torque) + (" (simulated)" if self.simulated else "")
 
+    def faults(self) -> str:
+        """Return the faults of the robot on either ankle, empty if there are none."""
+        return self._of_each(lambda robot: ", ".join(robot.faults))
+
+    def _of_each(self, tell: Callable[[Any], str]) -> str:
+        """Return what is told of the robot, with the ankles named if they differ."""
+        told = {side: tell(robot) for side, robot in sorted(self.robots.items())}
+        if len(set(told.values())) <= 1:
+            return next(iter(told.values()), "")
+        return ", ".join(f"{side.name.lower()} {words or 'none'}" for side, words in told.items())
+
     def robot_words(self) -> list[tuple[str, str]]:
         """Return what there is to say of the robot: names and values."""
         rows = [("state", "not heard")]
-        if self.robot is not None:
-            rows = [("state", STATUSES[min(self.robot.status, 3)])]
+        if self.robots:
+            rows = [("state", self._of_each(lambda robot: STATUSES[min(robot.status, 3)]))]
             if not self.blinded:
-                rows.append(("commanded", _torque(self.robot.commanded_torque)))
+                asked = self._of_each(lambda robot: _torque(robot.commanded_torque))
+                rows.append(("commanded", asked))
             rows.append(("measured", self.measured()))
-            rows.append(("faults", ", ".join(self.robot.faults) or "none"))
+            rows.append(("faults", self.faults() or "none"))
         if (setup := self.setup) is not None:
             limits = dict(zip(setup.limit_names, setup.limits, strict=False))
             if self.blinded:

@@ -41,9 +41,9 @@ def event(at, kind, side):
     )  # fmt: skip
 
 
-def robot(at, commanded, measured, faults=()):
+def robot(at, commanded, measured, faults=(), side=RIGHT):
     return Message(
-        header=header(at), run=1, status=1, commanded_torque=commanded, measured_torque=measured,
+        header=header(at), run=1, side=side, status=1, commanded_torque=commanded, measured_torque=measured,
         angle=0.0, faults=list(faults),
     )  # fmt: skip
 
@@ -116,6 +116,21 @@ def test_torque_that_was_not_measured_is_never_called_zero():
     assert view.measured() == "not measured"
     view.take("perturbator/state", robot(2 * PERIOD, 0.0, -0.001))
     assert view.measured() == "+0.00 N m"
+
+
+def test_each_of_two_ankles_is_told_if_they_differ():
+    view = View()
+    walk(view, 1, 1, 10)
+    for side, torque, faults in ((LEFT, 9.0, ("too much torque",)), (RIGHT, 0.0, ())):
+        view.take("perturbator/state", robot(2 * PERIOD, 0.0, torque, faults, side))
+    assert view.measured() == "left +9.00 N m, right +0.00 N m"
+    assert view.faults() == "left too much torque, right none"
+    assert dict(view.robot_words())["state"] == "active"
+    # The chart is of the leg whose strides are counted.
+    view.take("perturbator/state", robot(2 * PERIOD + 1, 7.0, 7.0, (), LEFT))
+    assert view.pushes
+    walk(view, 2, 2, 10, readings=2, height=3.0)
+    assert max(commanded for _, commanded, _ in view.torque) == 3.0
 
 
 def test_a_simulated_torque_is_called_so():
