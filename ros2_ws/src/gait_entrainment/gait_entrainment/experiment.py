@@ -405,8 +405,8 @@ class Conductor:
         delay = nanoseconds((1 + plan.initial_phase) * stride)
         if self._periods:
             # The stamps of a constant gait are rounded, so its next stride can be a nanosecond
-            # longer than the mean: a pulse at phase 0 is not to come before the strike. The product
-            # itself is off by rounding, to a double, by less than a thousandth of a nanosecond.
+            # longer than the mean: a pulse at phase 0 is not to come before the strike. As a
+            # double, the product is off by less than a thousandth of a nanosecond.
             exact = (1 + plan.initial_phase) * stride * NANOSECONDS_PER_SECOND
             delay = math.floor(exact + 1e-3) + 1
         block.pulse_period = plan.period_for(stride)

@@ -43,8 +43,8 @@ def event(at, kind, side):
 
 def robot(at, commanded, measured, faults=(), side=RIGHT):
     return Message(
-        header=header(at), run=1, side=side, status=1, commanded_torque=commanded, measured_torque=measured,
-        angle=0.0, faults=list(faults),
+        header=header(at), run=1, side=side, status=1, commanded_torque=commanded,
+        measured_torque=measured, angle=0.0, faults=list(faults),
     )  # fmt: skip
 
 
