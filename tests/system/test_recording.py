@@ -52,6 +52,7 @@ from gait_entrainment_nodes.messaging.topics import (
     WALKER_PROGRESS,
     Topic,
 )
+from gait_entrainment_sensors.sources import ENCODER, FOOT, SHANK, SWITCH
 
 SECOND = 10**9
 RECORDER = (
@@ -399,6 +400,8 @@ def test_another_recorder_is_told_of_every_topic_that_counts() -> None:
 
 
 def every_topic() -> Iterator[Topic]:
+    for source in (ENCODER, FOOT, SHANK, SWITCH):
+        yield from topics.sensor_topics(source)
     for value in vars(topics).values():
         if isinstance(value, Topic):
             yield value

@@ -101,8 +101,11 @@ def read_run(
             for leg in live_sides
         }
         blocks = conducted(protocol, record.events)
-        begun = onsets[onset or live_onset]
-        analysis, judged = analyze_blocks(blocks, events, begun, side, settings, record.unknown)
+        begun, unknown = onsets[onset or live_onset], record.unknown
+        if side not in {leg for leg, _ in begun}:  # its strides, with pulses on the other ankle
+            begun = [(side, at) for _, at in begun]
+            unknown = [(side, *hole) for _, *hole in unknown]
+        analysis, judged = analyze_blocks(blocks, events, begun, side, settings, unknown)
         measured_period, pulse_period = periods_of(blocks, analysis)
         run = RecordedRun(
             protocol=protocol,
