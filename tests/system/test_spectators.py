@@ -38,7 +38,7 @@ def suspended_spectator(domain: int) -> Iterator[int]:
 
 def test_in_real_time_a_suspended_reader_delays_nobody(tmp_path):
     # It is over before the spectator's participant is given up for dead (20 s).
-    options = (*QUICK, "--baseline=2", "--pulses=24", "--washout=2", "--sample-rate=1000")
+    options = (*QUICK, "--baseline=2", "--pulses=28", "--washout=2", "--sample-rate=1000")
     with (
         entrain_run(tmp_path / "bag", *options, "--real-time", "--json") as run,
         suspended_spectator(run.domain()),
