@@ -8,41 +8,45 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from harness import LONG, QUICK, entrain_run
+import pytest
+from harness import LONG, QUICK, claimed_domain, entrain_run
 
 # After so long a suspended reader of shared memory held up its writers for seconds [s].
 HUNG_FOR = 12.0
 SILENCE_TIMEOUT = 3.0
 
 
-@contextmanager
-def suspended_spectator(domain: int) -> Iterator[int]:
-    """Have a process subscribe to every topic, and suspend it; give its number."""
+@pytest.fixture
+def suspend(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], int]]:
+    """Start a reader of every topic of the next run; give what suspends it, once it hears."""
+    with claimed_domain() as domain:
+        monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
     program = Path(__file__).with_name("spectator.py")
-    spectator = subprocess.Popen(
-        [sys.executable, program, str(domain)], stdout=subprocess.PIPE, text=True
-    )
-    try:
-        assert spectator.stdout is not None
-        assert spectator.stdout.readline() == "ready\n"
+    spectator = subprocess.Popen([sys.executable, program], stdout=subprocess.PIPE, text=True)
+    assert spectator.stdout is not None
+    words = iter(spectator.stdout)
+
+    def suspend() -> int:
+        assert next(words) == "hears\n"
         os.kill(spectator.pid, signal.SIGSTOP)
-        yield spectator.pid
+        return spectator.pid
+
+    try:
+        assert next(words) == "listens\n"  # so a short run is not over before
+        yield suspend
     finally:
         spectator.kill()
         spectator.wait()
 
 
-def test_in_real_time_a_suspended_reader_delays_nobody(tmp_path):
+def test_in_real_time_a_suspended_reader_delays_nobody(tmp_path, suspend):
     # It is over before the spectator's participant is given up for dead (20 s).
-    options = (*QUICK, "--baseline=2", "--pulses=28", "--washout=2", "--sample-rate=1000")
-    with (
-        entrain_run(tmp_path / "bag", *options, "--real-time", "--json") as run,
-        suspended_spectator(run.domain()),
-    ):
+    options = (*QUICK, "--baseline=2", "--pulses=24", "--washout=2", "--sample-rate=1000")
+    with entrain_run(tmp_path / "bag", *options, "--real-time", "--json") as run:
+        suspend()
         begin = time.monotonic()
         outcome = run.outcome()
         assert run.ended_at - begin > HUNG_FOR
@@ -52,11 +56,9 @@ def test_in_real_time_a_suspended_reader_delays_nobody(tmp_path):
     assert outcome["promises"]["starved_stretches"] == 0
 
 
-def test_in_real_time_a_run_with_a_suspended_reader_is_stopped_as_any(tmp_path):
-    with (
-        entrain_run(tmp_path / "bag", *LONG, "--real-time", "--sample-rate=1000") as run,
-        suspended_spectator(run.domain()),
-    ):
+def test_in_real_time_a_run_with_a_suspended_reader_is_stopped_as_any(tmp_path, suspend):
+    with entrain_run(tmp_path / "bag", *LONG, "--real-time", "--sample-rate=1000") as run:
+        suspend()
         run.wait_for_stride(12)
         begin = time.monotonic()
         run.process.send_signal(signal.SIGINT)
@@ -66,11 +68,9 @@ def test_in_real_time_a_run_with_a_suspended_reader_is_stopped_as_any(tmp_path):
         assert run.survivors() == []
 
 
-def test_in_lock_step_a_suspended_reader_is_named(tmp_path):
-    with (
-        entrain_run(tmp_path / "bag", *LONG) as run,
-        suspended_spectator(run.domain()) as spectator,
-    ):
+def test_in_lock_step_a_suspended_reader_is_named(tmp_path, suspend):
+    with entrain_run(tmp_path / "bag", *LONG) as run:
+        spectator = suspend()
         begin = time.monotonic()
         assert run.wait() == 1
         assert f"held up by process {spectator} " in run.text.splitlines()[0]
