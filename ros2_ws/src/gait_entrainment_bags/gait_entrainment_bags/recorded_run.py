@@ -104,7 +104,7 @@ def read_run(
         begun, unknown = onsets[onset or live_onset], record.unknown
         if side not in {leg for leg, _ in begun}:  # its strides, with pulses on the other ankle
             begun = [(side, at) for _, at in begun]
-            unknown = [(side, *hole) for _, *hole in unknown]
+            unknown = [(side, start, end) for _, start, end in unknown]
         analysis, judged = analyze_blocks(blocks, events, begun, side, settings, unknown)
         measured_period, pulse_period = periods_of(blocks, analysis)
         run = RecordedRun(
