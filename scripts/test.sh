@@ -2,8 +2,8 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-# Every test. Most share the processors, a file for each at a time; then so do those that run in
-# real time and wait most of the time. Those that stop every robot of this machine, or hold its
+# Every test. Most share the processors, a file for each at a time and one more, since some wait;
+# then so do those that run in real time. Those that stop every robot of this machine, or hold its
 # timing to account, have it to themselves. Arguments go to pytest each time.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -15,14 +15,15 @@ run() {
     pytest "$@" || [[ $? == "$nothing_selected" ]] || failed=1
 }
 
+workers=$(($(nproc) + 1))
 devices=ros2_ws/src/gait_entrainment_drivers/test
 alone=("$devices/test_torque_loop.py" tests/safety tests/page
     tests/system/test_{preflight,session_stop,stop_command}.py)
 waiting=("$devices"
     tests/system/test_{deaths,drivers,interventions,person,perturbator,races,real_time_run}.py
     tests/system/test_{ros2_control,spectators,stopping}.py)
-run --numprocesses auto --dist loadfile \
+run --numprocesses "$workers" --dist loadfile \
     "${waiting[@]/#/--ignore=}" "${alone[@]/#/--ignore=}" ros2_ws/src tests "$@"
-run --numprocesses 3 --dist loadfile "${alone[@]/#/--ignore=}" "${waiting[@]}" "$@"
+run --numprocesses "$workers" --dist loadfile "${alone[@]/#/--ignore=}" "${waiting[@]}" "$@"
 run "${alone[@]}" "$@"
 exit $failed

@@ -34,7 +34,7 @@ RESULTS = ("/gait/strides", "/gait/pulse_phases", "/gait/entrainment")
 # Of each topic, at most [s].
 DELIVERY = 0.03
 # By when the nodes are up [s]; where they take longer it is tried again with more.
-UP = (6.0, 25.0)
+UP = (9.0, 25.0)
 
 
 def delays(pair="", matched=0.0):
