@@ -95,10 +95,9 @@ fi
 
 install() {
     # Nothing is compiled here: of empy there is no wheel, but it is Python only. Given through the
-    # environment, the constraints hold for what builds its wheel too. Python compiles what is used
-    # when it is first imported: to compile everything takes as long as to install it.
+    # environment, the constraints hold for what builds its wheel too.
     PIP_USER=0 PIP_CONSTRAINT=.venv/constraints.txt .venv/bin/python -m pip install -qq --no-input \
-        --disable-pip-version-check --progress-bar off --no-compile --only-binary :all: --no-binary empy "$@" ||
+        --disable-pip-version-check --progress-bar off --only-binary :all: --no-binary empy "$@" ||
         fail "pip could not install the packages (its message is above); once that is solved, run this again"
 }
 
