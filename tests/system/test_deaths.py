@@ -59,7 +59,7 @@ def test_death_ends_the_run(node, tmp_path):
 def test_stalled_process_ends_the_run(mode, stalled, tmp_path):
     # All at once: most of the time is spent waiting. How long it takes is then no measure of one
     # run any more, save where there is only one.
-    limit = SILENCE_TIMEOUT + END_WITHIN if len(stalled) == 1 else PATIENCE
+    limit = SILENCE_TIMEOUT + 2 * END_WITHIN if len(stalled) == 1 else PATIENCE
     runs = {}
     try:
         for node in stalled:

@@ -190,7 +190,7 @@ def test_torque_ends_if_one_who_must_be_heard_falls_silent(tmp_path, silent):
             conductor.promise(now, now + 0.2)
             nodes.probe.client.each_round = live
             assert conductor.request(
-                time.time() + 1.0, period=10.0, count=3, duration=0.5
+                time.time() + 2.0, period=10.0, count=3, duration=0.5
             ).accepted
             nodes.probe.until(lambda: states and states[-1].measured_torque > 0.5, "torque")
             alive.remove(silent)
