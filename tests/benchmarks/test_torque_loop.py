@@ -15,23 +15,13 @@ from gait_entrainment.conventions import Side
 from gait_entrainment.robot import DeviceLimits, find_driver
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "safety"))
-from test_real_time import quantiles
+from test_real_time import lateness_of_sleeping, quantiles
 from time_to_zero import busy, emulated_motor
 
 pytestmark = pytest.mark.benchmark
 
 RATE = 500
 SECONDS = 10.0
-
-
-def lateness_of_sleeping():
-    """Return how late a loop wakes that only sleeps from deadline to deadline [s]."""
-    begin, late = time.monotonic(), []
-    for k in range(1, int(RATE * SECONDS)):
-        due = begin + k / RATE
-        time.sleep(max(due - time.monotonic(), 0))
-        late.append(time.monotonic() - due)
-    return late
 
 
 def lateness_of_commands(port):
@@ -56,10 +46,10 @@ def lateness_of_commands(port):
 def test_commands_at_500_hz(tmp_path, count):
     with emulated_motor("ak_motor_emulator", tmp_path / "trace") as port, busy(count):
         late, refused = lateness_of_commands(port)
-        bare = lateness_of_sleeping()
+        bare = lateness_of_sleeping(RATE, SECONDS)
         with contextlib.suppress(PermissionError):
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(50))
-        first = lateness_of_sleeping()
+        first = lateness_of_sleeping(RATE, SECONDS)
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
     print(f"\nbeside {count} busy processes; not permitted: {refused or 'nothing'}")
     for name, lateness in (

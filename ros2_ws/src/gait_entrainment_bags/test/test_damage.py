@@ -54,12 +54,12 @@ def test_every_byte_flipped(small_bag: Path, tmp_path: Path) -> None:
             os.pwrite(file.fileno(), bytes([byte]), offset)
 
 
-def test_bytes_of_the_metadata_file_flipped(small_bag: Path, tmp_path: Path) -> None:
+def test_every_byte_of_the_metadata_file_flipped(small_bag: Path, tmp_path: Path) -> None:
     folder = tmp_path / "small"
     folder.mkdir()
     (folder / "small_0.mcap").write_bytes((small_bag / "small_0.mcap").read_bytes())
     data = bytearray((small_bag / "metadata.yaml").read_bytes())
-    for offset in range(0, len(data), 3):
+    for offset in range(len(data)):
         data[offset] ^= 0x15
         (folder / "metadata.yaml").write_bytes(data)
         data[offset] ^= 0x15

@@ -131,7 +131,7 @@ class Run:
         for ankle in self._ankles.values():
             ankle.robot.cancel()  # all robots first, whatever becomes of the messages
         for ankle in self._ankles.values():
-            ankle.end_torque(outcome, reason, fault=fault)
+            ankle.tell_end(outcome, reason, fault=fault)
 
 
 class AnkleRun:
@@ -195,13 +195,12 @@ class AnkleRun:
             for state in self.robot.read():
                 self._publish_state(state)
 
-    def end_torque(self, outcome: int, reason: str, *, fault: bool = False) -> None:
+    def tell_end(self, outcome: int, reason: str, *, fault: bool = False) -> None:
         """
-        Bring the torque to zero now, whatever was promised.
+        Tell whoever asked for torque, and the walker, that it is zero now, whatever was promised.
 
         A ``fault`` is told the walker even if no torque was due.
         """
-        self.robot.cancel()
         self._end_trains(outcome, reason)
         if self._committed or fault:
             self._committed = False
