@@ -42,7 +42,7 @@ setup: ## ROS 2 Jazzy and pinned Python packages in .venv
 build: setup ## build the workspace with colcon
 	@scripts/build.sh
 
-lock: ## resolve requirements/*.in again (needs uv)
+lock: ## resolve requirements/*.in again
 	@scripts/lock.sh
 
 clean: ## remove what was built

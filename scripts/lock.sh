@@ -3,19 +3,19 @@
 # SPDX-License-Identifier: Apache-2.0
 
 # Resolve requirements/*.in into requirements/lock.txt: every version, for Python 3.10 to 3.14.
-# Needs `uv` (pip install uv). Only for those who change the requirements; setting up needs no uv.
+# Only for those who change the requirements. Needs what setting up has installed.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../requirements"
 
-if ! command -v uv > /dev/null; then
-    echo "lock: uv is missing: pip install uv" >&2
+if [ ! -x ../.venv/bin/uv ]; then
+    echo "lock: there is no .venv: make setup" >&2
     exit 1
 fi
 
 {
     echo "# Written by \`make lock\` from the .in files beside it. Python 3.10 to 3.14, Linux, x86-64."
     # The markers of the one platform there is are left out: they would hide the ones that differ.
-    uv pip compile --quiet --universal --python-version 3.10 --no-header \
+    ../.venv/bin/uv pip compile --quiet --universal --python-version 3.10 --no-header \
         --annotation-style line --no-annotate ./*.in |
         sed -E "s/ and implementation_name == 'cpython'//
                 s/ and platform_machine == 'x86_64'//

@@ -216,10 +216,11 @@ class Bench(ABC):
 
     def run_into_pulse(self) -> int:
         """Run to where most of a pulse is still to come; return the end of what is promised."""
-        self.schedule(duration=self.long_pulse, period=3 * self.long_pulse, count=20)
+        train = self.schedule(duration=self.long_pulse, period=3 * self.long_pulse, count=20)
+        onset = train.pulses[0].onset
         self.run(self.lead + 0.3 * self.long_pulse)
         give_up = self.now + nanoseconds(self.tolerances.onset)
-        while not (pushed := self._pushes()) and self.now < give_up:
+        while not (pushed := self.largest_since(onset) > self.height / 2) and self.now < give_up:
             self.advance(self.now + self.stretch)
         require(
             pushed,
@@ -227,10 +228,6 @@ class Bench(ABC):
             "not delivered.",
         )
         return self.promised_until
-
-    def _pushes(self) -> bool:
-        """Whether a pulse has been delivered lately."""
-        return self.largest_since(self.now - nanoseconds(0.1)) > self.height / 2
 
     # What was delivered
 
