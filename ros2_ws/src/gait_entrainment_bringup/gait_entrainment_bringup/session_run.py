@@ -146,9 +146,9 @@ class SessionRun:
         reason = self._in_a_process(protocol, bag, about)
         if reason:
             folder.note("failed", number, bag.name, reason)
-            raise BlockFailedError(
-                f"block {number}: {reason.splitlines()[0]}; the same command resumes at it"
-            )
+            why, *log = reason.splitlines()
+            told = f"block {number}: {why}; the same command resumes at it"
+            raise BlockFailedError("\n".join([told, *log]))
         folder.note("done", number, bag.name)
 
     def _in_a_process(self, protocol: Protocol, bag: Path, about: dict[str, str]) -> str:

@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import pytest
 
 from gait_entrainment_bringup import session_run
+from gait_entrainment_bringup.commands.run import kept
 from gait_entrainment_bringup.session_run import BlockFailedError, SessionRun
 from gait_entrainment_drivers.proof import keep_preflight
 from gait_entrainment_sessions.folder import SessionFolder
@@ -124,11 +125,16 @@ def test_the_end_of_the_input_is_a_pause(conduct, monkeypatch):
 
 
 def test_a_block_that_fails_ends_the_session_and_is_the_next(conduct):
-    with pytest.raises(BlockFailedError, match="block 2: it fell; the same command resumes"):
+    told = r"block 2: it fell; the same command resumes at it\n  walker_sim\| more"
+    with pytest.raises(BlockFailedError, match=told):
         conduct(ends=["", "it fell\n  walker_sim| more"])
     folder = conduct()
     assert ledger(folder)[3:5] == [("failed", "2", "it fell walker_sim| more"), ("begun", "2", "")]
     assert sorted(folder.runs()) == [1, 2]
+
+
+def test_of_a_run_that_could_not_be_recorded_nothing_is_kept(tmp_path):
+    assert kept(tmp_path / "removed, as the disk is full") == ""
 
 
 def test_a_repetition_needs_a_block_that_is_done(conduct):
