@@ -72,7 +72,8 @@ def test_first_ends_before_the_next_is_asked_and_last_comes_last(programs):
     assert first < min(between) <= max(between) < last
 
 
-def test_a_node_that_is_stopped_as_it_starts_ends_without_a_word(programs, tmp_path, capfd):
+@pytest.mark.usefixtures("programs")
+def test_a_node_that_is_stopped_as_it_starts_ends_without_a_word(tmp_path, capfd):
     before = {number: signal.getsignal(number) for number in STOPPING}
     stop_on_signals()
     try:
