@@ -17,12 +17,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from gait_entrainment.conventions import (
-    NANOSECONDS_PER_SECOND,
-    EventKind,
-    Side,
-    nanoseconds_of,
-)
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side, nanoseconds_of
 from gait_entrainment.gait.verdict import Reason, Verdict
 from gait_entrainment.robot import DeviceError, DeviceLimits, find_driver
 from gait_entrainment.settings import settings_of
