@@ -64,7 +64,7 @@ class TorqueLoop:
 
     def __init__(self, link: Link, device: TorqueDevice, settings: Any) -> None:
         self._link, self._device, self._settings = link, device, settings
-        self._stop_channel = StopListener(device.name.replace(" ", "_"))
+        self._stop_channel = StopListener(device.name)
         self._period = 1 / settings.rate
         capabilities = device.capabilities
         self._gone = _RUN_DOWN_SHARE * capabilities.peak_torque
@@ -76,7 +76,7 @@ class TorqueLoop:
         self._enabled = self._closing = False
         self._halted = False  # no torque until the device is opened anew
         self._samples: list[Sample] = []  # not handed over yet
-        self._askers: list[str | bytes] = []  # of a stop, not answered yet
+        self._askers: list[str | bytes | None] = []  # of a stop, not answered yet
         self._ended_at = math.inf  # when torque was ended [s]
         self._measured = math.nan  # torque measured last [N m]
         self._heard_at = self._answered_at = self._due = time.monotonic()

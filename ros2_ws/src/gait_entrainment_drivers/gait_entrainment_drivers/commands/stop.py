@@ -20,6 +20,8 @@ DESCRIPTION = (
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     parser.add_argument("--json", action="store_true", help="print one JSON object")
+    # Whoever is in a hurry mistypes: nothing keeps it from stopping.
+    parser.add_argument("words", nargs="*", help=argparse.SUPPRESS)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -32,8 +34,11 @@ def run(options: argparse.Namespace) -> int:
         for name, answer in answers.items():
             print(f"{name}: {answer.message if answer else 'does not answer'}")
     if not answers:
-        print("entrain stop: no robot is driven by this machine", file=sys.stderr)
+        told = "no robot is driven by this machine: if one pushes, cut its power"
+        print(f"entrain stop: {told}", file=sys.stderr)
         return 1
+    if options.words:
+        print(f"entrain stop: unknown words: {' '.join(options.words)}", file=sys.stderr)
     failed = [name for name, answer in answers.items() if answer is None or not answer.done]
     if failed:
         print(
