@@ -38,8 +38,6 @@ _START_TIMEOUT = 10.0
 _ANSWER_TIMEOUT = 2.0
 # Commands whose lateness is remembered: ten seconds of the fastest loop.
 _REMEMBERED = 10_000
-# Pulses in one packet to the loop at most: it has to fit into a socket's buffer, samples too.
-_PACKET_PULSES = 10
 _LOOP_ENDED = Fault(
     "torque_loop_ended",
     "The process that streams torque has ended: the device's own watchdog must bring zero. If "
@@ -176,10 +174,7 @@ class HostTimedRobot(AnkleRobot):
         if late > 0:
             raise LimitError(f"onset: is over by {late / NANOSECONDS_PER_SECOND:.3g} s")
         self._train = self._train.followed_by(train) if self._train else train
-        pulses = train.shifted(-self._offset).pulses
-        for first in range(0, len(pulses), _PACKET_PULSES):
-            part = pulses[first : first + _PACKET_PULSES]
-            self._tell("train", PulseTrain(train.side, part))
+        self._tell("train", train.shifted(-self._offset))
 
     def cancel(self) -> None:
         """Drop the train; the next command is zero."""
