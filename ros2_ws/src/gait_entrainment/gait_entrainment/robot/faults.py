@@ -40,16 +40,6 @@ DEADMAN_SILENT = Fault(
 EXPERIMENT_SILENT = Fault(
     "experiment_silent", "The experiment sent no horizon for longer than the limit."
 )
-DEVICE_SILENT = Fault(
-    "device_silent",
-    "The device sent no reply for longer than the limit: see to its power and wiring, or to what"
-    " else loads this computer.",
-)
-HOST_LOOP_LATE = Fault(
-    "host_loop_late",
-    "The loop that times the torque woke up later than the limit: see to what else loads this"
-    " computer.",
-)
 TORQUE_EXCEEDED = Fault(
     "torque_exceeded", "More torque was delivered than the limit and its margin allow."
 )
