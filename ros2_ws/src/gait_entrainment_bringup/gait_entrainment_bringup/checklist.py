@@ -18,7 +18,7 @@ from gait_entrainment.robot.faults import STOPPED
 from gait_entrainment_bags.messages import nanoseconds_of
 from gait_entrainment_bringup.node_list import CLOCK_OFFSET, limits_of
 from gait_entrainment_bringup.operator_console import STOP_KEY, pressed_key
-from gait_entrainment_drivers.monitor import NEAR_ZERO_SHARE
+from gait_entrainment_drivers.monitor import NEAR_ZERO_SHARE, torque_scale
 from gait_entrainment_drivers.proof import proof_of
 from gait_entrainment_drivers.stop_channel import StopAnswer, stop_all
 from gait_entrainment_nodes.messaging.domain import wanted_domain
@@ -174,8 +174,7 @@ def _stop(robot: GuardedRobot, timeout: float) -> Point:
         measured = _watch(robot, lambda: False, _FALL_TIME)
     finally:
         channel.close()
-    near_zero = NEAR_ZERO_SHARE * robot.capabilities.peak_torque
-    if not abs(measured) <= near_zero:
+    if not abs(measured) <= NEAR_ZERO_SHARE * torque_scale(robot.capabilities):
         return Point("stop", False, f"pressed, but {measured:.2f} N m are measured: cut the power")
     return Point("stop", True, f"obeyed and latched, {measured:+.2f} N m measured")
 

@@ -81,9 +81,10 @@ class StopListener:
     def answer(self, addresses: Iterable[str | bytes | None], answer: StopAnswer) -> None:
         """Answer requests; whoever asked and is gone misses nothing."""
         data = json.dumps(asdict(answer)).encode()
-        for address in filter(None, addresses):
-            with suppress(OSError):
-                self._socket.sendto(data, address)
+        for address in addresses:
+            if address is not None:
+                with suppress(OSError):
+                    self._socket.sendto(data, address)
 
     def close(self) -> None:
         """Listen no more."""

@@ -24,28 +24,31 @@ import sys
 import time
 from typing import Any
 
-from gait_entrainment.robot.faults import (
-    DEVICE_SILENT,
-    DRIVER_FAILED,
-    HOST_LOOP_LATE,
-    STOPPED,
-    DeviceError,
-    Fault,
-)
+from gait_entrainment.robot.faults import DRIVER_FAILED, STOPPED, DeviceError, Fault
 from gait_entrainment.robot.pulse_train import PulseTrain
 from gait_entrainment_drivers.device import Reading, TorqueDevice
 from gait_entrainment_drivers.device_lock import DeviceLock
 from gait_entrainment_drivers.link import Link, Sample
-from gait_entrainment_drivers.monitor import NEAR_ZERO_SHARE, NOT_FALLING, Monitor
+from gait_entrainment_drivers.monitor import NEAR_ZERO_SHARE, NOT_FALLING, Monitor, torque_scale
 from gait_entrainment_drivers.stop_channel import StopAnswer, StopListener
 
+DEVICE_SILENT = Fault(
+    "device_silent",
+    "The device sent no reply for longer than the limit: see to its power and wiring, or to what"
+    " else loads this computer.",
+)
+HOST_LOOP_LATE = Fault(
+    "host_loop_late",
+    "The loop that times the torque woke up later than the limit: see to what else loads this"
+    " computer.",
+)
 HOST_SILENT = Fault(
     "host_silent",
     "The process that holds the robot fell silent for longer than the limit: it is frozen, or "
     "this computer is overloaded.",
 )
 # Before the device is disabled it is asked for zero torque: this often, so that a lost frame does
-# not matter, and on until its torque has run down to this share of its peak, or for this long [s].
+# not matter, and on until torque has run down to this share of its scale, or for this long [s].
 _ZERO_TICKS = 5
 _RUN_DOWN_SHARE = 0.02
 _RUN_DOWN_TIME = 0.2
@@ -67,9 +70,9 @@ class TorqueLoop:
         self._stop_channel = StopListener(device.name)
         self._period = 1 / settings.rate
         capabilities = device.capabilities
-        self._gone = _RUN_DOWN_SHARE * capabilities.peak_torque
-        self._near_zero = NEAR_ZERO_SHARE * capabilities.peak_torque
-        self._monitor = Monitor(settings, capabilities.peak_torque, capabilities.torque_bandwidth)
+        self._gone = _RUN_DOWN_SHARE * torque_scale(capabilities)
+        self._near_zero = NEAR_ZERO_SHARE * torque_scale(capabilities)
+        self._monitor = Monitor(settings, capabilities)
         self._lock: DeviceLock | None = None  # while the device is open
         self._train: PulseTrain | None = None  # onsets in steady time
         self._faults: tuple[Fault, ...] = ()

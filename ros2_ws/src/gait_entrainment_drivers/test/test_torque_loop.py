@@ -14,6 +14,8 @@ from misbehaving_device import PEAK, MisbehavingOptions, MisbehavingRobot
 from gait_entrainment.conventions import Side
 from gait_entrainment.robot import DeviceError, PulseTrain
 from gait_entrainment.robot.guard import GuardedRobot
+from gait_entrainment_drivers.host_timed import LoopOptions
+from gait_entrainment_drivers.monitor import Monitor, MonitorSettings
 from gait_entrainment_drivers.stop_channel import listening, stop_all
 
 from .emulator_process import until
@@ -89,6 +91,7 @@ def bench(tmp_path):
         ("heat up", "too_hot"),
         ("report an error", "overheated"),
         ("measure NaN", "reading_not_finite"),
+        ("lose the angle", "reading_not_finite"),
         ("answer no more", "device_silent"),
         ("raise", "driver_failed"),
     ],
@@ -204,6 +207,13 @@ def test_the_last_thing_before_disabling_is_zero(bench):
     *commands, disabled = [torque for _, torque in device.commands()]
     assert math.isnan(disabled)
     assert commands[-5:] == [0.0] * 5
+
+
+def test_a_strong_motor_is_judged_by_what_a_person_is_to_feel():
+    bands = [
+        Monitor(MonitorSettings(), LoopOptions().capabilities(peak)).band for peak in (18.0, 390.0)
+    ]
+    assert bands == pytest.approx([0.12 * 18, 0.12 * 30])
 
 
 def test_peak_of_the_bench_device_is_above_what_is_asked_for():

@@ -34,8 +34,8 @@ def run(options: argparse.Namespace) -> int:
         for name, answer in answers.items():
             print(f"{name}: {answer.message if answer else 'does not answer'}")
     if not answers:
-        told = "no robot is driven by this machine: if one pushes, cut its power"
-        print(f"entrain stop: {told}", file=sys.stderr)
+        nobody = "no robot is driven by this machine: if one pushes, cut its power"
+        print(f"entrain stop: {nobody}", file=sys.stderr)
         return 1
     if options.words:
         print(f"entrain stop: unknown words: {' '.join(options.words)}", file=sys.stderr)
