@@ -30,13 +30,6 @@ class Fault:
 
 
 STOPPED = Fault("stopped", "The stop was called.")
-OPERATOR_SILENT = Fault(
-    "operator_silent",
-    "An operator fell silent: a terminal or a page is closed, or a process is frozen.",
-)
-DEADMAN_SILENT = Fault(
-    "deadman_silent", "The emergency stop fell silent: it was let go, or its node has ended."
-)
 EXPERIMENT_SILENT = Fault(
     "experiment_silent", "The experiment sent no horizon for longer than the limit."
 )
