@@ -77,7 +77,7 @@ class TorqueLoop:
         self._train: PulseTrain | None = None  # onsets in steady time
         self._faults: tuple[Fault, ...] = ()
         self._enabled = self._closing = False
-        self._halted = False  # no torque until the device is opened anew
+        self._halted = False  # no torque in the life of this process any more
         self._samples: list[Sample] = []  # not handed over yet
         self._askers: list[str | bytes | None] = []  # of a stop, not answered yet
         self._ended_at = math.inf  # when torque was ended [s]
@@ -146,7 +146,7 @@ class TorqueLoop:
             return None
 
     def _end_torque(self, fault: Fault | None = None) -> None:
-        """Ask for zero torque from now on, for this reason, until the device is opened anew."""
+        """Ask for zero torque from now on, for this reason, for good."""
         self._train = None
         if not self._halted:
             self._halted, self._ended_at = True, time.monotonic()
@@ -218,7 +218,6 @@ class TorqueLoop:
             self._link.send("done", kind, error)
 
     def _open(self) -> None:
-        self._faults, self._halted, self._ended_at = (), False, math.inf
         self._lock = DeviceLock(self._device.address)
         self._device.open()
         self._link.send("identity", self._device.identity)

@@ -6,17 +6,20 @@
 import math
 import os
 import signal
+import socket
 import time
 
 import pytest
-from misbehaving_device import PEAK, MisbehavingOptions, MisbehavingRobot
+from misbehaving_device import PEAK, MisbehavingDevice, MisbehavingOptions, MisbehavingRobot
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.robot import DeviceError, PulseTrain
 from gait_entrainment.robot.guard import GuardedRobot
 from gait_entrainment_drivers.host_timed import LoopOptions
+from gait_entrainment_drivers.link import Link
 from gait_entrainment_drivers.monitor import Monitor, MonitorSettings
 from gait_entrainment_drivers.stop_channel import listening, stop_all
+from gait_entrainment_drivers.torque_loop import TorqueLoop
 
 from .emulator_process import until
 
@@ -181,14 +184,37 @@ def test_a_stop_of_a_motor_that_goes_on_pushing_says_to_cut_the_power(bench):
     device.until(lambda: "torque_not_falling" in device.faults())
 
 
-def test_a_frozen_loop_gives_no_answer(bench):
-    device = bench()
+def test_a_frozen_loop_gives_no_answer_and_is_named(bench):
+    device = bench(host_silence=0.1)
+    device.push()
     pid = device.driver._process.pid
     os.kill(pid, signal.SIGSTOP)
     try:
         assert stop_all(0.2)[f"bench_device/{pid}"] is None
+        device.until(device.faults)
+        assert device.faults() == ["torque_loop_silent"]
     finally:
         os.kill(pid, signal.SIGCONT)
+    asked = len(device.commands())
+    device.until(lambda: len(device.commands()) > asked + 20)
+    assert {torque for _, torque in device.commands()[asked:]} == {0.0}
+
+
+def test_a_stop_that_comes_before_the_device_is_opened_is_not_forgotten():
+    options = MisbehavingOptions()
+    ours, theirs = map(Link, socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET))
+    loop = TorqueLoop(theirs, MisbehavingDevice(options), options)
+    stop_all(0.0)
+    for step in ("open", "enable"):
+        ours.send(step)
+    loop._listen()
+    ours.send("train", PulseTrain.periodic(Side.LEFT, time.monotonic_ns(), 1.0, 1, HEIGHT, 1.0))
+    loop._tick()
+    assert loop._samples == []  # sent
+    *_, (_, (sample,)) = ours.received()
+    assert sample.commanded == 0.0
+    loop._closing = True
+    loop.serve()
 
 
 def test_a_closed_robot_listens_no_more(bench):
