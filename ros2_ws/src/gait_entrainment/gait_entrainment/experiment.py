@@ -135,7 +135,7 @@ class Conductor:
         self._legs = {side: _Leg(side, own) for side in protocol.sides}
         self.blocks: list[BlockRun] = []  # those that have begun
         self._begin_block()
-        self._longest_lookahead = longest_lookahead
+        self.longest_lookahead = longest_lookahead
         self._shortest = _shortest_stride(protocol)
         self._lookahead = min(self._shortest, longest_lookahead)
         self._longest_promise = self._lookahead
@@ -200,7 +200,7 @@ class Conductor:
         if stride is not None and not self.block.baseline:
             self._periods.append(stride.period)
             # A promise must end before the next strike can be an onset's reference.
-            self._lookahead = min(self._longest_lookahead, *self._periods)
+            self._lookahead = min(self.longest_lookahead, *self._periods)
             self._longest_promise = max(self._longest_promise, self._lookahead)
         if self._closing_strike is not None or not self._in_block(strike):
             return
