@@ -229,8 +229,7 @@ def _delivered(bag: Path, protocol: Protocol) -> list[tuple[float, float]]:
 
 def _conduct(parent: int, answer: Any, keyboard: int, conduct: Callable[..., None]) -> None:
     """Conduct one block in a process of its own; tell the parent how it ended."""
-    os.dup2(keyboard, 0)
-    sys.stdin = os.fdopen(0, closefd=False)  # the space bar stops
+    os.dup2(keyboard, 0)  # the space bar stops
     end_once()
     reason = ""
     try:

@@ -124,6 +124,7 @@ class HostTimedRobot(AnkleRobot):
                 ],
                 pass_fds=[theirs.fileno()],
                 stdin=subprocess.DEVNULL,
+                env={**os.environ, "PYTHONSAFEPATH": "1"},  # of modules in the working folder
                 start_new_session=True,  # a terminal's Ctrl-C and Ctrl-Z are for the parent
             )
         self._link = Link(ours)

@@ -23,6 +23,7 @@ from rclpy.utilities import remove_ros_args
 
 from gait_entrainment.errors import EntrainmentError, UsageError
 from gait_entrainment_bags import NothingToPlayError
+from gait_entrainment_drivers.signals import STOPPING
 from gait_entrainment_nodes.messaging.environment import come_before_others
 from gait_entrainment_nodes.nodes.late import PERIOD
 from gait_entrainment_nodes.nodes.parameters import HELP, HelpRequestedError
@@ -33,7 +34,7 @@ LONGEST_SLEEP = 0.1
 
 def run_node(make_node: Callable[[], Any]) -> int:
     """
-    Run a node until it is finished, it fails, or SIGINT or SIGTERM arrives.
+    Run a node until it is finished, it fails, or a signal arrives that stops.
 
     Returns
     -------
@@ -52,7 +53,7 @@ def run_node(make_node: Callable[[], Any]) -> int:
             node.stopping = True
 
     # rclpy's own handlers shut the context down at once: no last message could be sent.
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in STOPPING:
         signal.signal(number, request_stop)
     name = sys.argv[0].rpartition("/")[2]
     try:
