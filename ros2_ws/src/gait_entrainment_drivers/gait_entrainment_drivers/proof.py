@@ -13,6 +13,7 @@ motor is another robot. The files are in ``gait_entrainment`` in the user's stat
 
 import json
 import os
+import socket
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from datetime import datetime, timezone
@@ -124,7 +125,8 @@ def _known(name: str) -> dict[str, Any]:
 
 def _key(driver: str) -> str:
     name, _, options = driver.partition(":")
-    return f"{name}:{join_options(sorted(split_options(options)))}"
+    # Several computers may share a home folder.
+    return f"{socket.gethostname()}/{name}:{join_options(sorted(split_options(options)))}"
 
 
 def _now() -> str:
