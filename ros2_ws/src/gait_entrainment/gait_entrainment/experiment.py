@@ -137,8 +137,7 @@ class Conductor:
         self._begin_block()
         self.longest_lookahead = longest_lookahead
         self._shortest = _shortest_stride(protocol)
-        self._lookahead = min(self._shortest, longest_lookahead)
-        self._longest_promise = self._lookahead
+        self._longest_promise = self._lookahead = min(self._shortest, longest_lookahead)
         self._promised = 0  # up to this instant [ns]
         self._heights: list[float] = []  # of the pulses of the block [N m]
         # By ankle: pulses planned and not requested yet, and the promise not made before they are.
@@ -248,8 +247,9 @@ class Conductor:
         until, last = self._until(known_until), self._closing_strike is not None
         if not last:
             walking = self.block.first_onset is not None and self._resting_until is None
-            if walking and (stopped := self._leg.tracker.watch.stopped(known_until)):
-                raise GaitError(stopped)
+            told = self._leg.tracker.watch.stopped(known_until, self.block.pulse_period)
+            if walking and told:
+                raise GaitError(told)
             self._promised = max(self._promised, until)
         return Horizon(until, last)
 
