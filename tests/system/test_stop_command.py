@@ -109,7 +109,7 @@ def test_strangers_on_this_machine_are_in_nobodys_way(strange):
     with other, nameless, somebody() as came, somebody(strange):
         answers = stop_all(0.2)
         assert len(answers) == 2
-        assert [name for name in answers if answers[name]] == [f"some_body/{os.getpid()}"]
+        assert [name for name in answers if answers[name].done] == [f"some_body/{os.getpid()}"]
         code, out, err = entrain(None, "stop")
         assert code == 1
         assert out.count(ZERO.message) == 1
@@ -118,7 +118,7 @@ def test_strangers_on_this_machine_are_in_nobodys_way(strange):
         nameless.sendto(b"stop", f"\0{PREFIX}some_body/{os.getpid()}")  # whom nobody can answer
         while None not in came:
             time.sleep(0.01)
-        assert stop_all()[f"some_body/{os.getpid()}"]
+        assert stop_all()[f"some_body/{os.getpid()}"].done
 
 
 def test_any_name_of_a_robot_is_found():

@@ -31,7 +31,7 @@ class Operator:
         """Publish the heartbeat; raise NodeError if the stop key was pressed."""
         self._heartbeat.publish(OPERATOR_HEARTBEAT.type(data=RUN_CLIENT))
         if pressed_key() == STOP_KEY:
-            told = [f"{name}: {a.message if a else 'no answer'}" for name, a in stop_all().items()]
+            told = [f"{name}: {answer.message}" for name, answer in stop_all().items()]
             raise NodeError("stopped by the space bar: " + "; ".join(told), "")
 
 

@@ -40,15 +40,14 @@ class StopAnswer:
     message: str  # for people, in one line; says "zero" only of a torque that was measured
 
 
+NO_ANSWER = StopAnswer(False, "does not answer")
+
+
 class StopListener:
     """
     The end of the channel at the robot: requests are polled, or waited for by ``select``.
 
-    Parameters
-    ----------
-    name
-        What the robot is called in answers, such as the driver's name.
-
+    ``name`` is what the robot is called in answers, such as the driver's name.
     """
 
     def __init__(self, name: str) -> None:
@@ -100,19 +99,19 @@ def listening() -> list[str]:
     return sorted(name.removeprefix(marker) for name in names if name.startswith(marker))
 
 
-def stop_all(timeout: float = 0.5) -> dict[str, StopAnswer | None]:
+def stop_all(timeout: float = 0.5) -> dict[str, StopAnswer]:
     """
     Ask every robot of this machine to bring its torque to zero, as the script ``entrain`` does.
 
-    Returns the answers by name; None for a robot that did not answer within ``timeout`` [s].
+    Returns the answers by name; one that does not come within ``timeout`` [s] is NO_ANSWER.
     """
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as asker:
         asker.setblocking(False)
         asker.bind("")  # the kernel chooses an abstract name
         names = [name for name in listening() if _ask(asker, name)]
-        answers: dict[str, StopAnswer | None] = dict.fromkeys(names)
+        answers = dict.fromkeys(names, NO_ANSWER)
         give_up = time.monotonic() + timeout
-        while None in answers.values() and (left := give_up - time.monotonic()) > 0:
+        while NO_ANSWER in answers.values() and (left := give_up - time.monotonic()) > 0:
             if select.select([asker], [], [], left)[0]:
                 data, address = asker.recvfrom(_LARGEST_ANSWER)
                 sender = os.fsdecode(address or b"").removeprefix(f"\0{PREFIX}")

@@ -18,7 +18,7 @@ from gait_entrainment.robot.guard import GuardedRobot
 from gait_entrainment_drivers.host_timed import LoopOptions
 from gait_entrainment_drivers.link import Link
 from gait_entrainment_drivers.monitor import Monitor, MonitorSettings
-from gait_entrainment_drivers.stop_channel import listening, stop_all
+from gait_entrainment_drivers.stop_channel import NO_ANSWER, listening, stop_all
 from gait_entrainment_drivers.torque_loop import TorqueLoop
 
 from .emulator_process import until
@@ -190,7 +190,7 @@ def test_a_frozen_loop_gives_no_answer_and_is_named(bench):
     pid = device.driver._process.pid
     os.kill(pid, signal.SIGSTOP)
     try:
-        assert stop_all(0.2)[f"bench_device/{pid}"] is None
+        assert stop_all(0.2)[f"bench_device/{pid}"] is NO_ANSWER
         device.until(device.faults)
         assert device.faults() == ["torque_loop_silent"]
     finally:

@@ -28,18 +28,17 @@ def run(options: argparse.Namespace) -> int:
     """Stop everything; 1 if there is nothing to stop, or somebody did not confirm it."""
     answers = stop_all()
     if options.json:
-        told = {name: answer and asdict(answer) for name, answer in answers.items()}
-        print(json.dumps({"stopped": told}))
+        print(json.dumps({"stopped": {name: asdict(a) for name, a in answers.items()}}))
     else:
         for name, answer in answers.items():
-            print(f"{name}: {answer.message if answer else 'does not answer'}")
+            print(f"{name}: {answer.message}")
     if not answers:
         nobody = "no robot is driven by this machine: if one pushes, cut its power"
         print(f"entrain stop: {nobody}", file=sys.stderr)
         return 1
     if options.words:
         print(f"entrain stop: unknown words: {' '.join(options.words)}", file=sys.stderr)
-    failed = [name for name, answer in answers.items() if answer is None or not answer.done]
+    failed = [name for name, answer in answers.items() if not answer.done]
     if failed:
         print(
             f"entrain stop: {', '.join(failed)} did not confirm the stop: cut the power",
