@@ -170,15 +170,7 @@ class HostTimedRobot(AnkleRobot):
         self._offset = time.time_ns() - time.monotonic_ns()
 
     def schedule(self, train: PulseTrain) -> None:
-        """
-        Hand over a train.
-
-        Raises
-        ------
-        LimitError
-            if its first onset is over already.
-
-        """
+        """Hand over a train; LimitError if its first onset is over already."""
         late = time.monotonic_ns() + self._offset - train.onsets[0]
         if late > 0:
             raise LimitError(f"onset: is over by {late / NANOSECONDS_PER_SECOND:.3g} s")

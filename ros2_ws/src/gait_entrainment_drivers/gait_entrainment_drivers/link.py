@@ -68,15 +68,7 @@ class Link:
                 del samples[:_MESSAGE_SAMPLES]
 
     def received(self) -> list[Any]:
-        """
-        Return the messages that have come since the last call.
-
-        Raises
-        ------
-        EOFError
-            if the other side has ended.
-
-        """
+        """Return the messages since the last call; EOFError if the other side has ended."""
         messages: list[Any] = []
         while True:
             try:

@@ -42,11 +42,7 @@ _OPTIONAL = ("angle", "velocity", "temperature")
 
 
 def torque_scale(able: Capabilities) -> float:
-    """
-    Return the torque [N m] whose shares are what a measurement may be off by.
-
-    A motor far stronger than what a person is to feel is not judged by its own strength.
-    """
+    """Return the torque [N m] to judge by: a strong motor's peak is more than one is to feel."""
     return min(able.peak_torque, DeviceLimits.torque)
 
 

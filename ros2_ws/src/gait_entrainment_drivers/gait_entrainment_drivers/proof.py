@@ -64,11 +64,7 @@ def keep_proof(driver: str, within: float | None) -> None:
     """
     Remember that zero was measured within a time [s]; None takes back what was proved before.
 
-    Raises
-    ------
-    DeviceError
-        if it cannot be written.
-
+    Raises DeviceError if it cannot be written.
     """
     _keep(_PROOFS, driver, None if within is None else Proof(within, _now(), _version()))
 

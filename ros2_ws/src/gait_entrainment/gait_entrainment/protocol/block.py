@@ -101,11 +101,7 @@ class PulsePlan(Checked):
         """
         Return the first period of the pulses [s] for a measured stride period [s].
 
-        Raises
-        ------
-        ProtocolError
-            if successive pulses would overlap.
-
+        Raises ProtocolError if successive pulses would overlap.
         """
         if self.period is not None:
             period = self.period

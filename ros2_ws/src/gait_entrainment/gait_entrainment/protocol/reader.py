@@ -50,23 +50,12 @@ def read_protocol(
     to_run: bool = False,
 ) -> Protocol:
     """
-    Read and validate a protocol.
+    Read and validate a protocol: a YAML file, the text of one (with a line break), or the default.
 
-    Parameters
-    ----------
-    source
-        Path of a YAML file, the text of one (with a line break), or None for the default.
-    overrides
-        Values that replace those of the file: dotted field name -> (value, who says so), for
-        instance ``{"pulses.width": (0.2, "--width")}``. A text is read as what it stands for.
-    to_run
-        Hold the pulses against the limits, and see that there is such a driver, too.
-
-    Raises
-    ------
-    ProtocolError
-        One line: place, field, what is allowed.
-
+    ``overrides`` replace values of the file: dotted field name -> (value, who says so), for
+    instance ``{"pulses.width": (0.2, "--width")}``. A text is read as what it stands for.
+    ``to_run`` holds the pulses against the limits, and sees that there is such a driver, too.
+    Raises ProtocolError: one line with place, field, and what is allowed.
     """
     entries = dict(_entries(source)) if source is not None else {}
     replacing = dict(_spelled_out(key, _Entry(*given)) for key, given in (overrides or {}).items())

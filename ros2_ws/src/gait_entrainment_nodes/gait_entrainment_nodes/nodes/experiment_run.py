@@ -229,12 +229,7 @@ class Run:
         return self._began[0] + round(self._clock() * NANOSECONDS_PER_SECOND) + STAMP_TOLERANCE
 
     def _owed_from(self, progress: msg.Progress) -> float:
-        """
-        Return since when there ought to be more than a progress [s, steady].
-
-        One that goes on, but lags by more than what is promised ahead, or stands still, is no
-        better than none: nobody would know that the gait has stopped.
-        """
+        """Return since when [s, steady] more is owed: one that lags would hide a gait's stop."""
         if self._began is None or self.conductor is None:
             return math.inf
         about = (nanoseconds_of(progress.header.stamp) - self._began[1]) / NANOSECONDS_PER_SECOND

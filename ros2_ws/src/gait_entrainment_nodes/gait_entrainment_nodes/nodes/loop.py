@@ -36,12 +36,8 @@ def run_node(make_node: Callable[[], Any]) -> int:
     """
     Run a node until it is finished, it fails, or a signal arrives that stops.
 
-    Returns
-    -------
-    int
-        0 for a clean stop, 1 for a failure, 2 for an argument or a parameter that was refused;
-        the reason is one line on standard error, after the traceback of an unforeseen failure.
-
+    Returns 0 for a clean stop, 1 for a failure, 2 for an argument or a parameter that was refused;
+    the reason is one line on standard error, after the traceback of an unforeseen failure.
     """
     stop_requested = False
     node: Any = None

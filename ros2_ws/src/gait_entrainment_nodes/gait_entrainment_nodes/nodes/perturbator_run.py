@@ -47,10 +47,9 @@ _DEADMAN_SILENT = Fault(
 
 
 class SignsOfLife:
-    """When those were heard last who have to be heard while torque may come."""
+    """When those who have to be heard while torque may come were, on steady time [s]."""
 
     def __init__(self) -> None:
-        # On steady time [s].
         self._operators: dict[str, float] = {}
         self._stop = -math.inf
 
