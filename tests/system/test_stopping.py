@@ -11,7 +11,7 @@ from harness import QUICK, cpu_seconds, session, stamp_of
 
 from gait_entrainment_bags import BagReader
 from gait_entrainment_bringup.node_list import DISPLAY, NODES
-from gait_entrainment_drivers.signals import STOPPING
+from gait_entrainment_commands.signals import STOPPING
 from gait_entrainment_msgs.action import RunProtocol
 from gait_entrainment_nodes.messaging.topics import ANKLE_TORQUE, PULSES, TORQUE_PROFILE
 

@@ -23,8 +23,8 @@ from gait_entrainment_bags import BagError, BagReader
 from gait_entrainment_bags.topic_names import PULSES
 from gait_entrainment_bringup.commands.run import run_experiment
 from gait_entrainment_bringup.node_process import end_with
+from gait_entrainment_commands.signals import end_once, undisturbed
 from gait_entrainment_drivers.proof import preflight_of
-from gait_entrainment_drivers.signals import end_once, undisturbed
 from gait_entrainment_sessions.folder import KEY_HASH, SessionFolder
 from gait_entrainment_sessions.session_file import Session, SessionError
 

@@ -23,7 +23,7 @@ from rclpy.utilities import remove_ros_args
 
 from gait_entrainment.errors import EntrainmentError, UsageError
 from gait_entrainment_bags import NothingToPlayError
-from gait_entrainment_drivers.signals import STOPPING
+from gait_entrainment_commands.signals import STOPPING
 from gait_entrainment_nodes.messaging.environment import come_before_others
 from gait_entrainment_nodes.nodes.late import PERIOD
 from gait_entrainment_nodes.nodes.parameters import HELP, HelpRequestedError
