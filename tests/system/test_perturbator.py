@@ -8,9 +8,11 @@ import time
 from contextlib import contextmanager
 
 import pytest
+import rclpy
 from harness import Session, claimed_domain, session, stamp_of
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
+from rclpy.lifecycle import TransitionCallbackReturn
 from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 from test_drivers import emulated_motor
@@ -30,7 +32,10 @@ from gait_entrainment_nodes.messaging.topics import (
     ROBOT_STATE,
     TORQUE_PROFILE,
     TROUBLE,
+    quality,
 )
+from gait_entrainment_nodes.nodes import perturbator
+from gait_entrainment_nodes.nodes.perturbator_run import do_with_all
 
 UP = (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE)
 SECOND = 10**9
@@ -87,6 +92,8 @@ def test_cancelling_the_train_alone_ends_the_torque_at_once(tmp_path):
         assert result.outcome == DeliverPulseTrain.Result.CANCELLED
         assert result.delivered == 1
         assert list(conductor.promise(4, 6).torques) == [0.0]
+        back = Horizon(run=7, until=to_time(5 * SECOND), seal=seal_of(KEY))
+        conductor.horizons.publish(back)  # takes back no promise
         # Another train may follow.
         again = conductor.request(7)
         assert again.accepted
@@ -229,3 +236,46 @@ def horizon_from(now):
     message = Horizon(run=7, until=to_time(round((now + 0.2) * SECOND)), seal=seal_of(KEY))
     message.header.stamp = to_time(round(now * SECOND))
     return message
+
+
+def test_an_emergency_stop_is_heard_whatever_its_quality_and_holds_while_it_is_pressed(tmp_path):
+    with session(tmp_path, nodes=("perturbator",)) as nodes:
+        conductor, probe = Conductor(nodes), nodes.probe
+        for qos in (EMERGENCY_STOP.qos, quality(10), quality(1, reliable=False)):
+            button = probe.node.create_publisher(Bool, EMERGENCY_STOP.name, qos)
+            probe.until(button.get_subscription_count, "a reader")
+            count = len(conductor.troubles)
+
+            def press(button=button, count=count):
+                button.publish(Bool(data=True))
+                return len(conductor.troubles) > count
+
+            probe.until(press, "the stop")
+            assert "the emergency stop was pressed" in conductor.troubles[-1].message
+            assert conductor.transition(Transition.TRANSITION_DEACTIVATE)
+            assert conductor.transition(Transition.TRANSITION_CLEANUP)
+            assert not conductor.transition(Transition.TRANSITION_CONFIGURE)
+            probe.until(lambda: "release it" in conductor.troubles[-1].message, "the reason")
+            button.publish(Bool(data=False))
+            probe.until(lambda: conductor.transition(Transition.TRANSITION_CONFIGURE), "release")
+            assert conductor.transition(Transition.TRANSITION_ACTIVATE)
+            probe.node.destroy_publisher(button)
+
+
+def test_a_stop_while_the_robot_is_being_connected_is_not_forgotten(monkeypatch):
+    def stopped_meanwhile(*what):
+        made._stop_at_once()
+        do_with_all(*what)
+
+    rclpy.init()
+    made = perturbator.Perturbator()
+    try:
+        monkeypatch.setattr(perturbator, "do_with_all", stopped_meanwhile)
+        assert made.trigger_configure() == TransitionCallbackReturn.SUCCESS
+        monkeypatch.setattr(perturbator, "do_with_all", do_with_all)
+        assert made.trigger_activate() == TransitionCallbackReturn.FAILURE
+        assert [fault.name for fault in made._faults] == ["stopped"]
+    finally:
+        made.on_stop()
+        made.destroy_node()
+        rclpy.shutdown()

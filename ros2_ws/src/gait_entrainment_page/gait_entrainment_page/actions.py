@@ -45,8 +45,8 @@ def stop(nodes: Nodes | None) -> list[str]:
     If this machine drives none, that of another one is asked over ROS.
     """
     answers = stop_all()
-    lines = [f"{name}: {a.message if a else 'no answer'}" for name, a in answers.items()]
-    done = all(answer and answer.done for answer in answers.values())
+    lines = [f"{name}: {answer.message}" for name, answer in answers.items()]
+    done = all(answer.done for answer in answers.values())
     if not answers:
         if nodes is None or "stop" not in nodes.offered():
             return ["no robot is driven by this machine"]

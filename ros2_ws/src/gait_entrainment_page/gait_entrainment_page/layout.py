@@ -51,25 +51,12 @@ _HEARTBEAT = (
 
 class Page:
     """
-    The page, served from when it is made until it is closed; it tells people where.
+    The page, served at a socket from when it is made until it is closed; it tells people where.
 
-    Parameters
-    ----------
-    view
-        Gives the view that is shown.
-    seat, access
-        Who acts, and who may.
-    listener
-        The socket to serve at.
-    nodes, command
-        What can be asked of the nodes, and what can be started; None for a bag.
-    heartbeat
-        Whether the page is the operator's sign of life.
-    record
-        Folder of the record, whose disk is looked after.
-    bag
-        The bag that is shown, if it is none of a live run.
-
+    ``view`` gives the view that is shown; ``seat`` and ``access`` say who acts, and who may;
+    ``nodes`` and ``command`` what can be asked of the nodes, and started, None for a ``bag``.
+    ``heartbeat`` is whether the page is the operator's sign of life, ``record`` the folder whose
+    disk is looked after.
     """
 
     def __init__(
