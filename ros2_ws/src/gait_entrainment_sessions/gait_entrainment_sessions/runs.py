@@ -50,9 +50,9 @@ class PlacedRun:
 
 
 def is_sealed(bag: Path) -> bool:
-    """Whether a bag lies in a session of which nothing is to be told yet."""
-    folder = bag.absolute().parents[1]
-    return (folder / "ledger.tsv").exists() and SessionFolder(folder).sealed
+    """Whether a bag, a folder or a file, lies in a session of which nothing is to be told yet."""
+    around = (folder for folder in bag.resolve().parents if (folder / "ledger.tsv").exists())
+    return any(SessionFolder(folder).sealed for folder in around)
 
 
 def sessions_in(path: Path) -> list[SessionFolder]:
