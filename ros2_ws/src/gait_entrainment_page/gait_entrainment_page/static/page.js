@@ -10,6 +10,7 @@ const entrain = { heartbeat: false, acting: false };
   const OFF = 2000, OLD = 4000; // by which a clock may differ, and how old what is shown may be [ms]
   let lost = 0; // signs of life in a row that nobody answered
   let toldAt = performance.now();
+  const isOld = () => performance.now() - toldAt > OLD;
   entrain.told = (what) => { Object.assign(entrain, what); toldAt = performance.now(); };
   const byId = (id) => document.getElementById(id);
   const tell = (id, text) => { const box = byId(id); if (box && box.textContent !== text) box.textContent = text; };
@@ -36,6 +37,7 @@ const entrain = { heartbeat: false, acting: false };
 
   async function alive() {
     const sent = Date.now();
+    if (window.did_handshake && !window.socket.connected) toldAt = -Infinity;
     try {
       const body = document.visibilityState === "visible" ? "watching" : "";
       const signal = AbortSignal.timeout(2000);
@@ -44,8 +46,7 @@ const entrain = { heartbeat: false, acting: false };
       const now = (await response.json()).now;
       if (lost > 2) location.reload(); // another server may have come
       lost = 0;
-      tell("lost", performance.now() - toldAt > OLD
-        ? "What you see is old: nothing comes from the page's server. STOP works." : "");
+      tell("lost", isOld() ? "What you see is old: nothing comes from the page's server. STOP works." : "");
       const off = ((sent + Date.now()) / 2 - now) / 1000;
       tell("clock", Math.abs(off) * 1000 > OFF
         ? `The clock of this browser is ${off > 0 ? "ahead" : "behind"} by ${Math.abs(off).toFixed(1)} s: times on this page are those of the host.` : "");
@@ -58,7 +59,8 @@ const entrain = { heartbeat: false, acting: false };
   const gone = () => navigator.sendBeacon("/alive", "gone");
   addEventListener("pagehide", () => { if (!document.hidden) gone(); });
   document.addEventListener("visibilitychange", () => { if (document.hidden) gone(); });
-  addEventListener("beforeunload", (event) => { if (entrain.heartbeat && entrain.acting && !lost) event.preventDefault(); });
+  // No question stands before STOP when a page that was lost is loaded anew.
+  addEventListener("beforeunload", (event) => { if (entrain.heartbeat && entrain.acting && !isOld()) event.preventDefault(); });
   addEventListener("DOMContentLoaded", alive);
 
   // Angles: hips and ankles, left and right [rad]; lengths are those of the drawing.
