@@ -54,8 +54,9 @@ def read_protocol(
     """
     Read and validate a protocol: the default, or of what one says, a YAML file or its text.
 
-    A text has a line break in it. ``overrides`` replace values of the file: dotted field name -> (value, who says so), for
-    instance ``{"pulses.width": (0.2, "--width")}``. A text is read as what it stands for.
+    A text has a line break in it. ``overrides`` replace values of the source: dotted field name
+    -> (value, who says so), as ``{"pulses.width": (0.2, "--width")}``; a text is read as what it
+    stands for.
     ``to_run`` holds the pulses against the limits, and sees that there is such a driver, too.
     Raises ProtocolError: one line with place, field, and what is allowed.
     """
