@@ -192,7 +192,8 @@ def _require_plain_number(where: str, key: str, node: yaml.ScalarNode, value: ob
     if node.style in ("'", '"'):
         raise ProtocolError(f"{where}: {key}: {node.value!r} is a text: leave out the quotes")
     other_base = ":" in node.value or re.match(r"[-+]?0[0-9_box]", node.value)
-    if isinstance(value, int) and other_base:
+    same = node.value.isdigit() and int(node.value) == value
+    if isinstance(value, int) and other_base and not same:
         raise ProtocolError(
             f"{where}: {key}: {node.value} is {value} in YAML; write it as a decimal number"
         )

@@ -192,7 +192,8 @@ def test_options_that_contradict_each_other_are_refused():
 
 
 def test_a_text_is_taken_as_it_is_written():
-    protocol = read_protocol("name: 2012\npulses: {catch_pulses: 5}\n")
+    protocol = read_protocol("name: 2012\npulses: {catch_pulses: 5}\nseed: 07\n")
+    assert protocol.seed == 7
     assert (protocol.name, protocol.pulses.heights(1.0, (0, 1))[4]) == ("2012", 0.0)
 
 
