@@ -143,6 +143,6 @@ def test_a_sealed_session_tells_only_whether_the_data_are_sound(browser, pages):
     text, _ = shown(browser, pages["sealed"], DESKTOP)
     assert "This session is sealed" in text
     assert "Are the data sound?" in text
-    telling = "first|second|entrained|period_offset|stride period|off commanded|rate "
+    telling = "first|second|entrained|messages|period_offset|stride period|off commanded|rate "
     assert not re.search(telling, text)
     assert browser.find_elements("css selector", "svg") == []

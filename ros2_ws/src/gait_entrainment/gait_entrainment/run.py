@@ -4,7 +4,7 @@
 """What a simulated and a recorded run have in common: events, pulses, analysis, block by block."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Any
@@ -17,16 +17,19 @@ from gait_entrainment.robot import PulseTiming
 
 
 def settings_for(
-    plans: Iterable[Block], settings: VerdictSettings | None = None
+    plans: Sequence[Block], settings: VerdictSettings | None = None
 ) -> VerdictSettings | None:
     """
     Return the settings of a verdict about pulses that some blocks plan.
 
     Pulses by phase follow the gait: that their lag stays put shows nothing, whatever their period.
     """
-    if not any(plan.pulses.phase is not None for plan in plans):
-        return settings
-    return replace(settings or VerdictSettings(), smallest_difference=1.0)
+    pulses = [plan.pulses for plan in plans]
+    irregular = max((4 * p.jitter + abs(p.sweep) for p in pulses), default=0.0)
+    told: dict[str, Any] = {"irregularity": irregular} if irregular else {}
+    if any(p.phase is not None for p in pulses):
+        told["smallest_difference"] = 1.0
+    return replace(settings or VerdictSettings(), **told) if told else settings
 
 
 @dataclass(frozen=True)

@@ -79,7 +79,9 @@ def simulate(
         while train := conductor.due(walker.time_reached):
             robots[train.side].schedule(train)
         ended = horizon.last or walker.ending is not None
-    timings_of = timings_of or (lambda of, _: [PulseTiming(pulse.onset) for pulse in of])
+    timings_of = timings_of or (
+        lambda of, _: [PulseTiming(p.onset, None, None, p.torque, p.duration) for p in of]
+    )
     delivered = [(s, t) for s in robots for t in timings_of(pulses[s], states[s])]
     onsets = [(s, t.onset if measured_onsets else t.commanded) for s, t in delivered]
     analysis, blocks = analyze_blocks(conductor.blocks, events, onsets, protocol.side, settings)

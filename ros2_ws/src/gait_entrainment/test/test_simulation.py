@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from gait_entrainment import experiment
 from gait_entrainment.conventions import EventKind, Side
-from gait_entrainment.gait import Verdict
+from gait_entrainment.gait import Verdict, analyze
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.protocol import Protocol, PulsePlan
 from gait_entrainment.robot import LimitError
@@ -37,6 +37,17 @@ def test_the_papers_example_entrains_at_the_end_of_double_stance(default):
         assert -0.1 < pulse.phase_lag < 0
     # Washout: back to the unperturbed period, and the verdict stands.
     assert strides[-1].period == pytest.approx(default.measured_period, abs=1e-6)
+
+
+@pytest.mark.parametrize("irregular", [{"jitter": 0.8}, {"sweep": -0.9}])
+def test_pulses_that_are_planned_irregularly_are_one_train_without_holes(irregular):
+    plan = PulsePlan(count=40, period_offset=0.0, **irregular)
+    run = simulate(Protocol(pulses=plan))
+    assert [pulse.number for pulse in run.analysis.pulses] == list(range(1, 41))
+    assert {one.stretch for one in run.analysis.entrainments} == {1}
+    assert run.analysis.holes == ()
+    alone = analyze(run.events, run.onsets, Side.RIGHT)  # nobody knows the plan
+    assert alone.entrainments[-1].stretch > 1
 
 
 def test_the_stride_count_does_not_depend_on_the_pulse_period():

@@ -28,11 +28,7 @@ from gait_entrainment_bags import messages, topic_names
 from gait_entrainment_bags.errors import BagError
 from gait_entrainment_bags.reader import BagReader
 from gait_entrainment_bags.recovery import RECOVERY_KEY
-from gait_entrainment_bags.run_messages import (
-    AnkleTorques,
-    RunMessages,
-    fields_expected,
-)
+from gait_entrainment_bags.run_messages import AnkleTorques, RunMessages, fields_expected
 from gait_entrainment_bags.truth import TOE_OFF_BIAS, detector_errors, lag_shift, without_bias
 from gait_entrainment_bags.writer import ENDED_EARLY
 from gait_entrainment_commands.outcome import outcome_of, timing_outcome

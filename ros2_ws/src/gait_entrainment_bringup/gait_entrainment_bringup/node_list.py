@@ -240,9 +240,9 @@ def limits_of(protocol: Protocol, *, worn: bool) -> dict[str, Any]:
 
 
 def _verdict(protocol: Protocol | None) -> dict[str, Any]:
-    """Return what the analyzer must know of the protocol: whether there is something to test."""
+    """Return what the analyzer must know of the protocol's pulses: irregular, or by phase."""
     told = settings_for(protocol.sequence if protocol else ())
-    return {"verdict.smallest_difference": told.smallest_difference} if told else {}
+    return {f"verdict.{name}": value for name, value in said(told).items()} if told else {}
 
 
 def _drawn(protocol: Protocol) -> dict[str, Any]:

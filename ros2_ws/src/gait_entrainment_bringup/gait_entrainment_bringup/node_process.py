@@ -46,7 +46,12 @@ def start_node(
     context: Any = multiprocessing.get_context(method)
     more = (os.getpid(), module, words, log, dict(environment))
     process: BaseProcess = context.Process(target=_run, args=more, daemon=True)
-    process.start()
+    # What stops it waits until the handlers are its own.
+    signal.pthread_sigmask(signal.SIG_BLOCK, STOPPING)
+    try:
+        process.start()
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, STOPPING)
     return process
 
 
@@ -64,6 +69,7 @@ def _run(
     os.setsid()
     for number in STOPPING:  # the parent's handlers are not for a node
         signal.signal(number, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, STOPPING)
     if not end_with(parent):
         return
     with log.open("wb") as file:

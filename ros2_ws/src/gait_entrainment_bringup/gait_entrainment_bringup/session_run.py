@@ -20,7 +20,8 @@ from gait_entrainment.errors import EntrainmentError
 from gait_entrainment.protocol import Protocol
 from gait_entrainment.robot import DeviceLimits, find_driver
 from gait_entrainment_bags import BagError, BagReader
-from gait_entrainment_bags.topic_names import PULSES
+from gait_entrainment_bags.messages import profile_of, stop_of
+from gait_entrainment_bags.topic_names import TORQUE_PROFILE
 from gait_entrainment_bringup.commands.run import run_experiment
 from gait_entrainment_bringup.node_process import end_with
 from gait_entrainment_commands.signals import end_once, undisturbed
@@ -145,9 +146,9 @@ class SessionRun:
         reason = self._in_a_process(protocol, bag, about)
         if reason:
             folder.note("failed", number, bag.name, reason)
-            raise BlockFailedError(
-                f"block {number}: {reason.splitlines()[0]}; the same command resumes at it"
-            )
+            why, *log = reason.splitlines()
+            told = f"block {number}: {why}; the same command resumes at it"
+            raise BlockFailedError("\n".join([told, *log]))
         folder.note("done", number, bag.name)
 
     def _in_a_process(self, protocol: Protocol, bag: Path, about: dict[str, str]) -> str:
@@ -193,38 +194,46 @@ class SessionRun:
         """
         said, unsaid = protocol.limits, DeviceLimits()
         lower: dict[str, Any] = {}
-        given = [
-            pulse
-            for bag in sorted((self._folder.path / "bags").glob("*"))
-            for pulse in _delivered(bag, protocol)
-        ]
+        bags, ordered = self._folder.path / "bags", self._session.ordered
+        begun = {bags / e.bag: int(e.block) for e in self._folder.ledger if e.what == "begun"}
+        runs = ((bag, ordered[number - 1].protocol) for bag, number in begun.items())
+        given = [piece for bag, of in runs for piece in _delivered(bag, of)]
         if said.session_pulses != unsaid.session_pulses:
-            planned, left = protocol.planned.count, said.session_pulses - len(given)
+            count = sum(pulses for pulses, _ in given)
+            planned, left = protocol.planned.count, said.session_pulses - count
             if planned > left:
                 raise SessionError(
                     f"limits.session_pulses: {planned} more pulses; allowed: {max(left, 0)}, "
-                    f"since {len(given)} of {said.session_pulses} were delivered"
+                    f"since {count} of {said.session_pulses} were delivered"
                 )
             lower["session_pulses"] = left
         if said.session_impulse != unsaid.session_impulse:
-            impulse = sum(abs(torque) * width for torque, width in given)
+            impulse = sum(impulse for _, impulse in given)
             lower["session_impulse"] = max(said.session_impulse - impulse, 0.0)
         return replace(protocol, limits=replace(said, **lower))
 
 
-def _delivered(bag: Path, protocol: Protocol) -> list[tuple[float, float]]:
+def _delivered(bag: Path, protocol: Protocol) -> list[tuple[int, float]]:
     """
-    Return height [N m] and width [s] of the pulses of a bag.
+    Return how many pulses began in each profile of a bag, and their impulse [N m s].
 
-    If it cannot be read, as after a crash, every pulse of this protocol counts as delivered.
+    If it cannot be read, as after a crash, every pulse of its protocol counts as delivered.
     """
-    if not any(bag.iterdir()):  # nothing had begun
-        return []
     try:
         with BagReader(bag) as reader:
-            return [(pulse.torque, pulse.duration) for pulse in reader.messages_of(PULSES)]
+            told = [m for m in reader.messages_of(TORQUE_PROFILE) if stop_of(m) is None]
+            return [
+                (
+                    len(one.onsets),
+                    sum(abs(t) * (end - begin) / 1e9 for begin, end, t in one.pieces),
+                )
+                for one in map(profile_of, told)
+            ]
     except BagError:
-        return [(protocol.pulse_torque, protocol.planned.duration)] * protocol.planned.count
+        if not any(bag.glob("*")) and not bag.with_name(f"{bag.name}_unfinished").exists():
+            return []  # nothing had begun
+        planned = protocol.planned
+        return [(planned.count, planned.count * planned.torque * planned.duration)]
 
 
 def _conduct(parent: int, answer: Any, keyboard: int, conduct: Callable[..., None]) -> None:

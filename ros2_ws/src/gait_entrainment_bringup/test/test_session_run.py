@@ -5,11 +5,14 @@
 
 import argparse
 import itertools
+import shutil
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 from gait_entrainment_bringup import session_run
+from gait_entrainment_bringup.commands.run import kept
 from gait_entrainment_bringup.session_run import BlockFailedError, SessionRun
 from gait_entrainment_drivers.proof import keep_preflight
 from gait_entrainment_sessions.folder import SessionFolder
@@ -21,7 +24,7 @@ person: {code: P01, mass: 72, leg_length: 0.91}
 LIMITS
 blocks:
   - {name: one}
-  - {name: two, rest: 0.05}
+  - {name: two, rest: 0.05, protocol: {pulses: {count: 60}}}
 """
 
 
@@ -122,11 +125,16 @@ def test_the_end_of_the_input_is_a_pause(conduct, monkeypatch):
 
 
 def test_a_block_that_fails_ends_the_session_and_is_the_next(conduct):
-    with pytest.raises(BlockFailedError, match="block 2: it fell; the same command resumes"):
+    told = r"block 2: it fell; the same command resumes at it\n  walker_sim\| more"
+    with pytest.raises(BlockFailedError, match=told):
         conduct(ends=["", "it fell\n  walker_sim| more"])
     folder = conduct()
     assert ledger(folder)[3:5] == [("failed", "2", "it fell walker_sim| more"), ("begun", "2", "")]
     assert sorted(folder.runs()) == [1, 2]
+
+
+def test_of_a_run_that_could_not_be_recorded_nothing_is_kept(tmp_path):
+    assert kept(tmp_path / "removed, as the disk is full") == ""
 
 
 def test_a_repetition_needs_a_block_that_is_done(conduct):
@@ -158,8 +166,18 @@ def test_limits_of_a_session_hold_over_its_blocks(conduct):
     # What a crash left of a record may have been a whole block.
     for name in ("block-01", "block-02"):
         (folder.path / "bags" / name / "broken.mcap").write_bytes(b"no bag")
-    with pytest.raises(SessionError, match=r"50 more pulses; allowed: 20, since 100 of 120"):
+    with pytest.raises(SessionError, match=r"50 more pulses; allowed: 10, since 110 of 120"):
         conduct(limits=limits, repeat=1, reason="why")
+
+
+def test_what_was_delivered_is_what_the_record_says(conduct):
+    limits = "limits: {session_impulse: 100}"
+    folder = conduct(limits=limits)
+    for file in (Path(__file__).parents[4] / "bags/paper_example").glob("*.mcap"):
+        shutil.copy(file, folder.path / "bags/block-01")
+    conduct(limits=limits, repeat=2, reason="why")
+    # 50 square pulses of 13.35 N m and 0.1 s.
+    assert conduct.conducted[-1][0].limits.session_impulse == pytest.approx(100 - 66.73, abs=0.01)
 
 
 def test_the_checklist_of_a_real_robot_is_told_before_each_block(conduct, tmp_path, monkeypatch):

@@ -12,6 +12,7 @@ import pytest
 
 from gait_entrainment_bringup import supervisor as module
 from gait_entrainment_bringup.supervisor import LOG_LINES, TIMEOUT, Supervisor
+from gait_entrainment_drivers.signals import STOPPING, stop_on_signals
 
 OBEDIENT = """
 import signal, sys, time
@@ -69,6 +70,21 @@ def test_first_ends_before_the_next_is_asked_and_last_comes_last(programs):
     first, last = stopped_at(programs, "three"), stopped_at(programs, "four")
     between = [stopped_at(programs, "one"), stopped_at(programs, "two")]
     assert first < min(between) <= max(between) < last
+
+
+@pytest.mark.usefixtures("programs")
+def test_a_node_that_is_stopped_as_it_starts_ends_without_a_word(tmp_path, capfd):
+    before = {number: signal.getsignal(number) for number in STOPPING}
+    stop_on_signals()
+    try:
+        forking = Supervisor(tmp_path / "logs", os.environ, "fork")
+        for _ in range(10):
+            forking.start("one", [])
+            forking.stop(["one"])
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    assert capfd.readouterr().err == ""
 
 
 def test_who_does_not_obey_is_killed(programs):

@@ -29,6 +29,7 @@ MEANINGS = {
     "too_close": "pulse period and stride period are too close to tell them apart",
     "baseline_unknown": "fewer than two complete strides before the first pulse to compare with",
     "not_one_to_one": "only pulses at about one a stride are analyzed",
+    "by_phase": "pulses by phase follow the gait, whatever it does",
 }
 
 
@@ -145,7 +146,8 @@ def holes_of(run: Run) -> list[Hole]:
 def summary(outcome: dict[str, Any]) -> str:
     """Return the outcome in a few lines."""
     parameters = outcome["parameters"] or {}
-    plan = parameters.get("pulses")
+    plans = parameters.get("blocks", [parameters])
+    plan = plans[0].get("pulses") if len(plans) == 1 else None
     strides, pulses = outcome["stride_period"], outcome["pulses"]
     unperturbed = outcome["unperturbed_stride_period"]
     lines = [f"strides          {len(strides)}, pulses placed in them: {len(pulses)}"]
@@ -154,18 +156,19 @@ def summary(outcome: dict[str, Any]) -> str:
         if strides and not outcome["holes"]:
             lines[0] += "; the train is longer than the run: add washout strides"
     if "blocks" in outcome:
-        plans = parameters.get("blocks", [parameters])
         for number, (block, said) in enumerate(zip(outcome["blocks"], plans, strict=False), 1):
             lines += _block_lines(number, block, said)
         return "\n".join([*lines, *_doubt_lines(outcome)])
     if strides:
         measured = "not measured" if unperturbed is None else f"{unperturbed:.4f} s"
         lines.append(f"stride period    {measured} unperturbed, {strides[-1]:.4f} s last")
+    if plan and not plan["count"]:
+        return "\n".join([*lines, "pulses           none", *_doubt_lines(outcome)])
     if timing := _timing(outcome, plan or {}):
         shape = f"{plan['torque']:.2f} N m for {plan['width']:g} s" if plan else ""
-        timing = (timing if plan else timing.lstrip()) + _both(parameters)
+        timing = (timing if plan else timing.lstrip()) + _besides(plans[0])
         lines.append(f"pulses           {shape}{timing}")
-    lines.append(f"verdict          {_verdict(outcome)}")
+    lines.append(f"verdict          {_verdict(outcome, plan or {})}")
     for stretch in outcome["stretches"][:-1]:
         lines.append(f"  until stride {stretch['last_stride']:<3} {stretch['verdict']}")
     lines += _doubt_lines(outcome)
@@ -178,11 +181,14 @@ def summary(outcome: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _verdict(judged: dict[str, Any]) -> str:
+def _verdict(judged: dict[str, Any], plan: dict[str, Any]) -> str:
     """Return the verdict with since when it has held, or why nothing is claimed."""
     if judged["entrained"]:
         return f"{judged['verdict']} since stride {judged['entrained_since_stride']}"
-    return f"{judged['verdict']}: {MEANINGS[judged['reason'] or judged['verdict']]}"
+    why = judged["reason"] or judged["verdict"]
+    if plan.get("phase") is not None and why == "too_close":
+        why = "by_phase"
+    return f"{judged['verdict']}: {MEANINGS[why]}"
 
 
 def _block_lines(number: int, block: dict[str, Any], said: dict[str, Any]) -> list[str]:
@@ -195,12 +201,16 @@ def _block_lines(number: int, block: dict[str, Any], said: dict[str, Any]) -> li
     if not plan["count"]:
         return [f"{told}, no pulses"]
     pulses = f"{block['pulses']} pulses of {plan['torque']:.2f} N m{_timing(block, plan)}"
-    return [f"{told}, {pulses}{_both(said)}", f"{'':17}{_verdict(block)}"]
+    return [f"{told}, {pulses}{_besides(said)}", f"{'':17}{_verdict(block, plan)}"]
 
 
-def _both(said: dict[str, Any]) -> str:
-    """Say that the other leg got its pulses too, if it did."""
-    return ", the other leg in between" if said.get("both_legs") else ""
+def _besides(said: dict[str, Any]) -> str:
+    """Say that the other leg got its pulses too, if it did, and how many were left out."""
+    plan = said.get("pulses", {})
+    left_out = len(set(plan.get("catch_pulses", "").replace(",", " ").split()))
+    left_out += round(plan.get("catch_share", 0.0) * plan.get("count", 0))
+    other = ", the other leg in between" if said.get("both_legs") else ""
+    return other + (f", {left_out} of them left out" if left_out else "")
 
 
 def _timing(judged: dict[str, Any], plan: dict[str, Any]) -> str:
@@ -212,7 +222,8 @@ def _timing(judged: dict[str, Any], plan: dict[str, Any]) -> str:
         return ""
     offset = "" if unperturbed is None else f" ({(period - unperturbed) * 1e3:+.1f} ms)"
     sweep = f", changing by {plan['sweep'] * 1e3:+g} ms" if plan.get("sweep") else ""
-    return f" every {period:.4f} s{offset}{sweep}"
+    jitter = f", each off by up to {plan['jitter'] * 1e3:g} ms" if plan.get("jitter") else ""
+    return f" every {period:.4f} s{offset}{sweep}{jitter}"
 
 
 def _doubt_lines(outcome: dict[str, Any]) -> list[str]:
@@ -280,7 +291,7 @@ def distribution(
     unknown = math.isnan(stride)
     return {
         "pulses": len(late),
-        "missing": sum(not timing.sham for timing in timings) - len(late),
+        "missing": sum(timing.torque != 0 for timing in timings) - len(late),
         **{f"{name}_ms": ms for name, ms in figures.items()},
         **{f"{n}_percent": None if unknown else ms / stride / 10 for n, ms in figures.items()},
     }

@@ -125,10 +125,9 @@ class MeasuredOnsets:
     def _judge(self) -> PulseTiming:
         """Take the next pulse from those named, and return its timing."""
         onset = self._named.pop(0)
-        announced = onset in self._announced
-        height, width = self._announced.pop(onset, (0.0, 0.0))
-        if height == 0:
-            return PulseTiming(onset, None, None, sham=announced)
+        announced = height, width = self._announced.pop(onset, (math.nan, math.nan))
+        if height == 0 or math.isnan(height):
+            return PulseTiming(onset, None, None, *announced)
         end = self._end(onset, width, self._named[:1])
         self._forget_states_before(onset)
         seen = [state for state in self._states if state.stamp <= end]
@@ -137,12 +136,12 @@ class MeasuredOnsets:
         stamps, torques = [s.stamp for s in seen], [s.measured for s in seen]
         found = measured_onset(stamps, torques, height)
         if found is None:
-            return PulseTiming(onset, sent, None)
+            return PulseTiming(onset, sent, None, *announced)
         index, measured = found
         if seen[index].measured == seen[index].commanded:
             # Equal to the last bit: not measured but computed, and known at each of its jumps.
             measured = seen[index].stamp
-        return PulseTiming(onset, sent, measured)
+        return PulseTiming(onset, sent, measured, *announced)
 
     def _end(self, onset: int, width: float, later: Sequence[int]) -> int:
         """Return the end [ns] of the states by which a pulse is judged."""

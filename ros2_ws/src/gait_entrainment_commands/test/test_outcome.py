@@ -28,7 +28,7 @@ def test_the_distribution_is_that_of_the_pulses_seen():
     assert figures["worst_ms"] == pytest.approx(200)
     assert figures["worst_percent"] == pytest.approx(10)
     assert distribution(timings, "measured", 2.0) is None
-    sham = PulseTiming(0, None, None, sham=True)
+    sham = PulseTiming(0, None, None, torque=0.0)
     assert distribution([*timings, sham], "sent", 2.0)["missing"] == 1
 
 
@@ -72,7 +72,24 @@ def test_each_block_has_its_own_line_and_verdict():
     assert text[0] == f"strides          {spans[3][1]}, pulses placed in them: 18"
     assert "6 pulses of 0.00 N m every" in text[3]
     assert "6 pulses of 5.00 N m at phase 0.45" in text[5]
+    assert text[6].strip() == "untestable: pulses by phase follow the gait, whatever it does"
     assert text[7].endswith("no pulses")
+
+
+@pytest.mark.parametrize(
+    ("text", "begin", "end"),
+    [
+        ("pulses: {count: 0, phase: 0.4}", "none", ""),
+        ("blocks: [{name: a}]", "13.35 N m for 0.1 s every", "(-50.0 ms)"),
+        ("pulses: {catch_share: 0.3, count: 5}", "13.35 N m", ", 2 of them left out"),
+        ("pulses: {catch_pulses: [2, 3, 2], count: 5}", "13.35", ", 2 of them left out"),
+        ("pulses: {jitter: 0.05, count: 5}", "13.35 N m", ", each off by up to 50 ms"),
+    ],
+)
+def test_a_single_block_is_told_with_its_pulses(text, begin, end):
+    found = summary(outcome_of(simulate(read_protocol(text + "\n")))).splitlines()[2]
+    assert found.startswith(f"pulses           {begin}")
+    assert found.endswith(end)
 
 
 def test_an_open_baseline_is_told_as_walked():

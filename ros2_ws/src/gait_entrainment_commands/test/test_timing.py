@@ -88,7 +88,7 @@ def test_a_pulse_that_never_came_is_told_as_missing():
     onsets.add_pulse(100 * MS, 5.0, 0.1)
     for t in range(0, 1000, 5):
         onsets.add_state(RobotState(t * MS, 0.0, 0.0, math.nan))
-    assert onsets.timings == [PulseTiming(100 * MS, None, None)]
+    assert onsets.timings == [PulseTiming(100 * MS, None, None, 5.0, 0.1)]
 
 
 @pytest.mark.parametrize(("share", "value"), [(0.5, 2), (0.51, 3), (1.0, 4), (0.0, 1)])

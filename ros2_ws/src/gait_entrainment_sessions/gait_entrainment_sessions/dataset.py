@@ -54,7 +54,7 @@ def complete(folder: SessionFolder) -> list[Path]:
     runs = list(read_runs(folder.path))
     for placed in runs:
         _write_motion(folder.path / "motion", placed)
-    _describe(folder.path.parents[1])
+    _describe(folder.path.resolve().parents[1])
     return write_tables(runs, folder.path)
 
 
@@ -79,8 +79,7 @@ def _describe(study: Path) -> None:
 
 def _write_motion(out: Path, placed: PlacedRun) -> None:
     place = placed.place
-    start = min((event.stamp for event in placed.run.events), default=0)
-    angles, names = _joint_angles(place.bag, start)
+    angles, names = _joint_angles(place.bag, placed.start)
     stem = f"sub-{place.person}_ses-{place.session}_task-{_TASK}"
     run = f"run-{place.block:02d}"
     out.mkdir(exist_ok=True)

@@ -72,6 +72,12 @@ class Findings:
         return f"{name}: {self.part.name}" if self.part.name else name
 
     @property
+    def torque(self) -> float:
+        """Largest magnitude of its pulses [N m], NaN if they were not announced."""
+        heights = (self.placed.timings[p.onset].torque for p in self.part.analysis.pulses)
+        return max(map(abs, heights), default=0.0)
+
+    @property
     def verdict(self) -> str:
         """The verdict at its end."""
         found = self.part.analysis.entrainments[-1:]
@@ -140,17 +146,20 @@ class StudyFindings:
             by_person[one.placed.place.person].append(one)
         persons, phases = [], []
         for code, own in by_person.items():
-            offsets = [(f.offset_percent, f.verdict) for f in own]
+            # A basin is one of pulses of one height: without those of a sham.
+            least = 0.99 * max(f.torque for f in own)
+            offsets = [(f.offset_percent, f.verdict) for f in own if not f.torque < least]
             held = [f for f in own if f.verdict == "entrained"]
-            told = [v for _, v in offsets if v in ("entrained", "drifting", "lost")]
+            judged = [f for f in own if f.verdict in ("entrained", "drifting", "lost")]
             faster, slower = (statistics.border(offsets, sign) for sign in (-1, 1))
-            persons.append(PersonFindings(code, faster, slower, len(held), len(told)))
+            persons.append(PersonFindings(code, faster, slower, len(held), len(judged)))
             if held:
                 phases.append(statistics.direction([f.direction.phase for f in held]).phase)
-        widths = [person.basin_percent for person in persons if person.testable]
+        tested = [person for person in persons if person.testable]
+        widths = [person.basin_percent for person in tested]
         return cls(
             persons=tuple(persons),
-            entrained=statistics.share(len(phases), len(persons)),
+            entrained=statistics.share(len(phases), len(tested)),
             basin_mean=statistics.mean(widths),
             basin_deviation=statistics.deviation(widths),
             phases=tuple(phases),
@@ -161,25 +170,24 @@ class StudyFindings:
     @property
     def rows(self) -> Rows:
         """What is told of them, in words."""
-        p = "cannot be told" if math.isnan(self.rayleigh) else f"{self.rayleigh:.2g}"
-        phase = "cannot be told"
-        if self.phases:
-            phase = f"{self.direction.phase:.3f} of the stride"
+        phase = told(self.direction.phase, "{:.3f} of the stride")
         return [
             ("persons that entrained in some block", shown(self.entrained, "%", 100)),
             ("basin found, both sides, mean", shown(self.basin_mean, "% of the stride")),
             ("basin, standard deviation", shown(self.basin_deviation, "% of the stride")),
             ("mean phase of those that entrained", phase),
-            ("its resultant length over persons", f"{self.direction.resultant:.3f}"),
-            ("Rayleigh's p over persons", p),
+            ("its resultant length over persons", told(self.direction.resultant, "{:.3f}")),
+            ("Rayleigh's p over persons", told(self.rayleigh, "{:.2g}")),
         ]
+
+
+def told(value: float, form: str) -> str:
+    """Return a value in a form of words, if it is known."""
+    return "cannot be told" if math.isnan(value) else form.format(value)
 
 
 def shown(estimate: Estimate, unit: str, factor: float = 1.0) -> str:
     """Return an estimate with its interval in words."""
     value, low, high = (factor * number for number in estimate)
-    if math.isnan(value):
-        return "cannot be told"
-    if math.isnan(low):
-        return f"{value:.3g} {unit}"
-    return f"{value:.3g} {unit} (95 %: {low:.3g} to {high:.3g})"
+    interval = "" if math.isnan(low) else f" (95 %: {low:.3g} to {high:.3g})"
+    return told(value, f"{{:.3g}} {unit}{interval}")

@@ -32,7 +32,8 @@ from gait_entrainment_bags import BagReader
 from gait_entrainment_sessions.session_file import Session, SessionError
 
 KEY_HASH = "session_key"  # what a bag's custom data call it
-_PLAN, _KEY, _LEDGER, _COPY = "session.json", "key.json", "ledger.tsv", "session.yaml"
+PLAN = "session.json"
+_KEY, _LEDGER, _COPY, _PART = "key.json", "ledger.tsv", "session.yaml", "session.part"
 
 
 class Entry(NamedTuple):
@@ -60,17 +61,26 @@ class SessionFolder:
         """
         person = f"sub-{session.person.code}"
         folder = cls(study / person / f"ses-{session.session}")
-        if (folder.path / _PLAN).exists():
-            folder._check_same(session)
-            return folder
-        if folder.path.exists() and any(folder.path.iterdir()):
-            raise SessionError(
-                f"{folder.path}: holds something else; nothing is overwritten: give --out"
-            )
-        cls._check_number(study, session)
-        folder.path.mkdir(parents=True, exist_ok=True)
+        with _alone_in(study):
+            if (folder.path / PLAN).exists():
+                folder._check_same(session)
+                return folder
+            left = {file.name for file in folder.path.glob("*")}
+            if left - {_KEY, _LEDGER, _COPY, _PART}:
+                raise SessionError(
+                    f"{folder.path}: holds something else; nothing is overwritten: give --out"
+                )
+            cls._check_number(study, session)
+            for name in left:  # of a beginning that a crash cut short
+                (folder.path / name).unlink()
+            folder._begin(session)
+        return folder
+
+    def _begin(self, session: Session) -> None:
+        """Write what was planned."""
+        self.path.mkdir(parents=True, exist_ok=True)
         names = [block.name for block in session.ordered]
-        key = folder._seal(session, names) if session.blind else ""
+        key = self._seal(session, names) if session.blind else ""
         plan = {
             "study": session.study,
             "session": session.session,
@@ -83,24 +93,25 @@ class SessionFolder:
             "protocols": session.fingerprints,
             "key": key,
         }
-        (folder.path / _COPY).write_text(session.text, encoding="utf-8")
-        _write(folder.path / _LEDGER, "\t".join(Entry._fields) + "\n")
-        # The last of all: without it the session has not begun.
-        _write(folder.path / _PLAN, json.dumps(plan, indent=1) + "\n")
-        return folder
+        _write(self.path / _COPY, session.text)
+        _write(self.path / _LEDGER, "\t".join(Entry._fields) + "\n")
+        # The last of all, and at once: without it the session has not begun.
+        _write(self.path / _PART, json.dumps(plan, indent=1) + "\n")
+        (self.path / _PART).rename(self.path / PLAN)
 
     @cached_property
     def plan(self) -> dict[str, Any]:
         """What was planned; raises SessionError if this is no session."""
         try:
-            return dict(json.loads((self.path / _PLAN).read_text(encoding="utf-8")))
+            return dict(json.loads((self.path / PLAN).read_text(encoding="utf-8")))
         except (OSError, ValueError):
-            raise SessionError(f"{self.path}: no session: no readable {_PLAN} in it") from None
+            raise SessionError(f"{self.path}: no session: no readable {PLAN} in it") from None
 
     @property
     def ledger(self) -> list[Entry]:
         """What happened so far."""
-        lines = (self.path / _LEDGER).read_text(encoding="utf-8").splitlines()[1:]
+        text = (self.path / _LEDGER).read_text(encoding="utf-8", errors="replace")
+        lines = text.splitlines()[1:]
         # A line that a crash cut short says nothing.
         entries = (line.split("\t") for line in lines)
         return [Entry(*cells) for cells in entries if len(cells) == len(Entry._fields)]
@@ -169,8 +180,9 @@ class SessionFolder:
             return f"paused before {name}: {paused}"
         if last is not None and last.what == "rest":
             passed = datetime.now(timezone.utc) - datetime.fromisoformat(last.time)
-            left = float(last.text.split()[0]) - passed.total_seconds()
-            return f"rest before {name}: {max(left, 0):.0f} s"
+            rest = float(last.text.split()[0])
+            left = min(max(rest - passed.total_seconds(), 0), rest)  # the clock may be set back
+            return f"rest before {name}: {left:.0f} s"
         return f"next: {name}"
 
     def _last(self, *what: str) -> Entry | None:
@@ -219,7 +231,7 @@ class SessionFolder:
         Raises SessionError if it is not blinded, or the key is not the one that each bag names.
         """
         if not self.plan["blind"]:
-            raise SessionError(f"{self.path}: not blinded: {_PLAN} says which block is which")
+            raise SessionError(f"{self.path}: not blinded: {PLAN} says which block is which")
         names = list(self._key()["blocks"])
         if self.sealed:
             self.note("unblinded")
@@ -231,7 +243,7 @@ class SessionFolder:
             data = key.read_bytes()
         except OSError as error:
             raise SessionError(f"{key}: cannot be read: {error.strerror}") from None
-        found, told = hashlib.sha256(data).hexdigest(), {str(self.path / _PLAN): self.plan["key"]}
+        found, told = hashlib.sha256(data).hexdigest(), {str(self.path / PLAN): self.plan["key"]}
         for bag in self.runs().values():
             with BagReader(bag) as reader:
                 told[str(bag)] = reader.custom_data.get(KEY_HASH, "")
@@ -259,7 +271,7 @@ class SessionFolder:
     @classmethod
     def _check_number(cls, study: Path, session: Session) -> None:
         """Raise SessionError if another person has this number: orders would not be balanced."""
-        for file in sorted(study.glob(f"sub-*/ses-*/{_PLAN}")):
+        for file in sorted(study.glob(f"sub-*/ses-*/{PLAN}")):
             other, person = cls(file.parent).plan["person"], session.person
             if (other["code"] == person.code) != (other["number"] == person.number):
                 raise SessionError(
@@ -285,6 +297,18 @@ class SessionFolder:
                     f"{block.place}: protocol: that of {block.name} is not what it was when the "
                     f"session began, by its file or by another version of this program; {why}"
                 )
+
+
+@contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """Let no other process begin a session in the folder of a study meanwhile."""
+    folder.mkdir(parents=True, exist_ok=True)
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)
 
 
 def _write(path: Path, text: str) -> None:

@@ -6,13 +6,15 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from gait_entrainment.conventions import Side
+from gait_entrainment.robot import PulseTiming
 from gait_entrainment.run import JudgedBlock, Run
 from gait_entrainment_bags import BagError
 from gait_entrainment_bags.recorded_run import read_run
-from gait_entrainment_sessions.folder import SessionFolder
+from gait_entrainment_sessions.folder import PLAN, SessionFolder
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,19 @@ class PlacedRun:
     run: Run
 
     @property
+    def start(self) -> int:
+        """The instant from which its tables count [ns]."""
+        first = [s.start for s in self.run.strides[:1]] or [e.stamp for e in self.run.events]
+        return min(first, default=0)
+
+    @cached_property
+    def timings(self) -> dict[int, PulseTiming]:
+        """The pulses by their onset [ns], be it the commanded or the measured one."""
+        return {
+            at: timing for timing in self.run.timings for at in (timing.onset, timing.commanded)
+        }
+
+    @property
     def parts(self) -> tuple[JudgedBlock, ...]:
         """The blocks of its protocol, each judged by itself; of a protocol without, all of it."""
         run, strides = self.run, self.run.strides
@@ -50,15 +65,21 @@ class PlacedRun:
 
 
 def is_sealed(bag: Path) -> bool:
-    """Whether a bag lies in a session of which nothing is to be told yet."""
-    folder = bag.absolute().parents[1]
-    return (folder / "ledger.tsv").exists() and SessionFolder(folder).sealed
+    """Whether a bag, or a file of it, lies in a session of which nothing is to be told yet."""
+    folder = _session_around(bag)
+    return folder is not None and folder.sealed
 
 
 def sessions_in(path: Path) -> list[SessionFolder]:
     """Return the sessions in a folder, which may be one itself."""
-    found = sorted(path.rglob("ledger.tsv")) if path.is_dir() else []
+    found = sorted(path.rglob(PLAN)) if path.is_dir() else []
     return [SessionFolder(file.parent) for file in found]
+
+
+def _session_around(path: Path) -> SessionFolder | None:
+    """Return the session that a path lies in, if it lies in one."""
+    around = (parent for parent in path.resolve().parents if (parent / PLAN).exists())
+    return next(map(SessionFolder, around), None)
 
 
 def places_in(path: Path) -> list[Place]:
@@ -72,7 +93,10 @@ def places_in(path: Path) -> list[Place]:
     if not sessions:
         is_bag = path.is_file() or (path / "metadata.yaml").exists() or any(path.glob("*.mcap"))
         bags = [path] if is_bag else sorted(f.parent for f in path.rglob("metadata.yaml"))
-        places = [Place(bag, name=bag.stem, block=n) for n, bag in enumerate(bags, start=1)]
+        places = [
+            Place(bag, name=bag.stem, block=n, folder=_session_around(bag))
+            for n, bag in enumerate(bags, start=1)
+        ]
     if not places:
         why = "no block of it is done yet" if sessions else "a bag, a session, or a folder of them"
         raise BagError(f"{path}: no recorded run: {why}")

@@ -19,8 +19,7 @@ instance, the other. The walker has the person's mass and legs, in the paper's p
 """
 
 import hashlib
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -37,8 +36,9 @@ from gait_entrainment.protocol import (
     write_protocol,
 )
 from gait_entrainment.protocol.protocol import BLOCK_FIELDS
+from gait_entrainment.protocol.reader import Entry, composed, entries_in, value_of
 from gait_entrainment.robot import DeviceError, DeviceLimits, LimitError, find_driver
-from gait_entrainment.settings import Setting, SettingError, setting, settings_of
+from gait_entrainment.settings import Setting, setting, settings_of
 from gait_entrainment_sessions.order import ORDERS, block_order
 
 
@@ -114,77 +114,52 @@ class Session:
 
 
 _LABELS = ("person.code", "session")
-_REQUIRED = ("code", "mass", "leg_length")  # of a person
-_Fields = dict[str, tuple[yaml.Node, str]]  # by name: value, and file with line
-_Said = dict[str, tuple[object, str]]  # by field of a protocol: value, and file with line
+_REQUIRED = ("person.code", "person.mass", "person.leg_length")
+_PART = Setting("a part of the file", yaml.Node)
+_SECTIONS = {"person": Person, "limits": DeviceLimits}
+_FIELDS = settings_of(Session) | {"protocol": _PART, "blocks": _PART}
+for _section, _kind in _SECTIONS.items():
+    _FIELDS |= {f"{_section}.{name}": rule for name, rule in settings_of(_kind).items()}
+_BLOCK_FIELDS = settings_of(Block) | {"protocol": _PART}
+_Said = dict[str, Entry]  # by field
 
 
 def read_session(path: Path) -> Session:
     """Read and validate a session file; raises SessionError."""
     try:
-        text = path.read_text(encoding="utf-8")
-        root = yaml.compose(text, Loader=yaml.SafeLoader)
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "is not UTF-8 text"
-        raise SessionError(f"{path}: cannot be read: {reason}") from None
-    except (yaml.YAMLError, RecursionError) as error:
-        mark = getattr(error, "problem_mark", None)
-        line = f":{mark.line + 1}" if mark else ""
-        problem = getattr(error, "problem", None) or "nested too deeply"
-        raise SessionError(f"{path}{line}: not valid YAML: {problem}") from None
-    if root is None:
-        raise SessionError(f"{path}: empty; allowed: at least person and blocks")
-    return _Reader(path, text).session(root)
-
-
-@dataclass(frozen=True)
-class _Piece:
-    """Fields of a protocol: for read_protocol to take, and one by one."""
-
-    source: Path | str | None
-    said: _Said
-
-
-def _said_in(root: Any, name: str) -> Iterator[tuple[str, tuple[object, str]]]:
-    for key, value in root.value:
-        inside = value.value if isinstance(value, yaml.MappingNode) else [(None, value)]
-        for inner, item in inside:
-            field = str(key.value) + (f".{inner.value}" if inner else "")
-            where = f"{name}:{(inner or key).start_mark.line + 1}"
-            value = yaml.SafeLoader("").construct_object(item, deep=True)
-            if isinstance(item, yaml.SequenceNode) and field != "blocks":
-                value = ", ".join(map(str, value))  # as read_protocol takes it
-            yield field, (value, where)
+        _, text, root = composed(path)
+        if root is None:
+            raise SessionError(f"{path}: empty; allowed: at least person and blocks")
+        return replace(_Reader(path).session(root), text=text)
+    except (ProtocolError, LimitError, DeviceError) as error:
+        raise SessionError(str(error)) from None
 
 
 class _Reader:
-    def __init__(self, path: Path, text: str) -> None:
-        self._path, self._text = path, text
+    def __init__(self, path: Path) -> None:
+        self._path = path
 
     def session(self, root: yaml.Node) -> Session:
-        own = settings_of(Session)
-        given = self._fields(root, "a session", (*own, "person", "limits", "protocol", "blocks"))
-        for needed in ("person", "blocks"):
-            if needed not in given:
+        given = dict(entries_in(root, str(self._path), _FIELDS))
+        about = [entry.where for key, entry in given.items() if key.startswith("person.")]
+        for needed, found in ("person", about), ("blocks", "blocks" in given):
+            if not found:
                 raise SessionError(f"{self._path}: {needed}: missing; a session cannot do without")
-        about = self._fields(given["person"][0], "person", settings_of(Person))
         for needed in _REQUIRED:
-            if needed not in about:
-                allowed = settings_of(Person)[needed].allowed
-                raise SessionError(
-                    f"{given['person'][1]}: person.{needed}: missing; allowed: {allowed}"
-                )
-        person = Person(**self._settings(Person, about, "person."))
-        values = self._settings(Session, {n: v for n, v in given.items() if n in own}, "")
-        limits: _Said = {}
-        if "limits" in given:
-            said = self._fields(given["limits"][0], "limits", settings_of(DeviceLimits))
-            checked = self._settings(DeviceLimits, said, "limits.")
-            limits = {f"limits.{n}": (v, said[n][1]) for n, v in checked.items()}
-        common = _Piece(None, {})
-        if "protocol" in given:
-            common = self._piece(given["protocol"][0])
-        told = {f"walker.{n}": (v, given["person"][1]) for n, v in person.walker.items()} | limits
+            if needed not in given:
+                allowed = _FIELDS[needed].allowed
+                raise SessionError(f"{about[0]}: {needed}: missing; allowed: {allowed}")
+        values = _values(given, _FIELDS)
+        for name in _LABELS:
+            if not (text := str(values.get(name, "1"))).isascii() or not text.isalnum():
+                where = given[name].where
+                raise SessionError(f"{where}: {name}: {text!r}; allowed: letters and digits")
+        own = {name: value for name, value in values.items() if "." not in name}
+        section = "person."
+        person = Person(**{k.removeprefix(section): v for k, v in values.items() if section in k})
+        told = {f"walker.{n}": Entry(v, about[0]) for n, v in person.walker.items()}
+        told |= {key: entry for key, entry in given.items() if key.startswith("limits.")}
+        common = self._protocol(given)
         node, where = given["blocks"]
         if not isinstance(node, yaml.SequenceNode) or not node.value:
             raise SessionError(f"{where}: blocks: must be a list of blocks, at least one")
@@ -193,29 +168,29 @@ class _Reader:
         for number, block in enumerate(blocks):
             if block.name in (other.name for other in blocks[:number]):
                 raise SessionError(f"{block.place}: name: {block.name}: appears twice; keep one")
-        return Session(**values, person=person, blocks=blocks, file=self._path, text=self._text)
+        return Session(**own, person=person, blocks=blocks, file=self._path)
 
-    def _block(self, node: yaml.Node, told: _Said, common: "_Piece", rest: float) -> Block:
+    def _block(self, node: yaml.Node, told: _Said, common: _Said, rest: float) -> Block:
         """Read a block; ``told`` is what follows from the person."""
-        given = self._fields(node, "a block", ("name", "rest", "protocol"))
-        place = self._where(node)
-        values = self._settings(Block, {n: v for n, v in given.items() if n != "protocol"}, "")
+        place = f"{self._path}:{node.start_mark.line + 1}"
+        given = dict(entries_in(node, str(self._path), _BLOCK_FIELDS))
+        values = {"rest": rest} | _values(given, _BLOCK_FIELDS)
         if "name" not in values:
             raise SessionError(f"{place}: name: missing; allowed: a plain name")
-        own = self._piece(given["protocol"][0]) if "protocol" in given else _Piece(None, {})
-        told = {"name": (values["name"], place), **told}
-        over = {key: value for key, value in told.items() if key not in common.said} | own.said
-        source = common.source
-        if "blocks" in own.said:
+        own = self._protocol(given)
+        told = {"name": Entry(values["name"], place), **told}
+        over = {key: value for key, value in told.items() if key not in common} | own
+        source = common
+        if "blocks" in own:
             of_blocks = BLOCK_FIELDS.keys() - {"side"}
-            if clash := next((key for key in common.said if key in of_blocks), ""):
+            if clash := next((key for key in common if key in of_blocks), ""):
                 raise SessionError(
-                    f"{common.said[clash][1]}: {clash}: does not go with the blocks that the "
+                    f"{common[clash].where}: {clash}: does not go with the blocks that the "
                     f"protocol of {values['name']} has of its own; say it in them"
                 )
-            source, over = own.source, told | common.said
-            over = {key: value for key, value in over.items() if key not in own.said}
-        protocol = self._read(source, over, to_run=True)
+            source, over = own, told | common
+            over = {key: value for key, value in over.items() if key not in own}
+        protocol = read_protocol(source, over, to_run=True)
         driver = find_driver(protocol.driver)
         if not driver.simulated and "limits.torque" not in told:
             raise SessionError(
@@ -223,77 +198,25 @@ class _Reader:
                 "torque to a person; allowed: limits of the session, with the largest torque "
                 "for this person [N m]"
             )
-        return Block(values["name"], values.get("rest", rest), protocol, place)
+        return Block(**values, protocol=protocol, place=place)
 
-    def _piece(self, node: yaml.Node) -> "_Piece":
-        """Return what a part of the file, or the file that it names, says of a protocol."""
-        source: Path | str
+    def _protocol(self, given: _Said) -> _Said:
+        """Return what the protocol in a part of the file, or the file that it names, says."""
+        node: Any = given["protocol"].value if "protocol" in given else None
+        name = str(self._path)
         if isinstance(node, yaml.ScalarNode):
-            file = self._path.parent / node.value
-            source, name = file, str(file)
-            self._read(source, {})  # so that what is wrong by itself is told with its line
-            root = yaml.compose(file.read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
-        else:
-            begin, end, root, name = node.start_mark, node.end_mark, node, str(self._path)
-            # At its own place in the file, so that lines are those of the file.
-            place = "\n" * begin.line + " " * begin.column
-            source = place + self._text[begin.index : end.index] + "\n"
-            self._read(source, {})
-        said = dict(_said_in(root, name)) if root else {}
+            name, _, node = composed(self._path.parent / node.value)
+        said = dict(entries_in(node, name)) if node else {}
+        read_protocol(said)  # so that what is wrong by itself is told with its line
         for key, (_, where) in said.items():
             if key.startswith("limits."):
                 raise SessionError(
                     f"{where}: {key}: limits are the person's; say them once, as limits of the "
                     "session"
                 )
-        return _Piece(source, said)
-
-    def _read(self, source: Path | str | None, over: _Said, *, to_run: bool = False) -> Protocol:
-        try:
-            return read_protocol(source, over, to_run=to_run)
-        except (ProtocolError, LimitError, DeviceError) as error:
-            message = str(error)
-            if message.startswith("protocol:") and not isinstance(source, Path):
-                message = f"{self._path}{message.removeprefix('protocol')}"
-            raise SessionError(message) from None
-
-    def _settings(self, owner: Any, given: _Fields, prefix: str) -> dict[str, Any]:
-        rules, values = settings_of(owner), {}
-        for name, (node, where) in given.items():
-            try:
-                values[name] = _value(rules[name], prefix + name, node)
-            except SettingError as error:
-                raise SessionError(f"{where}: {error}") from None
-        return values
-
-    def _fields(self, node: yaml.Node, name: str, known: Any) -> _Fields:
-        if not isinstance(node, yaml.MappingNode):
-            raise SessionError(
-                f"{self._where(node)}: {name} must be a mapping of fields to values"
-            )
-        found: _Fields = {}
-        for key, value in node.value:
-            where, field = self._where(key), str(key.value)
-            if field not in known:
-                raise SessionError(
-                    f"{where}: {field}: unknown field of {name}; allowed: {', '.join(known)}"
-                )
-            if field in found:
-                raise SessionError(f"{where}: {field}: appears twice; keep one")
-            found[field] = value, where
-        return found
-
-    def _where(self, node: yaml.Node) -> str:
-        return f"{self._path}:{node.start_mark.line + 1}"
+        return said
 
 
-def _value(rule: Setting, name: str, node: yaml.Node) -> Any:
-    if not isinstance(node, yaml.ScalarNode):
-        raise SettingError(f"{name}: must be a single value; allowed: {rule.allowed}")
-    if rule.kind is not str:
-        value = yaml.SafeLoader("").construct_object(node)
-        return rule.parse(name, value) if isinstance(value, str) else rule.check(name, value)
-    text = rule.check(name, node.value)
-    if name in _LABELS and not (text.isascii() and text.isalnum()):
-        raise SettingError(f"{name}: {text!r}; allowed: letters and digits")
-    return text
+def _values(said: _Said, rules: dict[str, Setting]) -> dict[str, Any]:
+    """Return what was said as values, without the parts of the file."""
+    return {k: value_of(rules[k], k, e) for k, e in said.items() if rules[k] is not _PART}

@@ -88,7 +88,9 @@ def slope(strides: Sequence[float], lags: Sequence[float]) -> Estimate:
     if len(lags) < 3 or len(set(strides)) < 2:
         return UNKNOWN
     fitted = stats.linregress(strides, lags)
-    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, len(lags) - 2)) * fitted.stderr
+    # Of lags that are all the same it divides zero by zero.
+    error = fitted.stderr if np.ptp(lags) else 0.0
+    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, len(lags) - 2)) * error
     return Estimate(float(fitted.slope), float(fitted.slope - half), float(fitted.slope + half))
 
 
@@ -111,10 +113,10 @@ def convergence(numbers: Sequence[float], lags: Sequence[float]) -> Estimate:
     Return the time constant, in pulses, of an exponential approach of the lags to a last one.
 
     Least squares of L + A exp(-n / tau); the interval is that of log(tau) by the covariance of the
-    fit. NaN if no approach can be told: A is not shown to differ from zero, or the interval goes
-    beyond the pulses, so that a lag that drifts would do as well.
+    fit. NaN if no approach can be told: A is not shown to differ from zero, the interval goes
+    beyond the pulses, so that a lag that drifts would do as well, or a lag is not known.
     """
-    if len(lags) < 8:
+    if len(lags) < 8 or math.isnan(sum(lags)):
         return UNKNOWN
     n, y = np.asarray(numbers, float) - numbers[0], np.asarray(lags, float)
     scale = max(float(np.ptp(y)), 1e-12)
@@ -213,8 +215,10 @@ def rayleigh(phases: Sequence[float]) -> float:
 
     Not of the pulses of one run: they are periodic, so that it finds a direction in any few.
     """
-    if len(phases) < 2:
+    n = len(phases)
+    if n < 2:
         return math.nan
-    from astropy.stats import rayleightest  # loaded only here: it takes half a second
-
-    return min(max(float(rayleightest(2 * np.pi * np.asarray(phases))), 0.0), 1.0)
+    # Zar, Biostatistical Analysis, 5th ed., eq. 27.4. The series of other libraries falls below
+    # zero for few phases that are close together, as those of persons that entrain are.
+    spread = n**2 * (1 - direction(phases).resultant ** 2)
+    return math.exp(math.sqrt(1 + 4 * n + 4 * spread) - (1 + 2 * n))

@@ -10,13 +10,15 @@ column is and in which unit, as BIDS has it; or as Parquet with that in the colu
 
 import json
 import math
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
-from gait_entrainment.gait import Verdict
+from gait_entrainment.gait import Stride, Verdict
+from gait_entrainment.robot import PulseTiming
 from gait_entrainment_bags import BagError
 from gait_entrainment_commands.timing import late_ms
 from gait_entrainment_sessions.findings import Findings
@@ -43,6 +45,7 @@ _PLACE = (
     Column("block", "place of the block in the session, from 1"),
     Column("name", "name of the block; only its number while the session is blinded"),
 )
+_BLOCK = Column("part", "block of the protocol, if that has several")
 _FROM_START = "since the first heel strike of the perturbed leg"
 TABLES: dict[str, tuple[Column, ...]] = {
     "events": (
@@ -54,7 +57,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
     ),
     "strides": (
         Column("stride", "number of the stride of the perturbed leg, from 1"),
-        Column("part", "part of the protocol", words=("baseline", "pulses", "washout")),
+        Column("part", "part of its block", words=("baseline", "pulses", "washout", "rest")),
         Column("side", "the perturbed leg", words=_SIDES),
         Column("start", f"heel strike that starts it, {_FROM_START}", "s"),
         Column("period", "stride period", "s"),
@@ -63,10 +66,12 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("pulses", "pulses that began in it"),
     ),
     "pulses": (
-        Column("pulse", "number of the pulse in the run, from 1"),
+        _BLOCK,
+        Column("pulse", "its number in the run, or in such a block, from 1"),
         Column("stride", "stride in which it began"),
         Column("side", "the perturbed leg", words=_SIDES),
         Column("onset", f"commanded onset {_FROM_START}", "s"),
+        Column("torque", "height asked for; 0 of a sham and of a pulse left out", "N m"),
         Column("phase", "place of the onset in its stride, 0 to below 1", "1"),
         Column(
             "phase_lag", "onset minus the nearest toe-off (heel strike if none was detected)", "s"
@@ -76,7 +81,7 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("measured_late", "measured onset minus the commanded one", "s"),
     ),
     "blocks": (
-        Column("part", "block of the protocol, if that has several"),
+        _BLOCK,
         Column("verdict", "verdict at the end", words=[v.name.lower() for v in Verdict]),
         Column("stride_period", "mean stride period before the pulses", "s"),
         Column("pulse_period", "pulse period as planned", "s"),
@@ -101,50 +106,46 @@ _TELLING = ("pulses", "blocks")  # tables in which the condition of a run can be
 
 
 def rows_of(placed: PlacedRun, kind: str) -> Iterator[Row]:
-    """Return the rows of a run in one of TABLES, without person, session and block."""
-    run = placed.run
-    strides = run.strides
-    start = strides[0].start if strides else min((e.stamp for e in run.events), default=0)
+    """
+    Return the rows of a run in one of TABLES, without person, session and block.
+
+    Of a sealed run there is no pulse in them, and nothing that follows from pulses.
+    """
+    run, start, sealed = placed.run, placed.start, placed.place.sealed
 
     def seconds(stamp: int) -> float:
         return (stamp - start) / NANOSECONDS_PER_SECOND
 
+    if sealed and kind in _TELLING:
+        return
     if kind == "events":
-        width = run.protocol.planned.duration if run.protocol else math.nan
         events = [
             (e.stamp, 0.0, EventKind(e.kind).name.lower(), Side(e.side).name.lower(), e.step)
             for e in run.events
         ]
         pulses = [
-            (timing.commanded, width, "pulse", side.name.lower(), number)
+            (timing.commanded, timing.duration, "pulse", side.name.lower(), number)
             for side in Side
             for number, timing in enumerate((t for s, t in run.delivered if s is side), start=1)
+            if not sealed
         ]
         for stamp, *rest in sorted([*events, *pulses]):
             yield seconds(stamp), *rest
     elif kind == "strides":
-        given: dict[Side, list[int]] = {side: [] for side in Side}
-        for one in placed.parts:
-            given[one.side] += (pulse.stride for pulse in one.analysis.pulses)
-            if strides and one.side is not strides[0].side:
-                strides += (s for s in one.analysis.strides if s.end <= one.end)
-        for s in strides:
-            part, of_leg = "pulses", given[s.side]
-            if not of_leg or s.number < min(of_leg):
-                part = "baseline"
-            elif s.number > max(of_leg):
-                part = "washout"
-            count, of = of_leg.count(s.number), s.side.name.lower()
-            yield s.number, part, of, seconds(s.start), s.period, *s.step_periods, count
+        for s, part, count in _strides_of(placed):
+            told = (None, None) if sealed else (part, count)
+            place = s.side.name.lower(), seconds(s.start), s.period, *s.step_periods
+            yield s.number, told[0], *place, told[1]
     elif kind == "pulses":
-        late = {(side, timing.commanded): timing for side, timing in run.delivered}
-        for leg, p in ((part.side, p) for part in placed.parts for p in part.analysis.pulses):
-            timing = late.get((leg, p.onset))
+        for block, p in ((one, p) for one in placed.parts for p in one.analysis.pulses):
+            timing = placed.timings[p.onset]
             yield (
+                block.name or None,
                 p.number,
                 p.stride,
-                leg.name.lower(),
+                block.side.name.lower(),
                 seconds(p.onset),
+                timing.torque,
                 p.phase,
                 p.phase_lag,
                 p.unwrapped_lag,
@@ -154,8 +155,24 @@ def rows_of(placed: PlacedRun, kind: str) -> Iterator[Row]:
         yield from (one.row for one in Findings.of(placed))
 
 
-def _seconds_late(timing: Any, kind: str) -> float:
-    late = None if timing is None else late_ms(timing, kind)
+def _strides_of(placed: PlacedRun) -> list[tuple[Stride, str, int]]:
+    """Return the strides in their order, each with its part and its number of pulses."""
+    found = []
+    blocks = list[tuple[float, float]]()  # [ns]
+    for one in placed.parts:
+        strides = [s for s in one.analysis.strides if s.end <= one.end]
+        blocks += [(strides[0].start, strides[-1].end)] if strides else []
+        given = Counter(pulse.stride for pulse in one.analysis.pulses)
+        first, last = min(given, default=math.inf), max(given, default=math.inf)
+        for s in strides:
+            part = "pulses" if first <= s.number <= last else "washout"
+            found.append((s, "baseline" if s.number < first else part, given[s.number]))
+    between = (s for s in placed.run.strides if all(s.end <= a or b <= s.start for a, b in blocks))
+    return sorted([*found, *((s, "rest", 0) for s in between)], key=lambda row: row[0].start)
+
+
+def _seconds_late(timing: PulseTiming, kind: str) -> float:
+    late = late_ms(timing, kind)
     return math.nan if late is None else late / 1e3
 
 
@@ -163,16 +180,13 @@ def write_tables(runs: Iterable[PlacedRun], out: Path, format_name: str = "tsv")
     """
     Write each of TABLES over all runs into a folder; files of these names are replaced.
 
-    Of a sealed run there are no pulses and no verdict. Returns the paths. Raises BagError if
-    pyarrow is missing for Parquet.
+    Returns the paths. Raises BagError if pyarrow is missing for Parquet.
     """
     rows: dict[str, list[Row]] = {name: [] for name in TABLES}
     for placed in runs:
         place = placed.place
         head = (place.person or None, place.session or None, place.block, place.name)
         for name, found in rows.items():
-            if place.sealed and name in _TELLING:
-                continue
             found += ((*head, *row) for row in rows_of(placed, name))
     out.mkdir(parents=True, exist_ok=True)
     paths = []

@@ -7,7 +7,9 @@ import json
 
 import pytest
 
+from gait_entrainment_sessions import folder as folder_module
 from gait_entrainment_sessions.folder import SessionFolder
+from gait_entrainment_sessions.runs import is_sealed
 from gait_entrainment_sessions.session_file import SessionError, read_session
 
 BLIND = ("rest: 30", "blind: true")
@@ -49,8 +51,8 @@ def test_no_bag_is_overwritten(begun):
 def test_a_line_that_a_crash_cut_short_says_nothing_and_spoils_no_other(begun):
     folder = begun()
     folder.note("done", 1, "block-01")
-    with (folder.path / "ledger.tsv").open("a") as file:
-        file.write("2026-11-26T10:00:00\tdone\t2")
+    with (folder.path / "ledger.tsv").open("ab") as file:
+        file.write("2026-11-26T10:00:00\tdone\t\N{BALLOT X}".encode()[:-1])
     assert folder.next_block() == 2
     folder.note("note", text="after it")
     assert [entry.what for entry in folder.ledger] == ["done", "note"]
@@ -85,6 +87,21 @@ def test_what_else_is_in_the_folder_is_left_alone(begun, tmp_path):
     (tmp_path / "s/sub-P01/ses-1/mine").touch()
     with pytest.raises(SessionError, match="holds something else"):
         begun()
+
+
+@pytest.mark.parametrize("last", ["key.json", "session.yaml", "ledger.tsv", "session.part"])
+def test_a_session_whose_beginning_was_cut_short_begins_anew(begun, monkeypatch, last):
+    def cut(path, text):
+        path.write_text(text[: 0 if path.name == last else None])
+        if path.name == last:
+            raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as broken:
+        broken.setattr(folder_module, "_write", cut)
+        with pytest.raises(OSError, match="No space"):
+            begun(BLIND)
+    assert begun(BLIND).next_block() == 1
+    assert begun(BLIND).unblind() == ["faster", "slower"]
 
 
 @pytest.mark.parametrize("other", [("code: P01", "code: P02"), ("number: 2", "number: 3")])
@@ -154,15 +171,28 @@ def test_a_session_tells_how_it_stands(begun):
     ]
 
 
+def test_a_rest_is_no_longer_for_a_clock_that_was_set_back(begun):
+    folder = begun()
+    with (folder.path / "ledger.tsv").open("a") as file:
+        file.write("2126-11-26T10:00:00+00:00\trest\t1\t\t600 s\n")
+    assert folder.standing() == "rest before block 1 of 2 (faster): 600 s"
+
+
 def test_a_blinded_session_stands_by_numbers(begun):
     assert begun(BLIND).standing() == "next: block 1 of 2"
 
 
-def test_a_sealed_session_tells_no_name_before_it_is_unblinded(begun):
+def test_a_sealed_session_tells_no_name_before_it_is_unblinded(begun, tmp_path):
     folder = begun(BLIND)
     assert folder.names() == ["block 1", "block 2"]
     assert folder.plan["blocks"] is None
     assert "faster" not in (folder.path / "session.json").read_text()
+    bag = folder.path / "bags/block-01"
+    (bag.parent / "block-02").mkdir(parents=True)
+    bag.mkdir()
+    (tmp_path / "link").symlink_to(bag)
+    ways = (bag, bag / "block-01_0.mcap", bag.parent / "block-02/../block-01", tmp_path / "link")
+    assert all(is_sealed(way) for way in ways)
     assert (folder.path / "key.json").stat().st_mode & 0o222 == 0
     assert folder.unblind() == ["faster", "slower"]
     assert folder.names() == folder.unblind() == ["faster", "slower"]

@@ -53,6 +53,8 @@ def test_a_protocol_may_have_blocks_and_lists_of_its_own(write):
     shaped = "{pulses: {period: 1.9, shape: samples, samples: [0, 1, 0], catch_pulses: [3, 5]}}"
     pulses = read_session(write((SLOWER, shaped))).blocks[1].protocol.pulses
     assert (pulses.samples, pulses.catch_pulses) == ("0, 1, 0", "3, 5")
+    repeated = ("  pulses:\n", "  pulses: &all\n"), (SLOWER, "{pulses: *all}")
+    assert read_session(write(*repeated)).blocks[1].protocol.pulses.count == 20
     common = ("\n  pulses:\n    count: 20\n    torque: 9.0", "")
     own = "{blocks: [{name: a}, {name: b, washout: 3}]}"
     protocol = read_session(write((SLOWER, own), common)).blocks[1].protocol
@@ -71,8 +73,9 @@ MISTAKES = [
     ("side: left", "driver: emulatd", 7, "driver: 'emulatd' is unknown; allowed: "),
     ("side: left", "limits: {torque: 4}", 7, "limits.torque: limits are the person's"),
     ("code: P01", "code: P 01", 3, "person.code: 'P 01'; allowed: letters and digits"),
-    ("number: 2, ", "nmber: 2, ", 3, "nmber: unknown field of person; allowed: code, number"),
+    ("number: 2, ", "nmber: 2, ", 3, "person.nmber: unknown field; allowed: code, leg_length"),
     ("mass: 72, ", "", 3, "person.mass: missing; allowed: 5 to 500 kg"),
+    ("number: 2, ", "number: 012, ", 3, "person.number: 012 is 10 in YAML; write it as a decimal"),
     ("mass: 72", "mass: 7000", 3, "person.mass: 7000.0; allowed: 5 to 500 kg"),
     ("name: slower", "name: faster", 15, "name: faster: appears twice; keep one"),
     ("name: slower, ", "", 15, "name: missing; allowed: a plain name"),
@@ -82,10 +85,10 @@ MISTAKES = [
     ("rest: 30", "blind: perhaps", 5, "blind: 'perhaps'; allowed: true, false"),
     ("rest: 30", "seed: 1.5", 5, "seed: 1.5; allowed: a whole number"),
     ("rest: 30", "limits: {torqe: 15}", 5, "limits: appears twice"),
-    ("torque: 15", "torqe: 15", 4, "torqe: unknown field of limits; allowed: torque"),
+    ("torque: 15", "torqe: 15", 4, "limits.torqe: unknown field; allowed: arming"),
     ("study: pilot", "study: [pilot", 2, "not valid YAML"),
     ("study: pilot", "study: {a: b}", 1, "study: must be a single value"),
-    ("blocks:", "block:", 11, "block: unknown field of a session; allowed: study"),
+    ("blocks:", "block:", 11, "block: unknown field; allowed: blind, blocks"),
 ]
 
 

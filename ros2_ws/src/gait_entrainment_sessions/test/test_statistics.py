@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from astropy.stats import vonmisesmle
+from astropy.stats import rayleightest, vonmisesmle
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import special
@@ -46,6 +46,7 @@ def test_slope_is_that_of_the_normal_equations_and_its_interval_that_of_student(
 def test_slope_of_too_little_cannot_be_told():
     assert math.isnan(statistics.slope([1, 2], [1, 2]).value)
     assert math.isnan(statistics.slope([3, 3, 3], [1, 2, 3]).value)
+    assert statistics.slope([1, 2, 3, 4], [0.1] * 4) == (0, 0, 0)
 
 
 @given(PHASES, st.floats(0.0, 1.0))
@@ -83,6 +84,7 @@ def test_an_exponential_approach_is_found_exactly_and_nothing_else_is():
         assert found.value == pytest.approx(tau, rel=1e-6)
     assert math.isnan(statistics.convergence(n, -0.05 * n).value)  # drifts
     assert math.isnan(statistics.convergence(n[:5], np.exp(-n[:5])).value)
+    assert math.isnan(statistics.convergence(n, [*np.exp(-n[:39]), math.nan]).value)
 
 
 def test_interval_of_the_time_constant_holds_it_as_often_as_it_says():
@@ -163,10 +165,10 @@ def test_intervals_of_mean_and_deviation_hold_as_often_as_they_say():
 @pytest.mark.parametrize("count", [5, 12, 40])
 def test_rayleigh_by_another_approximation_and_by_chance(count):
     phases = [0.02 * n for n in range(count)]
-    length = abs(sum(np.exp(2j * np.pi * np.array(phases))))
-    # Zar (Biostatistical Analysis, 5th ed., eq. 27.4).
-    other = math.exp(math.sqrt(1 + 4 * count + 4 * (count**2 - length**2)) - (1 + 2 * count))
+    other = rayleightest(2 * np.pi * np.array(phases))
     assert statistics.rayleigh(phases) == pytest.approx(other, abs=0.005)
+    # Of ten persons close together the series of that library is negative.
+    assert 0 < statistics.rayleigh([0.65 + phase / count for phase in phases]) < 0.01
     assert 0.02 < rate_of(lambda rng: statistics.rayleigh(rng.uniform(size=count)) < 0.05) < 0.09
     assert math.isnan(statistics.rayleigh([0.5]))
 

@@ -5,15 +5,22 @@
 
 import csv
 import json
+import math
+import re
+from dataclasses import replace
+from itertools import groupby
 
 import pytest
 from pyarrow import parquet
 
 from gait_entrainment.protocol import read_protocol
 from gait_entrainment.simulation import simulate
-from gait_entrainment_bags import BagError
+from gait_entrainment_bags import BagError, BagReader
 from gait_entrainment_bags.recorded_run import read_run
-from gait_entrainment_sessions.runs import Place, PlacedRun, places_in, read_runs
+from gait_entrainment_sessions.findings import Findings, StudyFindings
+from gait_entrainment_sessions.report import page
+from gait_entrainment_sessions.report.checks import checks_of
+from gait_entrainment_sessions.runs import Place, PlacedRun, is_sealed, places_in, read_runs
 from gait_entrainment_sessions.tables import TABLES, write_tables
 
 
@@ -82,17 +89,70 @@ def test_runs_of_a_study_come_by_person_session_and_block(done, tmp_path):
     ]
     sealed = done(("rest: 30", "blind: true"), study="blind")
     assert [place.name for place in places_in(sealed.path)] == ["block 1", "block 2"]
+    for path in (sealed.path / "bags/block-01", *sealed.path.glob("bags/block-02/*.mcap")):
+        assert is_sealed(path)
+        (place,) = places_in(path)
+        assert place.sealed
 
 
-def test_each_block_of_a_protocol_has_a_row_of_its_own(tmp_path):
-    protocol = read_protocol("blocks:\n- {name: faster}\n- {name: slower, pulses: {period: 1.95}}")
-    write_tables([PlacedRun(Place(tmp_path), simulate(protocol))], tmp_path / "out")
+def test_of_a_sealed_run_no_table_tells_the_pulses(done, tmp_path):
+    sealed = done(("rest: 30", "blind: true"))
+    write_tables(read_runs(sealed.path), tmp_path)
+    events, strides = (rows(tmp_path / f"{name}.tsv") for name in ("events", "strides"))
+    assert {row["trial_type"] for row in events} == {"heel_strike", "toe_off"}
+    assert {(row["part"], row["pulses"]) for row in strides} == {("n/a", "n/a")}
+    assert len(strides) == 160
+    for name in ("pulses", "blocks"):
+        assert rows(tmp_path / f"{name}.tsv") == []
+
+
+def test_each_block_of_a_protocol_has_a_row_of_its_own_and_its_parts(tmp_path):
+    slower = "{name: slower, pulses: {period: 1.95, width: 0.2, torque: 5, catch_pulses: 1}}"
+    protocol = read_protocol(f"blocks:\n- {{name: faster, rest: 5}}\n- {slower}")
+    placed = PlacedRun(Place(tmp_path), simulate(protocol))
+    write_tables([placed], tmp_path / "out")
+    parts = [
+        part for part, _ in groupby(row["part"] for row in rows(tmp_path / "out/strides.tsv"))
+    ]
+    block = ["baseline", "pulses", "washout"]
+    assert parts == [*block, "rest", *block]
+    given = [row for row in rows(tmp_path / "out/events.tsv") if row["trial_type"] == "pulse"]
+    assert [row["duration"] for row in given] == ["0.1"] * 50 + ["0.2"] * 50
+    pulses = rows(tmp_path / "out/pulses.tsv")
+    assert [(row["part"], row["pulse"]) for row in pulses[49:51]] == [
+        ("faster", "50"),
+        ("slower", "1"),
+    ]
+    assert [row["torque"] for row in pulses[50:52]] == ["0.0", "5.0"]
+    # Weaker pulses, as those of a sham, say nothing about the basin of the others.
+    (person,) = StudyFindings.of(Findings.of(placed)).persons
+    assert (person.entrained, person.testable, person.slower.beyond) == (1, 2, math.inf)
     found = rows(tmp_path / "out/blocks.tsv")
     assert [(row["part"], row["verdict"]) for row in found] == [
         ("faster", "entrained"),
         ("slower", "drifting"),
     ]
     assert [round(float(row["offset"]), 2) for row in found] == [-2.59, 0.87]
+
+
+@pytest.mark.parametrize(
+    ("given", "finding"), [(0, "none was asked for"), (1, "1 of 1 pulses compared")]
+)
+def test_torque_is_compared_where_some_was_asked_for(bag, given, finding):
+    run = read_run(bag)
+    sham = [(side, replace(timing, torque=0.0)) for side, timing in run.delivered]
+    run = replace(run, delivered=tuple(sham[given:]) + run.delivered[:given])
+    with BagReader(bag) as reader:
+        (check,) = (one for one in checks_of(run, reader) if one.name == "torque")
+    assert (check.state, check.finding.endswith(finding)) == ("good", True)
+
+
+@pytest.mark.parametrize("text", ["pulses: {count: 0}\n", "baseline: 1\npulses: {period: 1.8}\n"])
+def test_what_cannot_be_told_is_not_told_as_a_number(text, tmp_path):
+    (found,) = Findings.of(PlacedRun(Place(tmp_path), simulate(read_protocol(text))))
+    told = " ".join(value for _, value in page.statistics_of(found))
+    assert "cannot be told" in told
+    assert not re.search("nan|million", told)
 
 
 def test_a_folder_without_runs_is_told(done, tmp_path):

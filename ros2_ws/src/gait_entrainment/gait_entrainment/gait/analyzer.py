@@ -70,7 +70,8 @@ class GaitAnalyzer:
     ) -> None:
         self._tracker = StrideTracker(side, _ANYBODY)
         self._strides_before = strides_before  # of the leg in the run, which are of no interest
-        self._test = EntrainmentTest(settings or VerdictSettings())
+        settings = settings or VerdictSettings()
+        self._test = EntrainmentTest(settings)
         self._lags = LagFollower()
         self._toe_offs = False  # whether a stride has shown one; settled by the first pulse
         self._unperturbed = UnperturbedPeriod()
@@ -80,7 +81,7 @@ class GaitAnalyzer:
         self._onsets: list[int] = []  # announced, not placed yet; ascending
         self._promised = -math.inf  # no pulse before this instant will be added [ns]
         self._finished = False
-        self._numbers = PulseNumbers()
+        self._numbers = PulseNumbers(settings.irregularity)
         self._unknown: list[tuple[int, int]] = []  # spans in which pulses may have begun [ns]
         self.holes: list[Hole] = []
         self.pulse_counts = PulseCounts()

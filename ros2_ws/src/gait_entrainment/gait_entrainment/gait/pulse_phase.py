@@ -65,10 +65,12 @@ class PulseNumbers:
 
     The period of a train is known once an interval agrees with the one before or with the
     unperturbed stride, within a quarter, more than any robot jitters. Then an interval of several
-    periods has pulses missing in it; any other is the pause before another train.
+    periods has pulses missing in it; any other is the pause before another train. Pulses that
+    are planned too irregular [s] for this follow each other.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, irregularity: float = 0.0) -> None:
+        self._irregularity = irregularity
         self.number = 0  # of the latest pulse
         self.latest = self._first = 0  # onset of the latest pulse, of the first of its train [ns]
         self._periods = 0  # between the two
@@ -77,7 +79,7 @@ class PulseNumbers:
     def place(self, onset: int, stride: float, *, anew: bool = False) -> int | None:
         """Take an onset [ns]; return how many lack before it, None if another train begins."""
         steps = 1.0 if self.number else 0.0
-        if self._periods:
+        if self._periods and not self._irregularity > stride / 4:
             steps = (onset - self.latest) * self._periods / (self.latest - self._first)
         whole, interval = round(steps), (onset - self.latest) / NANOSECONDS_PER_SECOND
         self.latest = onset

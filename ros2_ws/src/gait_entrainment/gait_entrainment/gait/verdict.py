@@ -80,6 +80,7 @@ class VerdictSettings(Checked):
     largest_difference: float = setting(
         0.25, "largest D at one pulse a stride, by the unperturbed period", "1", (0.01, 0.5)
     )
+    irregularity: float = setting(0.0, "by which intervals of pulses differ", "s", (0.0, 100.0))
     stretch_tolerance: float = setting(
         0.010, "distance from the final lag of an entrained stride", "s", (0.0, 1.0)
     )

@@ -5,8 +5,4 @@
 
 from gait_entrainment.protocol.block import Block, ProtocolError, PulsePlan
 from gait_entrainment.protocol.protocol import FIELDS, Protocol, content_of, said
-from gait_entrainment.protocol.reader import (
-    DEFAULT_PROTOCOL,
-    read_protocol,
-    write_protocol,
-)
+from gait_entrainment.protocol.reader import DEFAULT_PROTOCOL, read_protocol, write_protocol

@@ -33,8 +33,8 @@ class ProtocolError(UsageError):
     """A protocol that cannot be conducted; the message says place, field and what is allowed."""
 
 
-def _either(unit: str, meaning: str, within: tuple[float, float], default: Any = None) -> Any:
-    return setting(default, meaning, unit, within, kind=float, optional=True)
+def _either(unit: str, meaning: str, default: Any = None, **more: Any) -> Any:
+    return setting(default, meaning, unit, kind=float, optional=True, **more)
 
 
 @dataclass(frozen=True)
@@ -49,18 +49,16 @@ class PulsePlan(Checked):
     count: int = setting(50, "number of pulses; 0 for none", within=(0, _MOST))
     # A pulse shorter than a nanosecond has no stamps.
     width: float = setting(0.1, "duration of a pulse", "s", (1e-9, 10.0))
-    torque: float | None = setting(
-        None, "height of the pulses, plantarflexion positive", "N m", kind=float, optional=True
-    )
+    torque: float | None = _either("N m", "height of the pulses, plantarflexion positive")
     torque_fraction: float | None = _either(
-        "1", "the same as a fraction of the peak ankle torque", (-1.0, 1.0), 0.1
+        "1", "the same as a fraction of the peak ankle torque", 0.1, within=(-1.0, 1.0)
     )
     # Until the stride period is measured, the experiment proceeds by at most a pulse period.
     period: float | None = _either(
-        "s", "pulse period, from onset to onset, instead of an offset", (1e-3, 100.0)
+        "s", "pulse period, from onset to onset, instead of an offset", within=(1e-3, 100.0)
     )
     period_offset: float | None = _either(
-        "s", "pulse period minus the stride period of the baseline", (-100.0, 100.0), -0.05
+        "s", "pulse period minus the stride period of the baseline", -0.05, within=(-100.0, 100.0)
     )
     initial_phase: float = setting(
         0.0,
@@ -70,15 +68,12 @@ class PulsePlan(Checked):
         most_excluded=True,
     )
     period_ratio: float | None = _either(
-        "1", "pulse period by the stride period of the baseline", (0.01, 100.0)
+        "1", "pulse period by the stride period of the baseline", within=(0.01, 100.0)
     )
-    phase: float | None = setting(
-        None,
-        "place of each pulse in its own stride, of which the length is predicted",
+    phase: float | None = _either(
         "1",
-        (0.0, 1.0),
-        kind=float,
-        optional=True,
+        "place of each pulse in its own stride, of which the length is predicted",
+        within=(0.0, 1.0),
         most_excluded=True,
     )
     sweep: float = setting(0.0, "change of the period, linear, to the last pulse", "s", (-10, 10))
@@ -103,19 +98,16 @@ class PulsePlan(Checked):
 
         Raises ProtocolError if successive pulses would overlap.
         """
-        if self.period is not None:
-            period = self.period
-        elif self.period_ratio is not None:
-            period = measured_period * self.period_ratio
-        else:
-            assert self.period_offset is not None
-            period = measured_period + self.period_offset
+        period = self.period
+        if period is None:
+            period = measured_period * (self.period_ratio or 1.0) + (self.period_offset or 0.0)
         # In stamps: successive onsets are at least the whole nanoseconds of a period apart.
         least = min(period, period + self.sweep) - 2 * self.jitter
         if not least * NANOSECONDS_PER_SECOND >= nanoseconds(self.width) + 1:
+            name = "jitter" if self.jitter else "sweep" if self.sweep < 0 else "width"
             raise ProtocolError(
-                f"pulses.width: {self.width:g} s makes the pulses overlap at a pulse period of "
-                f"{least:.6g} s; allowed: below the period"
+                f"pulses.{name}: {getattr(self, name):g} s makes the pulses overlap, at intervals "
+                f"down to {least:.6g} s; allowed: intervals above the width of {self.width:g} s"
             )
         return period
 
@@ -237,7 +229,5 @@ class Block(Checked):
 
     def torque(self, walker: WalkerParameters) -> float:
         """Return the height of the pulses [N m], plantarflexion positive."""
-        if self.pulses.torque is not None:
-            return self.pulses.torque
-        assert self.pulses.torque_fraction is not None
-        return self.pulses.torque_fraction * walker.peak_torque
+        torque, fraction = self.pulses.torque, self.pulses.torque_fraction
+        return (fraction or 0.0) * walker.peak_torque if torque is None else torque

@@ -38,27 +38,33 @@ _SUSPECTS = ("pulses.period", "pulses.phase", "pulses.shape", "pulses.count")
 _B = TypeVar("_B", bound=Block)
 
 
-class _Entry(NamedTuple):
+class Entry(NamedTuple):
+    """What was said of a field."""
+
     value: object
     where: str  # file and line, or the command-line option that set it
 
 
 def read_protocol(
-    source: Path | str | None = None,
+    source: Path | str | Mapping[str, Entry] | None = None,
     overrides: Mapping[str, tuple[object, str]] | None = None,
     *,
     to_run: bool = False,
 ) -> Protocol:
     """
-    Read and validate a protocol: a YAML file, the text of one (with a line break), or the default.
+    Read and validate a protocol: the default, or of what one says, a YAML file or its text.
 
-    ``overrides`` replace values of the file: dotted field name -> (value, who says so), for
-    instance ``{"pulses.width": (0.2, "--width")}``. A text is read as what it stands for.
+    A text has a line break in it. ``overrides`` replace values of the source: dotted field name
+    -> (value, who says so), as ``{"pulses.width": (0.2, "--width")}``; a text is read as what it
+    stands for.
     ``to_run`` holds the pulses against the limits, and sees that there is such a driver, too.
     Raises ProtocolError: one line with place, field, and what is allowed.
     """
-    entries = dict(_entries(source)) if source is not None else {}
-    replacing = dict(_spelled_out(key, _Entry(*given)) for key, given in (overrides or {}).items())
+    if isinstance(source, str | Path):
+        name, _, root = composed(source)
+        source = dict(entries_in(root, name)) if root else {}
+    entries = dict(source or {})
+    replacing = dict(_spelled_out(key, Entry(*given)) for key, given in (overrides or {}).items())
     blocks = entries.pop("blocks", None)
     if blocks is None:
         entries = _merged(entries, replacing)
@@ -77,9 +83,7 @@ def read_protocol(
     return _checked(protocol, [of_block | entries for of_block in said], to_run=to_run)
 
 
-def _checked(
-    protocol: Protocol, said: Sequence[Mapping[str, _Entry]], *, to_run: bool
-) -> Protocol:
+def _checked(protocol: Protocol, said: Sequence[Mapping[str, Entry]], *, to_run: bool) -> Protocol:
     """Return a protocol, checked if it is ``to_run``; of each block is ``said`` what."""
     for block, entries in zip(protocol.sequence if to_run else (), said, strict=False):
         try:
@@ -92,7 +96,7 @@ def _checked(
     return protocol
 
 
-def _place(suspects: Iterable[str], entries: Mapping[str, _Entry]) -> str:
+def _place(suspects: Iterable[str], entries: Mapping[str, Entry]) -> str:
     """Return the place of the first field at fault that was said, else of the first that was."""
     found = (entries[key].where + ": " for key in (*suspects, *entries) if key in entries)
     return next(found, "")
@@ -108,8 +112,8 @@ def write_protocol(protocol: Protocol) -> str:
     return text
 
 
-def _entries(source: Path | str) -> Iterator[tuple[str, _Entry]]:
-    """Yield dotted field names with value and place from a YAML file or text."""
+def composed(source: Path | str) -> tuple[str, str, yaml.Node | None]:
+    """Return name, text and content of a YAML file or text; raises ProtocolError."""
     if isinstance(source, str) and "\n" in source:
         name, text = "protocol", source
     else:
@@ -120,7 +124,7 @@ def _entries(source: Path | str) -> Iterator[tuple[str, _Entry]]:
             reason = error.strerror if isinstance(error, OSError) else "is not UTF-8 text"
             raise ProtocolError(f"{name}: cannot be read: {reason}") from None
     try:
-        root = yaml.compose(text, Loader=yaml.SafeLoader)
+        return name, text, yaml.compose(text, Loader=yaml.SafeLoader)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         line = f":{mark.line + 1}" if mark else ""
@@ -128,13 +132,12 @@ def _entries(source: Path | str) -> Iterator[tuple[str, _Entry]]:
         raise ProtocolError(f"{name}{line}: not valid YAML: {problem}") from None
     except RecursionError:
         raise ProtocolError(f"{name}: nested too deeply for a protocol") from None
-    if root is not None:
-        yield from _walk(root, name, "", FIELDS)
 
 
-def _walk(
-    node: yaml.Node, name: str, prefix: str, allowed: Mapping[str, Setting]
-) -> Iterator[tuple[str, _Entry]]:
+def entries_in(
+    node: yaml.Node, name: str, allowed: Mapping[str, Setting] = FIELDS, prefix: str = ""
+) -> Iterator[tuple[str, Entry]]:
+    """Yield dotted field names with value and place from a part of a file of this ``name``."""
     if not isinstance(node, yaml.MappingNode):
         section = prefix.rstrip(".") or "a protocol"
         raise ProtocolError(
@@ -150,18 +153,22 @@ def _walk(
         if key == "blocks" and allowed is FIELDS:
             if not isinstance(value_node, yaml.SequenceNode) or not value_node.value:
                 raise ProtocolError(f"{where}: blocks: must be a list of at least one block")
-            blocks = [dict(_walk(block, name, "", BLOCK_FIELDS)) for block in value_node.value]
-            yield key, _Entry(blocks, where)
+            blocks = [dict(entries_in(block, name, BLOCK_FIELDS)) for block in value_node.value]
+            yield key, Entry(blocks, where)
+        elif key in allowed and allowed[key].kind is yaml.Node:  # for the caller to take apart
+            yield key, Entry(value_node, where)
         elif any(field.startswith(f"{key}.") for field in allowed):
-            yield from _walk(value_node, name, key + ".", allowed)
+            yield from entries_in(value_node, name, allowed, f"{key}.")
         elif key not in allowed or "." in str(key_node.value):  # a section's field has one place
             inside = [field.removeprefix(prefix) for field in allowed if field.startswith(prefix)]
             known = ", ".join(sorted({field.partition(".")[0] for field in inside}))
             raise ProtocolError(f"{where}: {key}: unknown field; allowed: {known}")
-        elif isinstance(value_node, yaml.SequenceNode) and FIELDS[key].kind is str:
-            yield key, _Entry(", ".join(str(item.value) for item in value_node.value), where)
+        elif isinstance(value_node, yaml.SequenceNode) and allowed[key].kind is str:
+            yield key, Entry(", ".join(str(item.value) for item in value_node.value), where)
         elif not isinstance(value_node, yaml.ScalarNode):
             raise ProtocolError(f"{where}: {key}: must be a single value")
+        elif allowed[key].kind is str:  # as written, also if YAML would make a number of it
+            yield key, Entry(value_node.value, where)
         else:
             try:
                 value = yaml.SafeLoader("").construct_object(value_node)
@@ -169,11 +176,12 @@ def _walk(
                 raise ProtocolError(
                     f"{where}: {key}: {value_node.value[:40]!r} cannot be read as a value"
                 ) from None
-            _require_plain_number(where, key, value_node, value)
-            yield _spelled_out(key, _Entry(value, where))
+            if allowed[key].kind in (int, float):
+                _require_plain_number(where, key, value_node, value)
+            yield _spelled_out(key, Entry(value, where))
 
 
-def _spelled_out(key: str, entry: _Entry) -> tuple[str, _Entry]:
+def _spelled_out(key: str, entry: Entry) -> tuple[str, Entry]:
     """Return an entry, and what "side: both" is short for."""
     both = (key, entry.value) == ("side", "both")
     return ("both_legs", entry._replace(value=True)) if both else (key, entry)
@@ -181,17 +189,16 @@ def _spelled_out(key: str, entry: _Entry) -> tuple[str, _Entry]:
 
 def _require_plain_number(where: str, key: str, node: yaml.ScalarNode, value: object) -> None:
     """Raise ProtocolError for what YAML 1.1 takes for another number than people do, or a text."""
-    number = FIELDS[key].kind in (int, float)
-    if number and node.style in ("'", '"'):
+    if node.style in ("'", '"'):
         raise ProtocolError(f"{where}: {key}: {node.value!r} is a text: leave out the quotes")
     other_base = ":" in node.value or re.match(r"[-+]?0[0-9_box]", node.value)
-    if number and isinstance(value, int) and other_base:
+    if isinstance(value, int) and other_base:
         raise ProtocolError(
             f"{where}: {key}: {node.value} is {value} in YAML; write it as a decimal number"
         )
 
 
-def _merged(entries: Mapping[str, _Entry], replacing: Mapping[str, _Entry]) -> dict[str, _Entry]:
+def _merged(entries: Mapping[str, Entry], replacing: Mapping[str, Entry]) -> dict[str, Entry]:
     """Return entries of which some are replaced, with what says the same in another way."""
     replaced = {
         k for group in _ALTERNATIVES if not replacing.keys().isdisjoint(group) for k in group
@@ -205,19 +212,24 @@ def _merged(entries: Mapping[str, _Entry], replacing: Mapping[str, _Entry]) -> d
     return merged
 
 
-def _build(kind: type[_B], entries: Mapping[str, _Entry], **more: Any) -> _B:
+def value_of(rule: Setting, key: str, entry: Entry) -> Any:
+    """Return what was said of a field as a value; raises ProtocolError."""
+    value, where = entry
+    try:
+        # YAML 1.1 reads 1e-3, which has no dot, as a text.
+        return rule.parse(key, value) if isinstance(value, str) else rule.check(key, value)
+    except SettingError as error:
+        also = ", both" if key == "side" else ""
+        raise ProtocolError(f"{where}: {error}{also}") from None
+
+
+def _build(kind: type[_B], entries: Mapping[str, Entry], **more: Any) -> _B:
     """Return a block or a whole protocol from what is said of it."""
     sections: dict[str, dict[str, Any]] = {"": {}}
     rules = BLOCK_FIELDS if kind is Block else FIELDS
-    for key, (value, where) in entries.items():
-        rule, (section, _, name) = rules[key], key.rpartition(".")
-        try:
-            # YAML 1.1 reads 1e-3, which has no dot, as a text.
-            read = rule.parse(key, value) if isinstance(value, str) else rule.check(key, value)
-            sections.setdefault(section, {})[name] = read
-        except SettingError as error:
-            also = ", both" if key == "side" else ""
-            raise ProtocolError(f"{where}: {error}{also}") from None
+    for key, entry in entries.items():
+        section, _, name = key.rpartition(".")
+        sections.setdefault(section, {})[name] = value_of(rules[key], key, entry)
     # What is given leaves no place for the default of its alternative.
     for group in _ALTERNATIVES:
         if any(key in entries for key in group):

@@ -100,7 +100,7 @@ class GuardedRobot:
 
     @property
     def armed(self) -> bool:
-        """Whether torque is allowed; a device in simulated time needs no arming."""
+        """Whether torque is allowed."""
         return time.monotonic() < self._armed_until
 
     # Lifecycle. Each step raises DeviceError if it is not its turn or the driver fails.
@@ -127,7 +127,7 @@ class GuardedRobot:
             raise DeviceError("the device is active already; deactivate it first")
         self._call(self._robot.activate)
         self._active = True
-        self._armed_until = math.inf if self.capabilities.simulated else -math.inf
+        self.disarm()
         if not self.capabilities.simulated:
             # The interpreter's end kills the threads of a driver: zero torque comes before it.
             atexit.register(self.close)
@@ -140,6 +140,10 @@ class GuardedRobot:
         self._refuse_inactive()
         if not self.capabilities.simulated:
             self._armed_until = time.monotonic() + self.limits.arming
+
+    def disarm(self) -> None:
+        """Accept no train until armed again; a device in simulated time needs no arming."""
+        self._armed_until = math.inf if self.capabilities.simulated else -math.inf
 
     def begin(self, start: int) -> None:
         """

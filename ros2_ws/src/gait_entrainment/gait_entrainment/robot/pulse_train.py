@@ -163,12 +163,13 @@ class PulseTrain:
 
 @dataclass(frozen=True)
 class PulseTiming:
-    """Onsets of one pulse [ns]; None if the states do not show it."""
+    """Onsets of one pulse [ns], None if the states do not show it; and what was announced."""
 
     commanded: int
     sent: int | None = None
     measured: int | None = None
-    sham: bool = False  # announced without torque: no state can show it
+    torque: float = math.nan  # height [N m]; NaN if not announced, of 0 no state shows anything
+    duration: float = math.nan  # [s]
 
     @property
     def onset(self) -> int:

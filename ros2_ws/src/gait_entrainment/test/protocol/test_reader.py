@@ -109,8 +109,8 @@ def test_what_is_written_reads_back_the_same(
         ("pulses: {phase: 0.5, sweep: 0.1}", ("pulses.sweep: does not go with phase",)),
         ("pulses: {phase: 0.5, initial_phase: 0.1}", ("pulses.initial_phase", "phase")),
         ("pulses: {phase: 0.5, count: 3}\nbaseline: 2", ("baseline: 2", "at least 3")),
-        ("pulses: {period: 2, sweep: -1.95}", ("pulses.width", "overlap", "0.05 s")),
-        ("pulses: {period: 2, jitter: 0.96}", ("pulses.width", "overlap", "0.08 s")),
+        ("pulses: {period: 2, sweep: -1.95}", ("pulses.sweep: -1.95", "overlap", "0.05 s")),
+        ("pulses: {period: 2, jitter: 0.96}", ("pulses.jitter: 0.96", "overlap", "0.08 s")),
         ("pulses: {shape: triangle}", ("pulses.shape", "square, half_sine, trapezoid, samples")),
         ("pulses: {rise: 0.01}", ("pulses.rise: does not go with shape square",)),
         ("pulses: {samples: [0, 1]}", ("pulses.samples: does not go with shape square",)),
@@ -189,6 +189,11 @@ def test_options_that_contradict_each_other_are_refused():
     both = {"pulses.period": (1.9, "--period"), "pulses.period_offset": (0.1, "--period-offset")}
     with pytest.raises(ProtocolError, match=r"^--period-offset: .*not both"):
         read_protocol(None, both)
+
+
+def test_a_text_is_taken_as_it_is_written():
+    protocol = read_protocol("name: 2012\npulses: {catch_pulses: 5}\n")
+    assert (protocol.name, protocol.pulses.heights(1.0, (0, 1))[4]) == ("2012", 0.0)
 
 
 def test_a_number_without_a_dot_in_scientific_notation_is_a_number():

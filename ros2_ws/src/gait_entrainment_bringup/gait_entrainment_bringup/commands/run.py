@@ -191,7 +191,7 @@ def kept(bag: Path) -> str:
 
     A recorder that was killed could not close the bag; what reached the file is rescued.
     """
-    if not any(bag.iterdir()):
+    if not any(bag.glob("*")):  # nor is there a folder if the disk was full
         return ""
     try:
         BagReader(bag).close()

@@ -16,13 +16,7 @@ from contextlib import ExitStack, suppress
 from dataclasses import fields, is_dataclass
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, nanoseconds
-from gait_entrainment.robot import (
-    DeviceError,
-    DeviceLimits,
-    Pulse,
-    PulseTrain,
-    Shape,
-)
+from gait_entrainment.robot import DeviceError, DeviceLimits, Pulse, PulseTrain, Shape
 from gait_entrainment.robot.faults import EXPERIMENT_SILENT
 from gait_entrainment_commands.timing import MeasuredOnsets, lateness_ms, quantile
 from gait_entrainment_drivers.conformance.bench import (

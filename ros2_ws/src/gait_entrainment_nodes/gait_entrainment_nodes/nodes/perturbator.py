@@ -389,9 +389,8 @@ class Perturbator(Participant, TolerantLifecycleNode):
         """Publish a message; the client that asked for pulses hears of each."""
         super().publish(topic, message)
         if topic is topics.PULSES:
-            number, onset = message.number, message.header.stamp
-            feedback = DeliverPulseTrain.Feedback(number=number, onset=onset)
-            self._server.publish_feedback(feedback, message.side)
+            told = DeliverPulseTrain.Feedback(number=message.number, onset=message.header.stamp)
+            self._server.publish_feedback(told, message.side)
 
     def _on_horizon(self, message: Horizon) -> None:
         """Answer a horizon with the torque up to it, promised."""
@@ -400,8 +399,9 @@ class Perturbator(Participant, TolerantLifecycleNode):
         enabled = robots and all(robot.enabled for robot in robots.values())
         if not robots or not (enabled if new else self.run is not None):
             return
-        if new:
-            self._end_torque("another run began")
+        if new and self.run is not None:
+            self.run.interrupt("another run began")
+            self._armed_by = ""
         elif self.run is not None and message.seal != self.run.seal:
             if message.seal != self._foreign_seal:  # told once
                 self._foreign_seal = message.seal

@@ -168,6 +168,12 @@ class Run:
         for ankle in self._ankles.values():
             ankle.tell_end(outcome, reason, fault=fault)
 
+    def interrupt(self, reason: str) -> None:
+        """End the torque; real robots must be armed again: why it was not over is to be seen."""
+        self.end_torque(Result.STOPPED, reason)
+        for ankle in self._ankles.values():
+            ankle.robot.disarm()
+
 
 class AnkleRun:
     """The robot on one ankle in a run."""

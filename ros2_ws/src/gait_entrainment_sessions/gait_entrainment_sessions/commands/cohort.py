@@ -12,17 +12,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import binomtest
 from tqdm import tqdm
 
 from gait_entrainment.errors import UsageError
 from gait_entrainment.settings import Setting, settings_of
-from gait_entrainment.simulation import Simulation
 from gait_entrainment_commands.drawing import save_figure
 from gait_entrainment_sessions.findings import Findings, StudyFindings
 from gait_entrainment_sessions.rehearsal import rehearse
 from gait_entrainment_sessions.report.figures import draw_verdicts
 from gait_entrainment_sessions.session_file import read_session
+from gait_entrainment_sessions.statistics import share
 from gait_entrainment_sessions.tables import write_tables
 from gait_entrainment_studies.cohort.figures import draw_cohort
 from gait_entrainment_studies.cohort.study import (
@@ -127,20 +126,16 @@ def _rehearse(options: argparse.Namespace, distributions: SubjectDistributions) 
         key=lambda one: (one.place.block, one.place.person),
     )
     findings = [one for placed in runs for one in Findings.of(placed)]
-    ended = {
-        (one.place.person, one.place.block)
-        for one in runs
-        if isinstance(one.run, Simulation) and one.run.ending
-    }
     study = StudyFindings.of(findings)
     blocks: dict[str, Any] = {}
     lines = ["| block | verdicts | pulses locked* |", "| --- | --- | --- |"]
     for name in dict.fromkeys(one.name for one in findings):
         own = [one for one in findings if one.name == name]
         verdicts = Counter(one.verdict for one in own)
-        fell = len(ended & {(one.placed.place.person, one.placed.place.block) for one in own})
-        share = np.mean([one.locking.share for one in own])
-        locked = None if np.isnan(share) else float(share)
+        runs_of = [one.placed for one in own]
+        fell = len({one.place.person for one in runs_of if getattr(one.run, "ending", None)})
+        shares = [one.locking.share for one in own if not np.isnan(one.locking.share)]
+        locked = float(np.mean(shares)) if shares else None
         blocks[name] = {"verdicts": dict(verdicts), "locked": locked, "ended_early": fell}
         told = ", ".join(f"{number} {verdict}" for verdict, number in sorted(verdicts.items()))
         told += f"; {fell} fell or flew off" if fell else ""
@@ -201,9 +196,8 @@ def _spread(values: Floats) -> list[float]:
 
 def _of(found: int, count: int) -> str:
     """Return how many, with the 95 % interval of the share by Wilson's score."""
-    interval = binomtest(found, count).proportion_ci(method="wilson")
-    low, high = 100 * interval.low, 100 * interval.high
-    return f"{found} of {count}, 95 % interval {low:.0f} to {high:.0f} %"
+    _, low, high = share(found, count)
+    return f"{found} of {count}, 95 % interval {100 * low:.0f} to {100 * high:.0f} %"
 
 
 def _summary(outcome: dict[str, Any]) -> str:

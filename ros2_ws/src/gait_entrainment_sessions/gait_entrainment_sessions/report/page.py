@@ -20,7 +20,7 @@ from gait_entrainment_bags import BagReader
 from gait_entrainment_bags.figures import run_figures
 from gait_entrainment_bags.recorded_run import RecordedRun, read_run
 from gait_entrainment_commands.outcome import outcome_of, summary
-from gait_entrainment_sessions.findings import Findings, Rows, StudyFindings, shown
+from gait_entrainment_sessions.findings import Findings, Rows, StudyFindings, shown, told
 from gait_entrainment_sessions.report import figures
 from gait_entrainment_sessions.report.checks import Check, checks_of, origin_of, worst
 from gait_entrainment_sessions.runs import Place, PlacedRun, places_in, sessions_in
@@ -77,7 +77,7 @@ def write_report(path: Path, out: Path) -> None:
         sections = list((pool.map if len(places) > 1 else map)(section, places))
     findings = [one for section in sections for one in section.findings]
     study = StudyFindings.of(findings) if len(findings) > 1 else None
-    told = {
+    content = {
         "title": sections[0].place.study or path.resolve().name,
         "sections": sections,
         "study": study and study.rows,
@@ -87,12 +87,13 @@ def write_report(path: Path, out: Path) -> None:
         "made": f"{datetime.now(timezone.utc):%Y-%m-%d %H:%M} UTC",
         "version": version("gait_entrainment"),
         "border": _border,
+        "told": told,
         "drawn_at_most": DRAWN_AT_MOST,
     }
     environment = Environment(
         loader=PackageLoader(__package__, "."), autoescape=True, trim_blocks=True
     )
-    page = environment.get_template("page.html").render(told)
+    page = environment.get_template("page.html").render(content)
     out.write_text(page, encoding="utf-8")
 
 
@@ -112,21 +113,22 @@ def _section(place: Place, *, drawn: bool) -> RunSection:
         findings=findings,
         protocol="not told" if run.protocol is None else write_protocol(run.protocol),
         outcome=summary(outcome_of(run)),
-        statistics=[(one.part.name, _statistics(one)) for one in findings],
+        statistics=[(one.part.name, statistics_of(one)) for one in findings],
         figures=_drawn(run, findings) if drawn else [],
     )
 
 
 def _drawn(run: RecordedRun, findings: list[Findings]) -> list[tuple[str, str]]:
-    drawn = run_figures(run)
+    drawn = [*run_figures(run).items()]
     for one in findings:
-        name = f"circle {one.part.name}".strip()
-        drawn[name] = figures.draw_circle(one)
+        if one.part.analysis.pulses:
+            name = f": {one.part.name}" if one.part.name else ""
+            drawn.append((f"circle{name}", figures.draw_circle(one)))
     salt = f"{findings[0].placed.place.bag}"
     return [
-        (title + name.removeprefix(key), figures.svg_of(drawn[name], salt + name))
+        (title + name.removeprefix(key), figures.svg_of(figure, f"{salt}{number}{name}"))
         for key, title in _TITLES.items()
-        for name in drawn
+        for number, (name, figure) in enumerate(drawn)
         if name.startswith(key)
     ]
 
@@ -143,21 +145,25 @@ def _overview(findings: Sequence[Findings], study: StudyFindings | None) -> list
     return drawn
 
 
-def _statistics(findings: Findings) -> Rows:
+def statistics_of(findings: Findings) -> Rows:
+    """Return the statistics of a run, or of a block of its protocol, in words."""
     where, locking = findings.direction, findings.locking
     runs = locking.runs
     lengths = "none"
     if runs:
         lengths = f"{len(runs)}, {sum(runs) / len(runs):.1f} pulses long on average"
-    kappa = f"{where.kappa:.3g}" if where.kappa < 1e6 else "above a million"
+    kappa = "above a million" if where.kappa > 1e6 else told(where.kappa, "{:.3g}")
     return [
-        ("variation of the stride before the pulses", f"{findings.variation_percent:.2f} %"),
+        (
+            "variation of the stride before the pulses",
+            told(findings.variation_percent, "{:.2f} %"),
+        ),
         ("slope of the lag, last 10 pulses", shown(findings.slope, "ms per stride", 1e3)),
-        (f"mean direction, last {where.count} pulses", f"{where.phase:.3f} of the stride"),
-        ("resultant length", f"{where.resultant:.3f}"),
+        (f"mean direction, last {where.count} pulses", told(where.phase, "{:.3f} of the stride")),
+        ("resultant length", told(where.resultant, "{:.3f}")),
         ("concentration (von Mises kappa)", kappa),
         ("time constant of the approach", shown(findings.time_constant, "pulses")),
-        ("pulses within 5 % of the stride of most of them", f"{100 * locking.share:.0f} %"),
+        ("pulses within 5 % of the stride of most of them", told(100 * locking.share, "{:.0f} %")),
         ("spans of such pulses", lengths),
     ]
 
