@@ -289,11 +289,7 @@ class GuardedRobot:
         return profile
 
     def read(self) -> Sequence[RobotState]:
-        """
-        Return the states since the last call; a fault in one of them latches.
-
-        Raises DeviceError if the driver fails, or if a state is one that no device can have.
-        """
+        """Return the states since the last call; a fault latches; DeviceError if one cannot be."""
         states = self._call(lambda: tuple(self._robot.read()))
         able, until = self.capabilities, self.promised_until
         if not able.simulated:

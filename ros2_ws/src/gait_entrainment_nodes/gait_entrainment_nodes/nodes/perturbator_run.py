@@ -50,9 +50,7 @@ class SignsOfLife:
     """When those who have to be heard while torque may come were, on steady time [s]."""
 
     def __init__(self) -> None:
-        self._at: dict[
-            str | None, float
-        ] = {}  # of the operators, and, of None, the emergency stop
+        self._at: dict[str | None, float] = {}  # of operators, and as None the emergency stop
 
     def hear(self, operator: str | None = None) -> None:
         """Note a heartbeat of an operator, or, without one, a word of the emergency stop."""
