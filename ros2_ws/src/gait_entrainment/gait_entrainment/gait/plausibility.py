@@ -78,7 +78,7 @@ class GaitWatch:
             self._own.append(period)
 
     def stopped(self, now: int, expected: float = math.inf) -> str:
-        """Return why nobody walks at an instant [ns], or ""; a first stride is ``expected`` [s]."""
+        """Return why nobody walks at an instant [ns], or ""; a first stride is as ``expected``."""
         if self._latest is None:
             return ""
         stride = statistics.median(self._own or [min(self.limits.stride_most, expected)])
