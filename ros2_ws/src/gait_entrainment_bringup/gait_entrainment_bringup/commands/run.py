@@ -10,6 +10,7 @@ import os
 import shutil
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from functools import partial
 from pathlib import Path
 
@@ -33,6 +34,7 @@ from gait_entrainment_bringup.run_options import (
     claimed_folder,
 )
 from gait_entrainment_bringup.supervisor import Supervisor, supervised
+from gait_entrainment_drivers.stop_channel import StopListener
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 from gait_entrainment_page.access import Access
 
@@ -117,9 +119,12 @@ def run_experiment(
 
     The bag keeps ``about`` beside what it says of every run.
     """
-    with supervised(
-        domain, STOP_ORDER, partial(kept, bag), real_time=options.real_time
-    ) as supervisor:
+    with (
+        closing(StopListener(RUN_CLIENT)) as early,
+        supervised(
+            domain, STOP_ORDER, partial(kept, bag), real_time=options.real_time
+        ) as supervisor,
+    ):
         given = chosen_parameters(protocol, bag, options)
         given[PAGE] |= options.page_parameters
         given["perturbator"]["operators"] = [RUN_CLIENT, *([PAGE] if options.heartbeat else [])]
@@ -144,6 +149,7 @@ def run_experiment(
             quiet=quiet,
             real_time=options.real_time,
             silence=silence,
+            early=early,
         )
         supervisor.wait_for_record()
         # No torque is left and the record is closed: in which order the rest ends does not matter.

@@ -176,13 +176,17 @@ class Run:
         """Take the walker's progress; it is answered once all that it covers is here."""
         if self.conductor is None:
             return
-        ahead = nanoseconds_of(progress.header.stamp) - self._latest_stamp()
-        if ahead > 0:
+        stamp = nanoseconds_of(progress.header.stamp)
+        if (ahead := stamp - self._latest_stamp()) > 0:
             lead = f"{ahead / NANOSECONDS_PER_SECOND:.3g} s ahead of what can be over by now"
             self.fail(ExperimentError(f"{self.walker} reports what is {lead}", self.walker))
             return
         if self._progress is None:  # else this one only repeats that an answer is owed
-            self._progress_at = min(self._clock(), self._owed_from(progress))
+            self._progress_at = self._clock()
+            if self._began is not None:  # one that lags would hide that the gait has stopped
+                about = (stamp - self._began[1]) / NANOSECONDS_PER_SECOND
+                owed_from = about + self.conductor.longest_lookahead
+                self._progress_at = min(self._progress_at, owed_from)
         self._progress = progress
         if self._recorded_grant >= self._grant:
             self._recorded_at = self._clock()
@@ -227,13 +231,6 @@ class Run:
         if self._began is None:
             return math.inf
         return self._began[0] + round(self._clock() * NANOSECONDS_PER_SECOND) + STAMP_TOLERANCE
-
-    def _owed_from(self, progress: msg.Progress) -> float:
-        """Return since when [s, steady] more is owed: one that lags would hide a gait's stop."""
-        if self._began is None or self.conductor is None:
-            return math.inf
-        about = (nanoseconds_of(progress.header.stamp) - self._began[1]) / NANOSECONDS_PER_SECOND
-        return about + self.conductor.longest_lookahead
 
     def _note_stop(self) -> None:
         if self.stopped_at is None:
