@@ -33,6 +33,9 @@ STOPPED = Fault("stopped", "The stop was called.")
 EXPERIMENT_SILENT = Fault(
     "experiment_silent", "The experiment sent no horizon for longer than the limit."
 )
+TORQUE_UNASKED = Fault(
+    "torque_unasked", "Torque is measured that nobody asked for. If it is felt, cut the power."
+)
 TORQUE_EXCEEDED = Fault(
     "torque_exceeded", "More torque was delivered than the limit and its margin allow."
 )

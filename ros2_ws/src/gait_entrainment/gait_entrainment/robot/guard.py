@@ -22,7 +22,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side, nanoseconds
 from gait_entrainment.robot.contract import AnkleRobot, Capabilities, LoopTiming, RobotState
 from gait_entrainment.robot.faults import (
     DRIVER_FAILED,
@@ -31,6 +31,7 @@ from gait_entrainment.robot.faults import (
     NOT_STOPPED,
     STOPPED,
     TORQUE_EXCEEDED,
+    TORQUE_UNASKED,
     DeviceError,
     Fault,
     LimitError,
@@ -41,8 +42,6 @@ from gait_entrainment.robot.pulse_train import Pulse, PulseTrain
 
 # How often the watchdog looks whether the experiment has fallen silent [s].
 _WATCH_PERIOD = 0.01
-# A device's clock may be ahead of the run's by so much [ns].
-_AHEAD = NANOSECONDS_PER_SECOND // 10
 # After so long without a pulse [ns] the next ones are another train, whose first ones rise anew.
 _PAUSE = 5 * NANOSECONDS_PER_SECOND
 
@@ -71,7 +70,10 @@ class GuardedRobot:
         self._configured = self._active = self._in_run = False
         self._begun = 0  # pulses scheduled since the latest pause
         self._past: tuple[Pulse, ...] = ()  # of trains that were cancelled, what had begun
-        self._read_until = 0  # stamp of the latest state [ns]
+        self._read_until = self._asked_at = 0  # stamp of the latest state, with torque asked [ns]
+        # Measured torque must be below this, this long after the command has become zero.
+        self._unasked = 0.12 * min(self.capabilities.peak_torque, self.limits.torque)
+        self._fall_time = nanoseconds(0.15 + 0.5 / self.capabilities.torque_bandwidth)
         self._offset = time.time_ns() - time.monotonic_ns()  # from steady time to a real run's
         self._armed_until = -math.inf  # steady time [s]
         self._delivered_torque = _DeliveredTorque(self.limits)
@@ -292,20 +294,24 @@ class GuardedRobot:
         """Return the states since the last call; a fault latches; DeviceError if one cannot be."""
         states = self._call(lambda: tuple(self._robot.read()))
         able, until = self.capabilities, self.promised_until
-        if not able.simulated:
-            until = time.monotonic_ns() + self._offset + _AHEAD
+        if not able.simulated:  # a device's clock may be a little ahead
+            until = time.monotonic_ns() + self._offset + NANOSECONDS_PER_SECOND // 10
         for state in states:
             for fault in state.faults:
                 if fault not in self.faults:
                     self.stop(fault)
             measured = state.measured if able.measures_torque and not state.faults else 0.0
             before, self._read_until = self._read_until, state.stamp
+            if not before or state.commanded or abs(measured) <= self._unasked:
+                self._asked_at = state.stamp
             finite = math.isfinite(state.commanded + measured)
             if not (finite and before <= state.stamp <= until):
                 raise self._breach(f"{state} after {before} and by {until} ns")
             # In simulated time it is a sensor with flaws that shows more than there is.
             if abs(measured) > self._delivered_torque.most and not able.simulated:
                 self.stop(TORQUE_EXCEEDED)
+            if state.stamp - self._asked_at > self._fall_time and not able.simulated:
+                self.stop(TORQUE_UNASKED)
         return states
 
     # Guarding

@@ -61,10 +61,7 @@ class DeviceLimits(Checked):
     torque: float = setting(30.0, "largest magnitude of a pulse", "N m", (0.0, 200.0))
     duration: float = setting(0.5, "longest duration of a pulse", "s", (0.001, 10.0))
     rate: float = setting(
-        0.0,
-        "steepest flank of a pulse; a square one gets such flanks; 0 leaves it square",
-        "N m/s",
-        (0.0, 1e6),
+        0.0, "steepest flank; a square pulse gets such ones, if it is not 0", "N m/s", (0.0, 1e6)
     )
     impulse: float = setting(15.0, "largest angular impulse within a stride", "N m s", (0.0, 1e3))
     rising: int = setting(
@@ -90,10 +87,7 @@ class DeviceLimits(Checked):
         0.2, "share by which delivered torque and impulse may exceed their limits", "1", (0.0, 1.0)
     )
     silence: float = setting(
-        1.0,
-        "longest silence of the experiment while torque may come (real time)",
-        "s",
-        (0.05, 60.0),
+        1.0, "longest silence of the experiment under torque, in real time", "s", (0.05, 60.0)
     )
 
     def check_pulse(self, pulse: Pulse) -> None:

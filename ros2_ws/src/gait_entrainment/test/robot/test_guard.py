@@ -314,6 +314,27 @@ def test_more_torque_in_a_state_than_the_limit_latches_but_for_an_emulated_senso
     guard.close()
 
 
+@pytest.mark.parametrize("simulated", [True, False])
+@pytest.mark.parametrize(
+    ("commanded", "measured", "seconds", "ends"),
+    [(0.0, 2.5, 0.16, True), (0.0, 2.3, 9.0, False), (0.0, -2.5, 0.14, False),
+     (2.0, 9.0, 9.0, False)],
+)  # fmt: skip
+def test_torque_that_nobody_asked_for_ends_in_time_whatever_the_driver(
+    monkeypatch, simulated, commanded, measured, seconds, ends
+):
+    guard, driver = ready(simulated=simulated)
+    guard.promise(60 * SECOND)
+    ticks = [n * SECOND // 100 for n in range(101, 101 + round(100 * seconds))]
+    states = [RobotState(SECOND, 5.0, 5.0, math.nan)]
+    states += [RobotState(stamp, commanded, measured, math.nan) for stamp in ticks]
+    monkeypatch.setattr(driver, "read", lambda: states)
+    guard.read()
+    names = [fault.name for fault in guard.faults]
+    assert names == (["torque_unasked"] if ends and not simulated else [])
+    guard.close()
+
+
 @pytest.mark.parametrize("name", ["peak_torque", "torque_rate", "torque_bandwidth"])
 @pytest.mark.parametrize("value", [math.nan, -1.0])
 def test_a_device_says_what_it_can_do(name, value):

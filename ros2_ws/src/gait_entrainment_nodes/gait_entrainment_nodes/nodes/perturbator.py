@@ -160,10 +160,10 @@ class Perturbator(Participant, TolerantLifecycleNode):
         """
         settings = self.settings
         try:
-            if self._take_stop():
-                raise DeviceError("the stop service was called; configure again to release it")
             if self._pressed and self.count_publishers("~/emergency_stop"):
                 raise DeviceError("the emergency stop is pressed; release it first")
+            if self._take_stop():
+                raise DeviceError("the stop service was called; configure again to release it")
             driver = find_driver(settings.driver)
             if self.get_parameter("use_sim_time").value and not driver.simulated:
                 raise DeviceError(
