@@ -337,7 +337,7 @@ def test_impossible_pulses_fail_the_run():
         bench.report(instant)
         instant += SECOND
     assert bench.run.failure.blamed == ""
-    assert "period" in str(bench.run.failure)
+    assert "overlap" in str(bench.run.failure)
 
 
 def test_run_that_is_over_stays_as_it_ended(bench):

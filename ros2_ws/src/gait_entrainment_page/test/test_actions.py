@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from gait_entrainment_drivers.stop_channel import StopAnswer
+from gait_entrainment_drivers.stop_channel import NO_ANSWER, StopAnswer
 from gait_entrainment_page.actions import ActionError, Command, stop, stop_at_once
 
 CUT = "not everybody confirmed the stop: cut the power"
@@ -104,7 +104,7 @@ def test_a_double_click_starts_one(monkeypatch):
         ({}, "zero", ["asked over ROS: zero"]),
         ({}, "", ["asked over ROS: no answer", CUT]),
         ({"motor/1": StopAnswer(done=True, message="zero")}, "zero", ["motor/1: zero"]),
-        ({"motor/1": None}, "zero", ["motor/1: no answer", CUT]),
+        ({"motor/1": NO_ANSWER}, "zero", ["motor/1: does not answer", CUT]),
     ],
 )
 def test_a_stop_asks_the_robot_that_is_shown_wherever_it_is(here, elsewhere, told, monkeypatch):
