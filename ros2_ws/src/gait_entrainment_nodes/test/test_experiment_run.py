@@ -168,7 +168,7 @@ def test_recorder_is_named_if_it_is_what_the_walker_waits_for():
     bench.report(11 * SECOND)
     bench.promise()
     bench.after(2.0)
-    bench.run.take_recorder_progress(Progress(run=7, grant=0))
+    bench.run.take_recorder_progress(Progress(run=7, header=header(11 * SECOND)))
     bench.report(12 * SECOND)
     bench.promise()
     assert bench.after(TIMEOUT) is None

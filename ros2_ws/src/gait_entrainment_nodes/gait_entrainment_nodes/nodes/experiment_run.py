@@ -81,7 +81,7 @@ class Run:
         self._held_up, self._clock = held_up, clock
         self._events = 0
         self._progress: msg.Progress | None = None  # received, not answered yet
-        self._grant = self._recorded_grant = -1
+        self._reported = self._recorded_until = 0  # of progress [ns since 1970]
         self._covered: dict[int, int] = {}  # by profiles of each ankle [ns since 1970]
         self._closed: set[int] = set()  # ankles whose robots have answered the closing horizon
         self._planning = False  # pulses were requested, and there is no answer yet
@@ -174,7 +174,8 @@ class Run:
         """Take the walker's progress; it is answered once all that it covers is here."""
         if self.conductor is None:
             return
-        ahead = nanoseconds_of(progress.header.stamp) - self._latest_stamp()
+        stamp = nanoseconds_of(progress.header.stamp)
+        ahead = stamp - self._latest_stamp()
         if ahead > 0:
             lead = f"{ahead / NANOSECONDS_PER_SECOND:.3g} s ahead of what can be over by now"
             self.fail(ExperimentError(f"{self.walker} reports what is {lead}", self.walker))
@@ -182,14 +183,15 @@ class Run:
         if self._progress is None:  # else this one only repeats that an answer is owed
             self._progress_at = self._clock()
         self._progress = progress
-        if self._recorded_grant >= self._grant:
+        if self._recorded_until >= self._reported:
             self._recorded_at = self._clock()
-        self._grant = progress.grant
+        self._reported = stamp
         self._answer()
 
     def take_recorder_progress(self, progress: msg.Progress) -> None:
         """Note how far the recorder is, to name it if it is what the walker waits for."""
-        self._recorded_at, self._recorded_grant = self._clock(), progress.grant
+        self._recorded_at = self._clock()
+        self._recorded_until = nanoseconds_of(progress.header.stamp)
 
     def take_profile(self, profile: msg.TorqueProfile) -> None:
         """Note that the perturbator has answered a horizon, or has ended the torque."""
@@ -316,7 +318,7 @@ class Run:
             yield self._planning_at, PERTURBATOR
         if self._covered_until < self.promised_until:
             yield self._profile_at, PERTURBATOR
-        if self._recorded and self._recorded_grant < self._grant:
+        if self._recorded and self._recorded_until < self._reported:
             yield self._recorded_at, RECORDER
         since = self._progress_at
         yield since if self._real_time else max(since, self._profile_at), self.walker
