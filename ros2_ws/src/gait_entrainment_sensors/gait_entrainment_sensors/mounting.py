@@ -107,9 +107,13 @@ def _sign_of_foot(times: Floats, rates: Floats, about: Floats) -> float:
             angle = np.cumsum((about * steps)[start:end])
             angle -= np.linspace(0.0, angle[-1], angle.size)
             areas.append(float(angle @ steps[start:end]))
-    alike = [area for area in areas if 2 * abs(area) > max(map(abs, areas))]
-    total = sum(alike)
-    certain = len(alike) > 1 and abs(total) > 0.75 * sum(map(abs, areas))
+    if not areas:
+        return 0.0
+    # A stride is one vote, and what is much smaller than a stride is less.
+    sizes = np.abs(areas)
+    votes = np.clip(areas / max(np.median(sizes), 0.25 * sizes.max(), 1e-9), -1.0, 1.0)
+    total = float(votes.sum())
+    certain = abs(total) > max(1.5, 0.75 * float(np.abs(votes).sum()))
     return math.copysign(1.0, total) if certain else 0.0
 
 
