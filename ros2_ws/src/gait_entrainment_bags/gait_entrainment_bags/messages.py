@@ -10,6 +10,7 @@ count from 1970, the core's instants from wherever the caller wants: each functi
 ``start`` [ns].
 """
 
+import math
 from dataclasses import fields
 from enum import IntEnum
 from typing import Any, TypeVar
@@ -18,9 +19,17 @@ from gait_entrainment.conventions import EventKind, Side, nanoseconds_of
 from gait_entrainment.errors import UsageError
 from gait_entrainment.gait import GaitEvent, PulsePhase, Stride
 from gait_entrainment.gait.analyzer import Result
-from gait_entrainment.robot import Pulse, PulseTrain, RobotState, Shape, TorqueProfile
+from gait_entrainment.robot import (
+    ProfileError,
+    Pulse,
+    PulseTrain,
+    RobotState,
+    Shape,
+    TorqueProfile,
+)
 
 _E = TypeVar("_E", bound=IntEnum)
+_WIDEST = 1000.0  # no protocol allows a pulse of a hundredth of that [s]
 
 
 class MessageError(UsageError):
@@ -53,21 +62,36 @@ def profile_of(message: Any, start: int = 0) -> TorqueProfile:
     """
     Return the torque profile of a TorqueProfile message that reports no stop.
 
-    It is as the message says: ``TorqueProfile.check`` holds it against the profile before. Raises
-    MessageError for an unknown side.
+    Raises MessageError for an unknown side, and for what is no profile by itself; whether it
+    adjoins the one before is asked by ``TorqueProfile.check``.
     """
-    return TorqueProfile(
+    profile = TorqueProfile(
         side=side_of(message),
         times=tuple(nanoseconds_of(stamp) - start for stamp in message.times),
         torques=tuple(message.torques),
         onsets=tuple(nanoseconds_of(stamp) - start for stamp in message.onsets),
         valid_until=nanoseconds_of(message.valid_until) - start,
     )
+    try:
+        profile.check(profile.times[0] if profile.times else 0)
+    except ProfileError as error:
+        raise MessageError(str(error)) from None
+    return profile
 
 
 def pulse_of(message: Any, start: int = 0) -> tuple[int, float, float]:
-    """Return onset [ns], height [N m] and width [s] of a TorquePulse message."""
-    return nanoseconds_of(message.header.stamp) - start, message.torque, message.duration
+    """Return onset [ns], height [N m] and width [s] of a TorquePulse message; or MessageError."""
+    height, width = message.torque, message.duration
+    if not (math.isfinite(height) and 0 <= width <= _WIDEST):
+        raise MessageError(f"torque, duration: {height:g} N m for {width:g} s cannot be")
+    return nanoseconds_of(message.header.stamp) - start, height, width
+
+
+def counts_of(message: Any) -> dict[str, int]:
+    """Return the counts by topic of a PublishedCounts message; MessageError if some lack."""
+    if len(message.topics) != len(message.counts):
+        raise MessageError(f"counts: {len(message.counts)} for {len(message.topics)} topics")
+    return dict(zip(message.topics, message.counts, strict=True))
 
 
 def train_of(message: Any, start: int = 0) -> PulseTrain:

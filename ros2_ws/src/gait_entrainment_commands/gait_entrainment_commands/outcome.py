@@ -252,12 +252,12 @@ def _double_stance(events: Sequence[GaitEvent], toe_off: int | None) -> float:
 
 
 def _without_nan(value: Any) -> Any:
-    """Replace NaN, which JSON does not have, by None."""
+    """Replace NaN and infinities, which JSON does not have, by None."""
     if isinstance(value, dict):
         return {key: _without_nan(item) for key, item in value.items()}
     if isinstance(value, list):
         return [_without_nan(item) for item in value]
-    return None if isinstance(value, float) and math.isnan(value) else value
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def timing_outcome(timings: Sequence[PulseTiming], stride: float) -> dict[str, Any]:

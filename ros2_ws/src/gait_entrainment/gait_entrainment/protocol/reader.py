@@ -157,7 +157,9 @@ def entries_in(
     seen: set[str] = set()
     for key_node, value_node in node.value:
         where = f"{name}:{key_node.start_mark.line + 1}"
-        key = prefix + str(key_node.value)
+        if not isinstance(key_node, yaml.ScalarNode):
+            raise ProtocolError(f"{where}: the name of a field must be a single word")
+        key = prefix + key_node.value
         if key in seen:
             raise ProtocolError(f"{where}: {key}: appears twice; keep one")
         seen.add(key)
@@ -170,25 +172,31 @@ def entries_in(
             yield key, Entry(value_node, where)
         elif any(field.startswith(f"{key}.") for field in allowed):
             yield from entries_in(value_node, name, allowed, f"{key}.")
-        elif key not in allowed or "." in str(key_node.value):  # a section's field has one place
+        elif key not in allowed or "." in key_node.value:  # a section's field has one place
             inside = [field.removeprefix(prefix) for field in allowed if field.startswith(prefix)]
             known = ", ".join(sorted({field.partition(".")[0] for field in inside}))
             raise ProtocolError(f"{where}: {key}: unknown field; allowed: {known}")
-        elif isinstance(value_node, yaml.SequenceNode) and allowed[key].kind is str:
-            yield key, Entry(", ".join(str(item.value) for item in value_node.value), where)
+        elif allowed[key].kind is str:  # as written, also if YAML would make a number of it
+            listed = isinstance(value_node, yaml.SequenceNode)
+            words = value_node.value if listed else [value_node]
+            if not all(isinstance(word, yaml.ScalarNode) for word in words):
+                raise ProtocolError(f"{where}: {key}: must be a single value, or a list of such")
+            yield key, Entry(", ".join(word.value for word in words), where)
         elif not isinstance(value_node, yaml.ScalarNode):
             raise ProtocolError(f"{where}: {key}: must be a single value")
-        elif allowed[key].kind is str:  # as written, also if YAML would make a number of it
-            yield key, Entry(value_node.value, where)
         else:
+            kind = allowed[key].kind
             try:
                 value = yaml.SafeLoader("").construct_object(value_node)
             except Exception:  # an unknown tag, a month 13: PyYAML passes on what it runs into
                 raise ProtocolError(
                     f"{where}: {key}: {value_node.value[:40]!r} cannot be read as a value"
                 ) from None
-            if allowed[key].kind in (int, float):
+            if kind in (int, float):
                 _require_plain_number(where, key, value_node, value)
+            number = isinstance(value, int | float) and isinstance(value, bool) is (kind is bool)
+            if value is not None and not number:
+                value = value_node.value  # is told as it was written
             yield _spelled_out(key, Entry(value, where))
 
 
@@ -202,8 +210,8 @@ def _require_plain_number(where: str, key: str, node: yaml.ScalarNode, value: ob
     """Raise ProtocolError for what YAML 1.1 takes for another number than people do, or a text."""
     if node.style in ("'", '"'):
         raise ProtocolError(f"{where}: {key}: {node.value!r} is a text: leave out the quotes")
-    other_base = ":" in node.value or re.match(r"[-+]?0[0-9_box]", node.value)
-    if isinstance(value, int) and other_base:
+    other_base = isinstance(value, int) and re.match(r"[-+]?0[0-9_box]", node.value)
+    if other_base or (isinstance(value, int | float) and ":" in node.value):
         raise ProtocolError(
             f"{where}: {key}: {node.value} is {value} in YAML; write it as a decimal number"
         )

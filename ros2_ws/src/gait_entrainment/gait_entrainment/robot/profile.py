@@ -81,8 +81,8 @@ class TorqueProfile:
         Raises
         ------
         ProfileError
-            if it does not adjoin the one before, goes beyond what was asked for, or its pieces
-            are not ascending, finite and one for each time.
+            if it does not adjoin the one before, goes beyond what was asked for, its pieces are
+            not ascending, finite and one for each time, or its onsets not ascending and within.
 
         """
         if not self.times or len(self.times) != len(self.torques):
@@ -98,5 +98,8 @@ class TorqueProfile:
         borders = [*self.times, self.valid_until]
         if self.has_length and any(a >= b for a, b in itertools.pairwise(borders)):
             raise ProfileError("the times of a profile are not ascending")
+        begun = [begin - 1, *self.onsets, self.valid_until]
+        if self.onsets and any(a >= b for a, b in itertools.pairwise(begun)):
+            raise ProfileError("the onsets of a profile are not ascending, or not in it")
         if not all(math.isfinite(torque) for torque in self.torques):
             raise ProfileError(f"the torques of a profile are not all finite: {self.torques}")
