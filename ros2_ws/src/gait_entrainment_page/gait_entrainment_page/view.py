@@ -24,10 +24,10 @@ from gait_entrainment.conventions import (
     nanoseconds_of,
 )
 from gait_entrainment.gait.verdict import Reason, Verdict
-from gait_entrainment.robot import DeviceError, DeviceLimits, find_driver
+from gait_entrainment.robot import DeviceError, DeviceLimits, LimitError, find_driver
 from gait_entrainment.settings import settings_of
 from gait_entrainment_bags import topic_names as names
-from gait_entrainment_bags.messages import MessageError, event_of, state_of
+from gait_entrainment_bags.messages import MessageError, event_of, member_of, side_of, state_of
 from gait_entrainment_commands.outcome import MEANINGS
 
 # Strides and pulses in the charts: more would not be told apart on a screen.
@@ -146,7 +146,7 @@ class View:
         self.version += 1
 
     def _on_stride(self, message: Any) -> None:
-        self.side = Side(message.side)
+        self.side = side_of(message)
         self.strides.append((message.number, message.period))
         start, end = nanoseconds_of(message.start), nanoseconds_of(message.header.stamp)
         self.torque = self._torque_between(start, end)
@@ -174,6 +174,8 @@ class View:
         self.version += 1
 
     def _on_verdict(self, message: Any) -> None:
+        for kind, field in (Verdict, "verdict"), (Reason, "reason"):
+            member_of(kind, field, getattr(message, field))
         self.verdict = message
         self.version += 1
 
@@ -190,16 +192,17 @@ class View:
             self.stances.append(passed / NANOSECONDS_PER_SECOND)
 
     def _on_robot(self, message: Any) -> None:
-        side, reading = Side(message.side), state_of(message)
+        side, reading = side_of(message), state_of(message)
         self.robots[side] = message
         if self.side in (None, side):
             self._readings.append((reading.stamp, reading.commanded, reading.measured))
 
     def _on_setup(self, message: Any) -> None:
+        side = side_of(message)
         self.setup = message
         if self.side is None:
-            self.side = Side(message.side)
-        with contextlib.suppress(DeviceError):  # a driver that is not installed here
+            self.side = side
+        with contextlib.suppress(DeviceError, LimitError):  # a driver that is not installed here
             self.simulated = find_driver(message.driver).simulated
 
     def _on_trouble(self, message: Any) -> None:
@@ -229,7 +232,7 @@ class View:
     @property
     def period(self) -> float:
         """Median period of the last strides [s]; NaN if unknown."""
-        last = [period for _, period in [*self.strides][-10:] if not math.isnan(period)]
+        last = [period for _, period in [*self.strides][-10:] if period > 0]
         return statistics.median(last) if last else _NAN
 
     def part_words(self) -> str:
@@ -256,9 +259,7 @@ class View:
             return "no pulse yet"
         stride, lag = self.lags[-1]
         period = dict(self.strides).get(stride) or (self.strides[-1][1] if self.strides else _NAN)
-        percent = (
-            "" if math.isnan(period) else f" = {_signed(100 * lag / period, 1)} % of the stride"
-        )
+        percent = f" = {_signed(100 * lag / period, 1)} % of the stride" if period > 0 else ""
         return f"{_signed(1e3 * lag, 0)} ms{percent}"
 
     def verdict_words(self) -> tuple[str, str]:
@@ -274,7 +275,7 @@ class View:
                 f" a stride; strides last {found.mean_period:.4f} s, pulses come every"
                 f" {found.pulse_period:.4f} s."
             )
-        meaning = MEANINGS[word if reason is Reason.NONE else reason.name.lower()]
+        meaning = MEANINGS.get(reason.name.lower()) or MEANINGS.get(word, word)
         figures = ""
         if not math.isnan(found.drift):
             figures = (
