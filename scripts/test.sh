@@ -3,8 +3,8 @@
 # SPDX-License-Identifier: Apache-2.0
 
 # Every test. Most share the processors, a file for each at a time and one more, since some wait;
-# then so do those that run in real time. Those that stop every robot of this machine, or hold its
-# timing to account, have it to themselves. Arguments go to pytest each time.
+# then those that run in real time, one for each processor. Those that stop every robot of this
+# machine, or hold its timing to account, have it to themselves. Arguments go to pytest each time.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -15,15 +15,15 @@ run() {
     pytest "$@" || [[ $? == "$nothing_selected" ]] || failed=1
 }
 
-workers=$(($(nproc) + 1))
+processors=$(nproc)
 devices=ros2_ws/src/gait_entrainment_drivers/test
 alone=("$devices/test_torque_loop.py" tests/safety tests/page
     tests/system/test_{preflight,session_stop,stop_command}.py)
 waiting=("$devices"
     tests/system/test_{deaths,drivers,interventions,person,perturbator,races,real_time_run}.py
     tests/system/test_{ros2_control,spectators,stopping}.py)
-run --numprocesses "$workers" --dist loadfile \
+run --numprocesses $((processors + 1)) --dist loadfile \
     "${waiting[@]/#/--ignore=}" "${alone[@]/#/--ignore=}" ros2_ws/src tests "$@"
-run --numprocesses "$workers" --dist loadfile "${alone[@]/#/--ignore=}" "${waiting[@]}" "$@"
+run --numprocesses "$processors" --dist loadfile "${alone[@]/#/--ignore=}" "${waiting[@]}" "$@"
 run "${alone[@]}" "$@"
 exit $failed

@@ -131,6 +131,8 @@ def test_a_bag_is_scrubbed_and_a_clock_that_is_off_is_told(tmp_path, browser):
             thumb,
         )
         look.until("pulses", "19 of 80")
+        browser.execute_script("window.socket.disconnect()")
+        look.until("What you see is old: nothing comes from the page's server. STOP works.")
 
 
 def test_who_may_not_is_told_so_in_one_line(tmp_path):

@@ -29,7 +29,11 @@ def test_a_page_that_dies_harms_no_run_and_stop_on_the_next_one_ends_the_torque(
             until_served(port, run)
             look = Look(browser, port)
             look.until("pulses", "ak_mit_can")
-            os.kill(run.find_nodes((*NODES, PAGE))[PAGE], signal.SIGKILL)
+            served = run.find_nodes((*NODES, PAGE))[PAGE]
+            os.kill(served, signal.SIGSTOP)
+            browser.find_element("id", "stop").click()
+            look.until("STOP: no answer yet. Use the switch in your hand, or cut the power.")
+            os.kill(served, signal.SIGKILL)
             look.until("No connection to the page's server", "STOP does not work from here")
             assert run.process.poll() is None, run.text
             with page(tmp_path, port=port, ROS_DOMAIN_ID=str(domain)):

@@ -5,11 +5,14 @@
 
 import itertools
 import time
+from contextlib import contextmanager
 
 import pytest
+import rclpy
 from harness import Session, claimed_domain, session, stamp_of
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
+from rclpy.lifecycle import TransitionCallbackReturn
 from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 from test_drivers import emulated_motor
@@ -29,7 +32,10 @@ from gait_entrainment_nodes.messaging.topics import (
     ROBOT_STATE,
     TORQUE_PROFILE,
     TROUBLE,
+    quality,
 )
+from gait_entrainment_nodes.nodes import perturbator
+from gait_entrainment_nodes.nodes.perturbator_run import do_with_all
 
 UP = (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE)
 SECOND = 10**9
@@ -62,10 +68,10 @@ class Conductor:
         self.probe.until(lambda: len(self.profiles) > count, "a profile")
         return self.profiles[-1]
 
-    def request(self, onset, key=KEY, **changes):
+    def request(self, onset, key=KEY, run=7, **changes):
         """Ask for a train from an instant [s] on; return the goal's handle."""
         asked = {"period": 1.0, "count": 100, "torque": 5.0, "duration": 0.5} | changes
-        goal = goal_of(7, key, PulseTrain.periodic(Side.RIGHT, round(onset * SECOND), **asked))
+        goal = goal_of(run, key, PulseTrain.periodic(Side.RIGHT, round(onset * SECOND), **asked))
         return self.probe.send_goal(DeliverPulseTrain, "perturbator/deliver_pulse_train", goal)
 
 
@@ -86,6 +92,8 @@ def test_cancelling_the_train_alone_ends_the_torque_at_once(tmp_path):
         assert result.outcome == DeliverPulseTrain.Result.CANCELLED
         assert result.delivered == 1
         assert list(conductor.promise(4, 6).torques) == [0.0]
+        back = Horizon(run=7, until=to_time(5 * SECOND), seal=seal_of(KEY))
+        conductor.horizons.publish(back)  # takes back no promise
         # Another train may follow.
         again = conductor.request(7)
         assert again.accepted
@@ -155,55 +163,72 @@ def test_deactivating_and_activating_in_a_run_breaks_no_promise(tmp_path, driver
         assert not any(torque for profile in off for torque in profile.torques)
 
 
-@pytest.mark.parametrize("silent", ["the emergency stop", "entrain_run", "operator_page"])
-def test_torque_ends_if_one_who_must_be_heard_falls_silent(tmp_path, silent):
+@contextmanager
+def with_motor(tmp_path, *parameters):
+    """Start the perturbator with an emulated motor, armed, and the test as its conductor."""
     with emulated_motor(tmp_path) as (driver, _), claimed_domain() as domain:
-        # The test beats beside other tests: what else is watched may be silent for longer.
+        # The test speaks beside other tests: what is not tested may be silent for longer.
         driver = driver.replace("host_silence=1", "host_silence=5")
         nodes = Session(tmp_path, domain, [f"--driver={driver}"], real_time=True, strangers=True)
-        nodes.arguments += ["-p", "deadman_timeout:=1.0", "-p", "operator_timeout:=1.0"]
-        nodes.arguments += ["-p", "operators:=[entrain_run, operator_page]"]
-        nodes.arguments += ["-p", "unproved:=true"]
+        for parameter in ("unproved:=true", *parameters):
+            nodes.arguments += ["-p", parameter]
         try:
             nodes.start("perturbator")
-            stop = EMERGENCY_STOP
-            beat = OPERATOR_HEARTBEAT
-            button, heart = (
-                nodes.probe.node.create_publisher(topic.type, topic.name, topic.qos)
-                for topic in (stop, beat)
-            )
-            alive = ["the emergency stop", "entrain_run", "operator_page"]
-
-            def live():
-                """Send horizons, hold the button and beat: those who are not silent."""
-                conductor.horizons.publish(horizon_from(time.time()))
-                for name in alive:
-                    if name == "the emergency stop":
-                        button.publish(Bool(data=False))
-                    else:
-                        heart.publish(String(data=name))
-
             conductor = Conductor(nodes)
-            states = nodes.probe.listen(ROBOT_STATE)
             assert nodes.probe.call(Trigger, "perturbator/arm").success
-            for publisher in (button, heart):
-                nodes.probe.until(publisher.get_subscription_count, "a reader")
-            nodes.probe.client.each_round = live
-            nodes.probe.until(lambda: conductor.profiles, "a run")
-            asked = conductor.request(time.time() + 2.0, duration=0.3)
-            assert asked.accepted, conductor.troubles
-            nodes.probe.until(lambda: states and states[-1].measured_torque > 0.5, "torque")
-            alive.remove(silent)
-            nodes.probe.until(lambda: conductor.troubles, "the fault")
-            assert f": {silent} silent for 1 s" in conductor.troubles[0].message
-            told = stamp_of(conductor.troubles[0].header)
-            # A pulse a second was asked for; a measured one of 0.3 s is over by then.
-            nodes.probe.until(lambda: stamp_of(states[-1].header) > told + 2 * SECOND, "time")
-            after = [s for s in states if stamp_of(s.header) > told + 0.5 * SECOND]
-            assert max(abs(state.measured_torque) for state in after) < 0.5
+            yield conductor
         finally:
             nodes.probe.client.close()
             nodes.supervisor.stop(STOP_ORDER)
+
+
+def test_who_interrupts_a_run_gets_no_torque_until_a_real_robot_is_armed_again(tmp_path):
+    with with_motor(tmp_path, "operator_timeout:=0.0") as conductor:
+        now = time.time()
+        conductor.promise(now, now + 0.2)
+        assert conductor.request(now + 3).accepted, conductor.troubles
+        conductor.promise(time.time(), time.time() + 0.2, run=8)
+        assert not conductor.request(time.time() + 3, run=8).accepted
+        conductor.probe.until(lambda: conductor.troubles, "the reason")
+        assert "the device is not armed" in conductor.troubles[-1].message
+
+
+@pytest.mark.parametrize("silent", ["the emergency stop", "entrain_run", "operator_page"])
+def test_torque_ends_if_one_who_must_be_heard_falls_silent(tmp_path, silent):
+    operators = "operators:=[entrain_run, operator_page]"
+    timeouts = "deadman_timeout:=1.0", "operator_timeout:=1.0"
+    with with_motor(tmp_path, operators, *timeouts) as conductor:
+        probe = conductor.probe
+        button, heart = (
+            probe.node.create_publisher(topic.type, topic.name, topic.qos)
+            for topic in (EMERGENCY_STOP, OPERATOR_HEARTBEAT)
+        )
+        alive = ["the emergency stop", "entrain_run", "operator_page"]
+
+        def live():
+            """Send horizons, hold the button and beat: those who are not silent."""
+            conductor.horizons.publish(horizon_from(time.time()))
+            for name in alive:
+                if name == "the emergency stop":
+                    button.publish(Bool(data=False))
+                else:
+                    heart.publish(String(data=name))
+
+        states = probe.listen(ROBOT_STATE)
+        for publisher in (button, heart):
+            probe.until(publisher.get_subscription_count, "a reader")
+        probe.client.each_round = live
+        probe.until(lambda: conductor.profiles, "a run")
+        assert conductor.request(time.time() + 2, duration=0.3).accepted, conductor.troubles
+        probe.until(lambda: states and states[-1].measured_torque > 0.5, "torque")
+        alive.remove(silent)
+        probe.until(lambda: conductor.troubles, "the fault")
+        assert f": {silent} silent for 1 s" in conductor.troubles[0].message
+        told = stamp_of(conductor.troubles[0].header)
+        # A pulse a second was asked for; the one that was felt is over half a second later.
+        probe.until(lambda: stamp_of(states[-1].header) > told + 2 * SECOND, "time")
+        after = [s for s in states if stamp_of(s.header) > told + SECOND // 2]
+        assert max(abs(state.measured_torque) for state in after) < 0.5
 
 
 def horizon_from(now):
@@ -211,3 +236,46 @@ def horizon_from(now):
     message = Horizon(run=7, until=to_time(round((now + 0.2) * SECOND)), seal=seal_of(KEY))
     message.header.stamp = to_time(round(now * SECOND))
     return message
+
+
+def test_an_emergency_stop_is_heard_whatever_its_quality_and_holds_while_it_is_pressed(tmp_path):
+    with session(tmp_path, nodes=("perturbator",)) as nodes:
+        conductor, probe = Conductor(nodes), nodes.probe
+        for qos in (EMERGENCY_STOP.qos, quality(10), quality(1, reliable=False)):
+            button = probe.node.create_publisher(Bool, EMERGENCY_STOP.name, qos)
+            probe.until(button.get_subscription_count, "a reader")
+            count = len(conductor.troubles)
+
+            def press(button=button, count=count):
+                button.publish(Bool(data=True))
+                return len(conductor.troubles) > count
+
+            probe.until(press, "the stop")
+            assert "the emergency stop was pressed" in conductor.troubles[-1].message
+            assert conductor.transition(Transition.TRANSITION_DEACTIVATE)
+            assert conductor.transition(Transition.TRANSITION_CLEANUP)
+            assert not conductor.transition(Transition.TRANSITION_CONFIGURE)
+            probe.until(lambda: "release it" in conductor.troubles[-1].message, "the reason")
+            button.publish(Bool(data=False))
+            probe.until(lambda: conductor.transition(Transition.TRANSITION_CONFIGURE), "release")
+            assert conductor.transition(Transition.TRANSITION_ACTIVATE)
+            probe.node.destroy_publisher(button)
+
+
+def test_a_stop_while_the_robot_is_being_connected_is_not_forgotten(monkeypatch):
+    def stopped_meanwhile(*what):
+        made._stop_at_once()
+        do_with_all(*what)
+
+    rclpy.init()
+    made = perturbator.Perturbator()
+    try:
+        monkeypatch.setattr(perturbator, "do_with_all", stopped_meanwhile)
+        assert made.trigger_configure() == TransitionCallbackReturn.SUCCESS
+        monkeypatch.setattr(perturbator, "do_with_all", do_with_all)
+        assert made.trigger_activate() == TransitionCallbackReturn.FAILURE
+        assert [fault.name for fault in made._faults] == ["stopped"]
+    finally:
+        made.on_stop()
+        made.destroy_node()
+        rclpy.shutdown()

@@ -5,12 +5,14 @@
 
 import json
 import subprocess
+from pathlib import Path
 
 import pytest
 from harness import entrain_run
 from test_drivers import SHORT, emulated_motor, entrain
 
 from gait_entrainment_bags import BagReader
+from gait_entrainment_bringup.checklist import _record
 from gait_entrainment_drivers.proof import keep_proof, preflight_of
 
 
@@ -62,5 +64,6 @@ def test_a_robot_that_is_not_there_fails():
     options = ("--driver=ak_mit_can:interface=virtual,channel=nobody", "--arm")
     code, out, _ = entrain(None, "preflight", *options)
     assert code == 1
+    assert not _record(Path("/proc/study")).passed
     assert "FAIL  device" in out
     assert "check its power" in out

@@ -5,14 +5,20 @@
 
 import os
 import re
+import select
 import shutil
+import socket
 import subprocess
 import sys
+import threading
+import time
+from contextlib import contextmanager
 
+import pytest
 from harness import entrain_run
 from test_drivers import entrain
 
-from gait_entrainment_drivers.stop_channel import StopListener
+from gait_entrainment_drivers.stop_channel import PREFIX, StopAnswer, StopListener, stop_all
 
 
 def test_stop_from_the_command_line_ends_a_run(tmp_path):
@@ -31,30 +37,94 @@ def test_stop_that_finds_nobody_says_so():
     assert "no robot is driven by this machine" in err
 
 
-def test_stop_is_sent_before_anything_of_the_project_is_loaded():
-    listener = StopListener("somebody")
-    broken = {"PATH": os.environ["PATH"]}  # without PYTHONPATH there is no project
-    done = subprocess.run(["entrain", "stop"], capture_output=True, text=True, env=broken)
-    assert done.returncode == 1
-    assert "gait_entrainment_commands" in done.stderr
-    assert len(listener.requests()) == 1
-    subprocess.run(["entrain", "stop", "--help"], capture_output=True, check=True)
-    assert not listener.requests()
-    listener.close()
+ZERO = StopAnswer(True, 'it is "zero", \N{GREEK SMALL LETTER TAU} = 0')
 
 
-def test_stop_is_sent_where_there_is_no_perl(tmp_path):
+@contextmanager
+def somebody(answer=ZERO):
+    """Listen for stops in a thread; gives those who asked, each of whom gets the answer."""
+    listener, came, over = StopListener("some body"), [], threading.Event()
+
+    def listen():
+        while not over.is_set():
+            if select.select([listener], [], [], 0.02)[0]:
+                asked = listener.requests()
+                if isinstance(answer, bytes):
+                    listener._socket.sendto(answer, asked[0])
+                else:
+                    listener.answer(asked, answer)
+                came.extend(asked)
+
+    thread = threading.Thread(target=listen)
+    thread.start()
+    try:
+        yield came
+    finally:
+        over.set()
+        thread.join()
+        listener.close()
+
+
+HERE = {name: os.environ[name] for name in ("PATH", "PYTHONPATH")}  # no home folder, no ROS
+ALONE = {"PATH": "", "PYTHONPATH": os.pathsep.join(sys.path)}  # no perl
+
+
+@pytest.mark.parametrize("word", ["", "now!"])
+@pytest.mark.parametrize(
+    "environment",
+    [
+        HERE,
+        {"PATH": ""},  # no project
+        HERE | {"PERL5OPT": "-MNoSuchModule", "PERL5LIB": "/nowhere", "LC_ALL": "xx"},
+        HERE | {"PYTHONHOME": "/nowhere"},
+        ALONE,
+    ],
+)
+def test_a_stop_is_done_and_told_whatever_the_environment(tmp_path, environment, word):
+    (tmp_path / "socket.py").write_text("raise SystemExit('a module of the user, by chance')")
     (tmp_path / "python3").symlink_to(sys.executable)
-    bare = {"PATH": str(tmp_path), "PYTHONPATH": os.pathsep.join(sys.path)}
-    listener = StopListener("somebody")
-    subprocess.run([shutil.which("entrain"), "stop"], capture_output=True, env=bare, check=False)
-    assert len(listener.requests()) == 1
-    listener.close()
+    if environment is ALONE:
+        environment = ALONE | {"PATH": str(tmp_path)}
+    words = [shutil.which("entrain"), "stop", *word.split()]
+    with somebody() as came:
+        done = subprocess.run(
+            words, capture_output=True, text=True, env=environment, cwd=tmp_path, check=False
+        )
+        assert len(came) == 1
+    assert done.stdout == f"some_body/{os.getpid()}: {ZERO.message}\n"
+    assert done.stderr == ("entrain stop: unknown words: now!\n" if word else "")
+    assert done.returncode == 0
 
 
-def test_stop_needs_no_home_and_no_ros():
-    bare = {"PATH": os.environ["PATH"], "PYTHONPATH": os.environ["PYTHONPATH"]}
-    done = subprocess.run(["entrain", "stop"], capture_output=True, text=True, env=bare)
-    assert done.returncode == 1
-    assert "no robot is driven by this machine" in done.stderr
-    assert "Traceback" not in done.stderr
+def test_help_stops_nobody():
+    with somebody() as came:
+        subprocess.run(["entrain", "stop", "--help"], capture_output=True, check=True)
+        assert not came
+
+
+@pytest.mark.parametrize("strange", [b"no json", b"[1]", b'{"done": true, "message": "", "n": 1}'])
+def test_strangers_on_this_machine_are_in_nobodys_way(strange):
+    other, nameless = (socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) for _ in range(2))
+    other.bind(b"\0gait_entrainment/\xff\x00\xfe")
+    with other, nameless, somebody() as came, somebody(strange):
+        answers = stop_all(0.2)
+        assert len(answers) == 2
+        assert [name for name in answers if answers[name].done] == [f"some_body/{os.getpid()}"]
+        code, out, err = entrain(None, "stop")
+        assert code == 1
+        assert out.count(ZERO.message) == 1
+        assert out.count("does not answer") == 1
+        assert "did not confirm the stop: cut the power" in err
+        nameless.sendto(b"stop", f"\0{PREFIX}some_body/{os.getpid()}")  # whom nobody can answer
+        while None not in came:
+            time.sleep(0.01)
+        assert stop_all()[f"some_body/{os.getpid()}"].done
+
+
+def test_any_name_of_a_robot_is_found():
+    names = "robot\non\tx", "robot on /dev/serial/by-id/" + 80 * "x", "\N{GREEK SMALL LETTER TAU}"
+    listeners = [StopListener(name) for name in names]
+    assert len(stop_all(0.0)) == len(names)
+    for listener in listeners:
+        assert listener.requests()
+        listener.close()

@@ -135,10 +135,9 @@ class Conductor:
         self._legs = {side: _Leg(side, own) for side in protocol.sides}
         self.blocks: list[BlockRun] = []  # those that have begun
         self._begin_block()
-        self._longest_lookahead = longest_lookahead
+        self.longest_lookahead = longest_lookahead
         self._shortest = _shortest_stride(protocol)
-        self._lookahead = min(self._shortest, longest_lookahead)
-        self._longest_promise = self._lookahead
+        self._longest_promise = self._lookahead = min(self._shortest, longest_lookahead)
         self._promised = 0  # up to this instant [ns]
         self._heights: list[float] = []  # of the pulses of the block [N m]
         # By ankle: pulses planned and not requested yet, and the promise not made before they are.
@@ -200,7 +199,7 @@ class Conductor:
         if stride is not None and not self.block.baseline:
             self._periods.append(stride.period)
             # A promise must end before the next strike can be an onset's reference.
-            self._lookahead = min(self._longest_lookahead, *self._periods)
+            self._lookahead = min(self.longest_lookahead, *self._periods)
             self._longest_promise = max(self._longest_promise, self._lookahead)
         if self._closing_strike is not None or not self._in_block(strike):
             return
@@ -248,8 +247,9 @@ class Conductor:
         until, last = self._until(known_until), self._closing_strike is not None
         if not last:
             walking = self.block.first_onset is not None and self._resting_until is None
-            if walking and (stopped := self._leg.tracker.watch.stopped(known_until)):
-                raise GaitError(stopped)
+            told = self._leg.tracker.watch.stopped(known_until, self.block.pulse_period)
+            if walking and told:
+                raise GaitError(told)
             self._promised = max(self._promised, until)
         return Horizon(until, last)
 

@@ -67,11 +67,7 @@ class Setting:
         """
         Return a value as the setting's kind; whole numbers pass for real ones.
 
-        Raises
-        ------
-        SettingError
-            if it is of another kind, not finite, or out of range.
-
+        Raises SettingError if it is of another kind, not finite, or out of range.
         """
         if value is None and self.optional:
             return None

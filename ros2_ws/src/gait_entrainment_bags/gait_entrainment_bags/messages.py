@@ -38,13 +38,13 @@ class MessageError(UsageError):
 
 def side_of(message: Any) -> Side:
     """Return the side of a message about one leg; raises MessageError for an unknown one."""
-    return member_of(Side, "side", message.side)
+    return _member(Side, "side", message.side)
 
 
 def event_of(message: Any, start: int = 0) -> GaitEvent:
     """Return the event of a GaitEvent message; raises MessageError for an unknown kind or side."""
     stamp = nanoseconds_of(message.header.stamp) - start
-    kind = member_of(EventKind, "kind", message.kind)
+    kind = _member(EventKind, "kind", message.kind)
     uncertainty = getattr(message, "uncertainty", 0.0)  # bags of earlier versions have none
     return GaitEvent(stamp, kind, side_of(message), int(message.step), uncertainty)
 
@@ -101,7 +101,7 @@ def train_of(message: Any, start: int = 0) -> PulseTrain:
             onset=nanoseconds_of(pulse.onset) - start,
             torque=pulse.torque,
             duration=pulse.duration,
-            shape=member_of(Shape, "shape", pulse.shape),
+            shape=_member(Shape, "shape", pulse.shape),
             rise=pulse.rise,
             fall=pulse.fall,
             samples=tuple(pulse.samples),
@@ -146,8 +146,7 @@ def result_values(result: Result, side: Side) -> dict[str, Any]:
     return values | {"header": result.stamp, "entrained_since_stride": since}
 
 
-def member_of(enumeration: type[_E], field: str, value: int) -> _E:
-    """Return what a number of a field stands for; raises MessageError for an unknown one."""
+def _member(enumeration: type[_E], field: str, value: int) -> _E:
     try:
         return enumeration(value)
     except ValueError:

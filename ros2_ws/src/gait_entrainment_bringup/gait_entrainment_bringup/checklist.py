@@ -12,13 +12,15 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from gait_entrainment.errors import UsageError
 from gait_entrainment.protocol import Protocol
 from gait_entrainment.robot import DeviceError, GuardedRobot, driver_on, make_robots
 from gait_entrainment.robot.faults import STOPPED
 from gait_entrainment_bags.messages import nanoseconds_of
 from gait_entrainment_bringup.node_list import CLOCK_OFFSET, limits_of
 from gait_entrainment_bringup.operator_console import STOP_KEY, pressed_key
-from gait_entrainment_drivers.monitor import NEAR_ZERO_SHARE
+from gait_entrainment_bringup.run_options import check_output
+from gait_entrainment_drivers.monitor import NEAR_ZERO_SHARE, torque_scale
 from gait_entrainment_drivers.proof import proof_of
 from gait_entrainment_drivers.stop_channel import StopAnswer, stop_all
 from gait_entrainment_nodes.messaging.domain import wanted_domain
@@ -91,6 +93,10 @@ def _watchdog(driver: str) -> Point:
 
 
 def _record(bag: Path) -> Point:
+    try:
+        check_output(bag, exactly=False)
+    except UsageError as error:
+        return Point("record", False, str(error))
     parent = next(folder for folder in bag.absolute().parents if folder.exists())
     free = shutil.disk_usage(parent).free
     return Point("record", free > _SPACE, f"{free / 1e9:.1f} GB free in {parent}")
@@ -174,8 +180,7 @@ def _stop(robot: GuardedRobot, timeout: float) -> Point:
         measured = _watch(robot, lambda: False, _FALL_TIME)
     finally:
         channel.close()
-    near_zero = NEAR_ZERO_SHARE * robot.capabilities.peak_torque
-    if not abs(measured) <= near_zero:
+    if not abs(measured) <= NEAR_ZERO_SHARE * torque_scale(robot.capabilities):
         return Point("stop", False, f"pressed, but {measured:.2f} N m are measured: cut the power")
     return Point("stop", True, f"obeyed and latched, {measured:+.2f} N m measured")
 

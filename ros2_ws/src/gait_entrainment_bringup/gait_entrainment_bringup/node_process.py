@@ -20,7 +20,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
-from gait_entrainment_drivers.signals import STOPPING
+from gait_entrainment_commands.signals import STOPPING
 from gait_entrainment_nodes.messaging.environment import PACKAGE
 
 _PR_SET_PDEATHSIG, _PR_SET_NAME = 1, 15

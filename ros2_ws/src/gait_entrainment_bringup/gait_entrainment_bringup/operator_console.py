@@ -5,7 +5,6 @@
 
 import os
 import select
-import sys
 import termios
 import tty
 from collections.abc import Iterator
@@ -32,26 +31,41 @@ class Operator:
         """Publish the heartbeat; raise NodeError if the stop key was pressed."""
         self._heartbeat.publish(OPERATOR_HEARTBEAT.type(data=RUN_CLIENT))
         if pressed_key() == STOP_KEY:
-            told = [f"{name}: {a.message if a else 'no answer'}" for name, a in stop_all().items()]
+            told = [f"{name}: {answer.message}" for name, answer in stop_all().items()]
             raise NodeError("stopped by the space bar: " + "; ".join(told), "")
 
 
 @contextmanager
 def keys_at_once() -> Iterator[None]:
     """Have a terminal hand over each key as it is pressed, without showing it."""
-    if not sys.stdin.isatty():
+    if not _is_attended():
         yield
         return
-    before = termios.tcgetattr(sys.stdin)
-    tty.setcbreak(sys.stdin)  # Ctrl-C and Ctrl-Z stay signals
+    before = termios.tcgetattr(0)
+    tty.setcbreak(0)  # Ctrl-C and Ctrl-Z stay signals
     try:
         yield
     finally:
-        termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
+        if _is_attended():
+            termios.tcsetattr(0, termios.TCSADRAIN, before)
 
 
 def pressed_key() -> str:
     """Return a key that was pressed, or an empty text."""
-    if not sys.stdin.isatty() or not select.select([sys.stdin], [], [], 0)[0]:
+    if not _is_attended() or not select.select([0], [], [], 0)[0]:
         return ""
-    return os.read(sys.stdin.fileno(), 1).decode(errors="replace")
+    return os.read(0, 1).decode(errors="replace")
+
+
+def _is_attended() -> bool:
+    """
+    Whether keys come to this process.
+
+    A job in the background that touches its terminal is suspended by that, run and all.
+    """
+    if not os.isatty(0):
+        return False
+    try:
+        return os.tcgetpgrp(0) == os.getpgrp()
+    except OSError:  # it is not the terminal that controls jobs
+        return True

@@ -23,7 +23,11 @@ def add_page_options(parser: argparse.ArgumentParser) -> None:
         "--host", default="127.0.0.1", help="serve it at this address; another asks for a token"
     )
     group.add_argument("--port", default="8080", help="at this port (8080); 0: a free one")
-    group.add_argument("--token", default="", help="whoever has it may act; default: a new one")
+    group.add_argument(
+        "--token",
+        default="",
+        help="whoever has it may act; default: that of ENTRAIN_PAGE_TOKENS, or a new one",
+    )
     group.add_argument(
         "--heartbeat",
         action="store_true",
@@ -50,7 +54,7 @@ def checked_page(options: argparse.Namespace, protocol: Protocol | None) -> dict
     Raises UsageError.
     """
     check_heartbeat(options, protocol)
-    access = Access.of(options.host, options.token)
+    access = Access.of_environment(options.host, options.token)
     port = _PORT.parse("--port", options.port)
     foxglove = _PORT.parse("--foxglove", options.foxglove)
     if foxglove and options.blinded:

@@ -43,12 +43,7 @@ def conduct(
 
     ``on_start`` is called once the experiment has accepted it. In ``real_time`` this process comes
     before others. Nodes that nobody else watches may be silent for ``silence`` [s].
-
-    Raises
-    ------
-    NodeError
-        if the run fails.
-
+    Raises NodeError if the run fails.
     """
     bar = tqdm(total=protocol.strides, unit="stride", disable=True if quiet else None, leave=False)
     with bar, keys_at_once(), Client(RUN_CLIENT) as client:

@@ -24,8 +24,8 @@ from gait_entrainment_bags.messages import profile_of, stop_of
 from gait_entrainment_bags.topic_names import TORQUE_PROFILE
 from gait_entrainment_bringup.commands.run import run_experiment
 from gait_entrainment_bringup.node_process import end_with
+from gait_entrainment_commands.signals import end_once, undisturbed
 from gait_entrainment_drivers.proof import preflight_of
-from gait_entrainment_drivers.signals import end_once, undisturbed
 from gait_entrainment_sessions.folder import KEY_HASH, SessionFolder
 from gait_entrainment_sessions.session_file import Session, SessionError
 
@@ -238,8 +238,7 @@ def _delivered(bag: Path, protocol: Protocol) -> list[tuple[int, float]]:
 
 def _conduct(parent: int, answer: Any, keyboard: int, conduct: Callable[..., None]) -> None:
     """Conduct one block in a process of its own; tell the parent how it ended."""
-    os.dup2(keyboard, 0)
-    sys.stdin = os.fdopen(0, closefd=False)  # the space bar stops
+    os.dup2(keyboard, 0)  # the space bar stops
     end_once()
     reason = ""
     try:

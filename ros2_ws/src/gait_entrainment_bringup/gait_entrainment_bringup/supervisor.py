@@ -18,7 +18,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 from gait_entrainment_bringup.node_process import load, start_node
-from gait_entrainment_drivers.signals import undisturbed
+from gait_entrainment_commands.signals import undisturbed
 from gait_entrainment_nodes.messaging.environment import PACKAGE, set_environment
 from gait_entrainment_nodes.messaging.errors import NodeError
 

@@ -4,6 +4,7 @@
 """Options of the page that cannot be had, and a computer without a browser."""
 
 import argparse
+import os
 
 import pytest
 
@@ -22,6 +23,16 @@ def test_a_port_that_is_taken_is_told_by_its_option(option):
         options = parser.parse_args(["--port=0", f"{option}={taken}"])
         with pytest.raises(UsageError, match=f"^{option}: {taken} is taken by another program"):
             checked_page(options, None)
+
+
+def test_tokens_of_the_environment_stand_unless_one_is_chosen(monkeypatch):
+    monkeypatch.setenv("ENTRAIN_PAGE_TOKENS", "letmeactnow letmelookon more")
+    parser = argparse.ArgumentParser()
+    add_page_options(parser)
+    checked_page(parser.parse_args(["--port=0", "--host=0.0.0.0"]), None)
+    assert os.environ["ENTRAIN_PAGE_TOKENS"] == "letmeactnow letmelookon"
+    checked_page(parser.parse_args(["--port=0", "--token=nowthisone"]), None)
+    assert os.environ["ENTRAIN_PAGE_TOKENS"].startswith("nowthisone ")
 
 
 def test_without_a_browser_the_address_is_told(monkeypatch, capsys):

@@ -25,6 +25,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from gait_entrainment.errors import EntrainmentError
+from gait_entrainment_commands.signals import stop_on_signals
 
 ENTRY_POINTS = "gait_entrainment.commands"
 COMMANDS = {
@@ -32,6 +33,9 @@ COMMANDS = {
 }
 # Where to look first: to search all packages takes longer than these commands, and stop hurries.
 _FOUND_AT_ONCE = {"simulate": __name__, "stop": "gait_entrainment_drivers.commands"}
+# Whatever ends these takes the same path as Ctrl-C, from their very beginning: torque first, then
+# the rest. Suspended, a robot would stay enabled.
+_WITH_NODES_OR_ROBOT = ("driver", "node", "page", "preflight", "replay", "run", "session")
 _DESCRIPTION = "Rehearse, run and analyze entrainment experiments."
 
 
@@ -43,6 +47,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     name = words[0] if words else ""
     prog = f"entrain {name}"
     try:
+        if name in _WITH_NODES_OR_ROBOT:
+            stop_on_signals()
         options = make_parser(name).parse_args(words)
         prog = options.prog
         code = int(options.run(options))

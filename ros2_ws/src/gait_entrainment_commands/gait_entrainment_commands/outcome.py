@@ -166,7 +166,7 @@ def summary(outcome: dict[str, Any]) -> str:
         return "\n".join([*lines, "pulses           none", *_doubt_lines(outcome)])
     if timing := _timing(outcome, plan or {}):
         shape = f"{plan['torque']:.2f} N m for {plan['width']:g} s" if plan else ""
-        timing = (timing if plan else timing.lstrip()) + _both(plans[0])
+        timing = (timing if plan else timing.lstrip()) + _besides(plans[0])
         lines.append(f"pulses           {shape}{timing}")
     lines.append(f"verdict          {_verdict(outcome, plan or {})}")
     for stretch in outcome["stretches"][:-1]:
@@ -201,12 +201,16 @@ def _block_lines(number: int, block: dict[str, Any], said: dict[str, Any]) -> li
     if not plan["count"]:
         return [f"{told}, no pulses"]
     pulses = f"{block['pulses']} pulses of {plan['torque']:.2f} N m{_timing(block, plan)}"
-    return [f"{told}, {pulses}{_both(said)}", f"{'':17}{_verdict(block, plan)}"]
+    return [f"{told}, {pulses}{_besides(said)}", f"{'':17}{_verdict(block, plan)}"]
 
 
-def _both(said: dict[str, Any]) -> str:
-    """Say that the other leg got its pulses too, if it did."""
-    return ", the other leg in between" if said.get("both_legs") else ""
+def _besides(said: dict[str, Any]) -> str:
+    """Say that the other leg got its pulses too, if it did, and how many were left out."""
+    plan = said.get("pulses", {})
+    left_out = len(set(plan.get("catch_pulses", "").replace(",", " ").split()))
+    left_out += round(plan.get("catch_share", 0.0) * plan.get("count", 0))
+    other = ", the other leg in between" if said.get("both_legs") else ""
+    return other + (f", {left_out} of them left out" if left_out else "")
 
 
 def _timing(judged: dict[str, Any], plan: dict[str, Any]) -> str:
@@ -218,7 +222,8 @@ def _timing(judged: dict[str, Any], plan: dict[str, Any]) -> str:
         return ""
     offset = "" if unperturbed is None else f" ({(period - unperturbed) * 1e3:+.1f} ms)"
     sweep = f", changing by {plan['sweep'] * 1e3:+g} ms" if plan.get("sweep") else ""
-    return f" every {period:.4f} s{offset}{sweep}"
+    jitter = f", each off by up to {plan['jitter'] * 1e3:g} ms" if plan.get("jitter") else ""
+    return f" every {period:.4f} s{offset}{sweep}{jitter}"
 
 
 def _doubt_lines(outcome: dict[str, Any]) -> list[str]:

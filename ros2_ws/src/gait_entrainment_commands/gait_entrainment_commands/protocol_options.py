@@ -53,15 +53,7 @@ def _default_text(field: str) -> str:
 
 
 def chosen_protocol(options: argparse.Namespace) -> Protocol:
-    """
-    Return the protocol that the options name.
-
-    Raises
-    ------
-    ProtocolError, LimitError, DeviceError
-        One line: place, field, what is allowed.
-
-    """
+    """Return the protocol that the options name; ProtocolError, LimitError or DeviceError."""
     given = vars(options)
     overrides = {
         field: (given[field], _option(field)) for field in FIELDS if given[field] is not None

@@ -3,8 +3,14 @@
 
 """In a workspace that lacks a Python package the command line says so."""
 
+import signal
 import subprocess
 import sys
+
+import pytest
+
+from gait_entrainment_commands import main
+from gait_entrainment_commands.signals import STOPPING
 
 WITHOUT_NUMBA = """
 import sys
@@ -19,3 +25,18 @@ def test_missing_package_is_one_line():
     assert done.returncode == 1
     assert "package numba is missing" in done.stderr
     assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize(("command", "heeded"), [("driver", True), ("simulate", False)])
+def test_what_drives_a_robot_heeds_signals_before_it_is_loaded(monkeypatch, command, heeded):
+    before = {number: signal.signal(number, signal.SIG_IGN) for number in STOPPING}
+    seen = {}
+    look = "gait_entrainment_commands.make_parser"
+    monkeypatch.setattr(look, lambda _: seen.update({n: signal.getsignal(n) for n in STOPPING}))
+    try:
+        with pytest.raises(AttributeError):  # there is no parser
+            main([command])
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    assert set(seen.values()) == {signal.default_int_handler if heeded else signal.SIG_IGN}

@@ -76,10 +76,20 @@ def test_each_block_has_its_own_line_and_verdict():
     assert text[7].endswith("no pulses")
 
 
-@pytest.mark.parametrize("text", ["pulses: {count: 0, phase: 0.4}", "blocks: [{name: a}]"])
-def test_a_single_block_is_told_with_its_pulses(text):
+@pytest.mark.parametrize(
+    ("text", "begin", "end"),
+    [
+        ("pulses: {count: 0, phase: 0.4}", "none", ""),
+        ("blocks: [{name: a}]", "13.35 N m for 0.1 s every", "(-50.0 ms)"),
+        ("pulses: {catch_share: 0.3, count: 5}", "13.35 N m", ", 2 of them left out"),
+        ("pulses: {catch_pulses: [2, 3, 2], count: 5}", "13.35", ", 2 of them left out"),
+        ("pulses: {jitter: 0.05, count: 5}", "13.35 N m", ", each off by up to 50 ms"),
+    ],
+)
+def test_a_single_block_is_told_with_its_pulses(text, begin, end):
     found = summary(outcome_of(simulate(read_protocol(text + "\n")))).splitlines()[2]
-    assert found.startswith("pulses           " + ("none" if "count" in text else "13.35 N m for"))
+    assert found.startswith(f"pulses           {begin}")
+    assert found.endswith(end)
 
 
 def test_an_open_baseline_is_told_as_walked():

@@ -17,7 +17,7 @@ from gait_entrainment.settings import setting
 from gait_entrainment_drivers.can_bus import open_bus, send
 from gait_entrainment_drivers.device import TorqueDevice
 from gait_entrainment_drivers.host_timed import LoopOptions
-from gait_entrainment_drivers.monitor import SECOND_MASTER
+from gait_entrainment_drivers.monitor import NEAR_ZERO_SHARE, SECOND_MASTER, torque_scale
 
 _T = TypeVar("_T")
 
@@ -108,8 +108,10 @@ class CanMotor(TorqueDevice):
     def _note_command(self, message: Any) -> None:
         """Note a command to this motor that was seen on the bus; some adapters echo one's own."""
         sent = message.arbitration_id, bytes(message.data)
-        if sent in self._sent:
-            self._sent.remove(sent)
+        # An echo comes soon, and in order. Where none comes, what was sent fills the memory.
+        if sent in self._sent and len(self._sent) < _REMEMBERED:
+            while self._sent.popleft() != sent:
+                pass
         else:
             self._second_master = True
 
@@ -157,7 +159,7 @@ class CanMotor(TorqueDevice):
         while True:
             reading = self.exchange(0.0, _ASK_PERIOD)
             torque = math.nan if reading is None else reading.torque
-            if abs(torque) <= 0.05 * self.capabilities.peak_torque:
+            if abs(torque) <= NEAR_ZERO_SHARE * torque_scale(self.capabilities):
                 return
             if time.monotonic() > give_up:
                 raise DeviceError(

@@ -24,15 +24,7 @@ _LONGEST_COMMAND = 80
 
 
 class DeviceLock:
-    """
-    Holds a device, by its address, until it is released.
-
-    Raises
-    ------
-    DeviceError
-        if another process holds it; names that one.
-
-    """
+    """Holds a device, by its address, until released; DeviceError names who holds it already."""
 
     def __init__(self, address: str) -> None:
         # An address may be longer than a socket's name.

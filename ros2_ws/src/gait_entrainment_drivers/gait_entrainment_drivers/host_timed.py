@@ -38,12 +38,15 @@ _START_TIMEOUT = 10.0
 _ANSWER_TIMEOUT = 2.0
 # Commands whose lateness is remembered: ten seconds of the fastest loop.
 _REMEMBERED = 10_000
-# Pulses in one packet to the loop at most: it has to fit into a socket's buffer, samples too.
-_PACKET_PULSES = 10
 _LOOP_ENDED = Fault(
     "torque_loop_ended",
     "The process that streams torque has ended: the device's own watchdog must bring zero. If "
     "torque is felt, cut the power.",
+)
+_LOOP_SILENT = Fault(
+    "torque_loop_silent",
+    "The process that streams torque fell silent for longer than the limit: it is frozen. The "
+    "device's own watchdog must bring zero. If torque is felt, cut the power.",
 )
 
 
@@ -55,7 +58,7 @@ class LoopOptions(MonitorSettings):
     silence: float = setting(0.05, "longest silence of the device", "s", (0.005, 1.0))
     lateness: float = setting(0.05, "by which the loop may wake up late", "s", (0.005, 1.0))
     host_silence: float = setting(
-        0.2, "longest silence of the robot's process while torque may come", "s", (0.02, 5.0)
+        0.2, "longest silence of the robot's process, or of the loop itself", "s", (0.02, 5.0)
     )
     bandwidth: float = setting(
         30.0,
@@ -102,6 +105,8 @@ class HostTimedRobot(AnkleRobot):
         self._promised = 0  # up to this instant [ns]; 0 until a run begins
         self._offset = time.time_ns() - time.monotonic_ns()  # from steady time to stamps
         self._done: dict[str, str] = {}  # answers of the loop: error texts
+        self._streams, self._heard_at = False, 0.0  # the loop, and when it was heard last [s]
+        self._latest = 0  # stamp of its latest sample [ns]
 
     # Lifecycle
 
@@ -119,6 +124,7 @@ class HostTimedRobot(AnkleRobot):
                 ],
                 pass_fds=[theirs.fileno()],
                 stdin=subprocess.DEVNULL,
+                env={**os.environ, "PYTHONSAFEPATH": "1"},  # of modules in the working folder
                 start_new_session=True,  # a terminal's Ctrl-C and Ctrl-Z are for the parent
             )
         self._link = Link(ours)
@@ -129,10 +135,11 @@ class HostTimedRobot(AnkleRobot):
         """Let the loop enable the device and stream zero torque."""
         self._promised = 0
         self._ask("enable")
+        self._streams = True
 
     def deactivate(self) -> None:
         """Let the loop bring the torque to zero and disable the device."""
-        self._train = None
+        self._train, self._streams = None, False
         if self._process is not None and _LOOP_ENDED not in self._faults:
             self._ask("disable")
 
@@ -156,30 +163,19 @@ class HostTimedRobot(AnkleRobot):
         """Start the account of a run."""
         self.cancel()
         self._listen()
-        self._promised, self._states = start, []
+        self._promised, self._latest, self._states = start, time.time_ns(), []
         # Stamps from before are of another offset, if the wall clock was set meanwhile.
         self._held = self._samples[-1][1] if self._samples else 0.0
         self._samples = []
         self._offset = time.time_ns() - time.monotonic_ns()
 
     def schedule(self, train: PulseTrain) -> None:
-        """
-        Hand over a train.
-
-        Raises
-        ------
-        LimitError
-            if its first onset is over already.
-
-        """
+        """Hand over a train; LimitError if its first onset is over already."""
         late = time.monotonic_ns() + self._offset - train.onsets[0]
         if late > 0:
             raise LimitError(f"onset: is over by {late / NANOSECONDS_PER_SECOND:.3g} s")
         self._train = self._train.followed_by(train) if self._train else train
-        pulses = train.shifted(-self._offset).pulses
-        for first in range(0, len(pulses), _PACKET_PULSES):
-            part = pulses[first : first + _PACKET_PULSES]
-            self._tell("train", PulseTrain(train.side, part))
+        self._tell("train", train.shifted(-self._offset))
 
     def cancel(self) -> None:
         """Drop the train; the next command is zero."""
@@ -263,11 +259,13 @@ class HostTimedRobot(AnkleRobot):
         try:
             messages = self._link.received()
         except EOFError:
-            if _LOOP_ENDED not in self._faults:
-                self._train, self._faults = None, (*self._faults, _LOOP_ENDED)
-                now = time.monotonic_ns() + self._offset
-                self._states.append(RobotState(now, 0.0, math.nan, math.nan, self._faults))
+            self._miss(_LOOP_ENDED)
             return
+        now = time.monotonic()
+        if messages or not self._streams:
+            self._heard_at = now
+        elif now - self._heard_at > self._options.host_silence:
+            self._miss(_LOOP_SILENT)
         for kind, *content in messages:
             if kind == "samples":
                 for sample in content[0]:
@@ -282,9 +280,17 @@ class HostTimedRobot(AnkleRobot):
             elif kind == "identity":
                 (self.identity,) = content
 
+    def _miss(self, fault: Fault) -> None:
+        """Report that the loop is not heard any more, at the instant that it told of last."""
+        if fault not in self._faults:
+            self._train, self._faults = None, (*self._faults, fault)
+            state = RobotState(self._latest, 0.0, math.nan, math.nan, self._faults)
+            self._states.append(state)
+
     def _take(self, sample: Sample) -> None:
         stamp, reading = sample.sent + self._offset, sample.reading
         self._late.append(sample.late)
+        self._latest = stamp
         if not self._promised:  # nobody asks for samples until a run begins
             self._samples, self._states = self._samples[-1:], self._states[-1:]
         if reading is not None:

@@ -4,9 +4,9 @@
 """
 The link between a robot's process and its torque loop: messages that nobody waits for.
 
-A packet is a pickled tuple, its first element the kind of message. The loop never blocks: what the
-other side does not take at once is kept and sent with the next packet, so that a robot's process
-that was held up has lost no sample.
+A message is a pickled tuple, its first element the kind of message; a long one comes in several
+packets. The loop never blocks: what the other side does not take at once is kept and sent with the
+next packet, so that a robot's process that was held up has lost no sample.
 """
 
 import pickle
@@ -19,9 +19,11 @@ from typing import Any
 
 from gait_entrainment_drivers.device import Reading
 
-# Samples in one packet at most: it has to fit into a socket's buffer.
-_PACKET_SAMPLES = 200
-_LARGEST_PACKET = 1 << 17
+# Samples in one message at most: the loop is not to be held up by it.
+_MESSAGE_SAMPLES = 200
+# It has to fit into a socket's buffer. Its first byte says whether more of its message comes.
+_LARGEST_PACKET = 1 << 16
+_MORE, _LAST = b"+", b"."
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,7 @@ class Link:
         self._socket = end
         end.setblocking(False)
         self._waiting: deque[bytes] = deque()  # packets that have not been sent yet
+        self._begun = b""  # of a message whose last packet has not come yet
         self._sending = threading.RLock()  # nobody waits while it is held: sends do not block
 
     def fileno(self) -> int:
@@ -49,9 +52,11 @@ class Link:
 
     def send(self, *message: Any) -> None:
         """Send a message, or keep it until the other side takes it."""
-        packet = pickle.dumps(message)
+        data, size = pickle.dumps(message), _LARGEST_PACKET - 1
         with self._sending:
-            self._waiting.append(packet)
+            for place in range(0, len(data), size):
+                kind = _MORE if place + size < len(data) else _LAST
+                self._waiting.append(kind + data[place : place + size])
             self._flush()
 
     def send_samples(self, samples: list[Any]) -> None:
@@ -59,19 +64,11 @@ class Link:
         with self._sending:
             self._flush()
             while samples and not self._waiting:
-                self.send("samples", samples[:_PACKET_SAMPLES])
-                del samples[:_PACKET_SAMPLES]
+                self.send("samples", samples[:_MESSAGE_SAMPLES])
+                del samples[:_MESSAGE_SAMPLES]
 
     def received(self) -> list[Any]:
-        """
-        Return the messages that have come since the last call.
-
-        Raises
-        ------
-        EOFError
-            if the other side has ended.
-
-        """
+        """Return the messages since the last call; EOFError if the other side has ended."""
         messages: list[Any] = []
         while True:
             try:
@@ -84,12 +81,15 @@ class Link:
                 if messages:
                     return messages
                 raise EOFError
-            messages.append(pickle.loads(packet))
+            self._begun += packet[1:]
+            if packet[:1] == _LAST:
+                messages.append(pickle.loads(self._begun))
+                self._begun = b""
 
     def first(self) -> Any:
-        """Wait for the first message, and leave those behind it."""
+        """Wait for the first message, a short one, and leave those behind it."""
         select.select([self._socket], [], [])
-        return pickle.loads(self._socket.recv(_LARGEST_PACKET))
+        return pickle.loads(self._socket.recv(_LARGEST_PACKET)[1:])
 
     def _flush(self) -> None:
         try:

@@ -6,12 +6,12 @@
 import math
 from dataclasses import dataclass
 
+from gait_entrainment.robot.contract import Capabilities
 from gait_entrainment.robot.faults import Fault
+from gait_entrainment.robot.limits import DeviceLimits
 from gait_entrainment.settings import Checked, setting
 from gait_entrainment_drivers.device import Reading
 
-# Measured torque below this share of the peak is what a sensor shows without any.
-NEAR_ZERO_SHARE = 0.05
 NOT_FOLLOWED = Fault(
     "torque_not_followed",
     "The measured torque does not follow the command: it pushes unasked, in the wrong direction, "
@@ -29,11 +29,21 @@ VELOCITY_OUT_OF_RANGE = Fault(
 )
 TOO_HOT = Fault("too_hot", "The measured temperature is beyond the limit.")
 READING_NOT_FINITE = Fault(
-    "reading_not_finite", "The device reports a torque that is not a number."
+    "reading_not_finite",
+    "The device reports a torque that is not a number, or no longer what it measured before.",
 )
 SECOND_MASTER = Fault(
     "second_master", "Somebody else sends commands to this motor: find and stop that."
 )
+# Measured torque below this share of its scale is what a sensor shows without any.
+NEAR_ZERO_SHARE = 0.05
+# What a device need not measure.
+_OPTIONAL = ("angle", "velocity", "temperature")
+
+
+def torque_scale(able: Capabilities) -> float:
+    """Return the torque [N m] to judge by: a strong motor's peak is more than one is to feel."""
+    return min(able.peak_torque, DeviceLimits.torque)
 
 
 @dataclass(frozen=True)
@@ -46,7 +56,11 @@ class MonitorSettings(Checked):
     """
 
     torque_band: float = setting(
-        0.12, "distance of measured from expected torque, as a share of the peak", "1", (0.01, 1.0)
+        0.12,
+        "distance of measured from expected torque, as a share of the peak, or of 30 N m if that"
+        " is less",
+        "1",
+        (0.01, 1.0),
     )
     torque_time: float = setting(
         0.03,
@@ -70,10 +84,11 @@ class Monitor:
     ``torque_time`` and two time constants, is a fault.
     """
 
-    def __init__(self, settings: MonitorSettings, peak_torque: float, bandwidth: float) -> None:
+    def __init__(self, settings: MonitorSettings, able: Capabilities) -> None:
         self._settings = settings
-        self.band = settings.torque_band * peak_torque
-        self._lag = 1 / (2 * math.pi * bandwidth)
+        self.band = settings.torque_band * torque_scale(able)
+        self._lag = 1 / (2 * math.pi * able.torque_bandwidth)
+        self._told: set[str] = set()  # what the device measures, beside torque
         self._tolerated = settings.torque_time + 2 * self._lag
         self._command = 0.0  # held since the last reading [N m]
         self._expected = 0.0  # the command behind the lag [N m]
@@ -92,6 +107,10 @@ class Monitor:
         if not math.isfinite(reading.torque):
             return (READING_NOT_FINITE,)
         found = []
+        measured = {name for name in _OPTIONAL if not math.isnan(getattr(reading, name))}
+        if not self._told <= measured:
+            found.append(READING_NOT_FINITE)
+        self._told |= measured
         if reading.angle < limits.angle_least or reading.angle > limits.angle_most:
             found.append(ANGLE_OUT_OF_RANGE)
         if abs(reading.velocity) > limits.velocity:

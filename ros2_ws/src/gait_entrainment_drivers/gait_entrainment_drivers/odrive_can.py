@@ -56,6 +56,7 @@ class OdriveAxis(CanMotor):
         self._errors = 0  # bits that are set, or for which it disarmed since it was enabled
         self._old_reason: int | None = None  # of a disarming before that
         self._angle = self._velocity = math.nan  # of the motor [rad], [rad/s]
+        self._angle_at = 0.0  # when they came [s, steady]
         # One of them in each tick: either is needed less often than the torque.
         self._questions = itertools.cycle((odrive.ENCODER, odrive.ERRORS))
 
@@ -90,8 +91,11 @@ class OdriveAxis(CanMotor):
         faults = odrive.faults_of(self._heartbeat.error | self._errors)
         if not faults and self._heartbeat.state != odrive.CLOSED_LOOP:
             faults = (odrive.DISARMED,)
-        if time.monotonic() - self._beat_at > HEARTBEAT_LOST:
+        now = time.monotonic()
+        if now - self._beat_at > HEARTBEAT_LOST:
             faults = (*faults, NO_HEARTBEAT)
+        if now - self._angle_at > HEARTBEAT_LOST:
+            self._angle = self._velocity = math.nan
         return Reading(
             measured * ratio,
             self._angle / ratio,
@@ -148,6 +152,7 @@ class OdriveAxis(CanMotor):
             self._errors = active | (reason if reason != self._old_reason else 0)
         elif command == odrive.ENCODER and (estimates := odrive.unpack_pair(data)):
             self._angle, self._velocity = (2 * math.pi * value for value in estimates)
+            self._angle_at = time.monotonic()
         return None
 
     def _version(self, message: Any) -> str | None:

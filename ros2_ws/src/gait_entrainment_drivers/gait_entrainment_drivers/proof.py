@@ -13,6 +13,7 @@ motor is another robot. The files are in ``gait_entrainment`` in the user's stat
 
 import json
 import os
+import socket
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from datetime import datetime, timezone
@@ -63,11 +64,7 @@ def keep_proof(driver: str, within: float | None) -> None:
     """
     Remember that zero was measured within a time [s]; None takes back what was proved before.
 
-    Raises
-    ------
-    DeviceError
-        if it cannot be written.
-
+    Raises DeviceError if it cannot be written.
     """
     _keep(_PROOFS, driver, None if within is None else Proof(within, _now(), _version()))
 
@@ -124,7 +121,8 @@ def _known(name: str) -> dict[str, Any]:
 
 def _key(driver: str) -> str:
     name, _, options = driver.partition(":")
-    return f"{name}:{join_options(sorted(split_options(options)))}"
+    # Several computers may share a home folder.
+    return f"{socket.gethostname()}/{name}:{join_options(sorted(split_options(options)))}"
 
 
 def _now() -> str:

@@ -15,18 +15,21 @@ import errno
 import itertools
 import json
 import os
+import re
 import select
 import socket
 import time
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 PREFIX = "gait_entrainment/stop/"
 _SOCKETS = Path("/proc/net/unix")
 _LARGEST_ANSWER = 4096
-# What the script `entrain` has done: the descriptor of its socket, and whom it has asked.
-_ASKED = "GAIT_ENTRAINMENT_STOP_ASKED"
+# Of a name: a socket's is short, and what looks for it splits at blanks.
+_LONGEST_NAME = 60
+_UNFIT = re.compile(r"[^\w/.:+-]", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -37,25 +40,25 @@ class StopAnswer:
     message: str  # for people, in one line; says "zero" only of a torque that was measured
 
 
+NO_ANSWER = StopAnswer(False, "does not answer")
+
+
 class StopListener:
     """
     The end of the channel at the robot: requests are polled, or waited for by ``select``.
 
-    Parameters
-    ----------
-    name
-        What the robot is called in answers, such as the driver's name.
-
+    ``name`` is what the robot is called in answers, such as the driver's name.
     """
 
     def __init__(self, name: str) -> None:
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
+        short = _UNFIT.sub("_", name)[-_LONGEST_NAME:]
         # A process may hold several robots of one name.
         for number in itertools.count(1):
             more = f"-{number}" if number > 1 else ""
             try:
-                self._socket.bind(f"\0{PREFIX}{name}/{os.getpid()}{more}")
+                self._socket.bind(f"\0{PREFIX}{short}/{os.getpid()}{more}")
                 break
             except OSError as error:
                 if error.errno != errno.EADDRINUSE:
@@ -65,23 +68,22 @@ class StopListener:
         """Return the descriptor that becomes readable with a request."""
         return self._socket.fileno()
 
-    def requests(self) -> list[str | bytes]:
-        """Return the addresses of those who asked for a stop since the last call."""
-        found: list[str | bytes] = []
+    def requests(self) -> list[str | bytes | None]:
+        """Return the addresses of those who asked for a stop since the last call, None without."""
+        found: list[str | bytes | None] = []
         while True:
             try:
                 found.append(self._socket.recvfrom(16)[1])
             except BlockingIOError:
                 return found
 
-    def answer(self, addresses: Iterable[str | bytes], answer: StopAnswer) -> None:
+    def answer(self, addresses: Iterable[str | bytes | None], answer: StopAnswer) -> None:
         """Answer requests; whoever asked and is gone misses nothing."""
         data = json.dumps(asdict(answer)).encode()
         for address in addresses:
-            try:
-                self._socket.sendto(data, address)
-            except OSError:
-                continue
+            if address is not None:
+                with suppress(OSError):
+                    self._socket.sendto(data, address)
 
     def close(self) -> None:
         """Listen no more."""
@@ -90,34 +92,32 @@ class StopListener:
 
 def listening() -> list[str]:
     """Return the names of all robots of this machine that can be stopped: NAME/PROCESS."""
-    names = (line.split()[-1] for line in _SOCKETS.read_text().splitlines()[1:])
+    # Other programs name their sockets as they like.
+    lines = _SOCKETS.read_text(errors="replace").splitlines()[1:]
+    names = (line.split()[-1] for line in lines)
     marker = f"@{PREFIX}"
     return sorted(name.removeprefix(marker) for name in names if name.startswith(marker))
 
 
-def stop_all(timeout: float = 0.5) -> dict[str, StopAnswer | None]:
+def stop_all(timeout: float = 0.5) -> dict[str, StopAnswer]:
     """
-    Ask every robot of this machine to bring its torque to zero.
+    Ask every robot of this machine to bring its torque to zero, as the script ``entrain`` does.
 
-    The script ``entrain`` has asked already; then its socket is taken over, and the answers read.
-    Returns the answers by name; None for a robot that did not answer within ``timeout`` [s].
+    Returns the answers by name; one that does not come within ``timeout`` [s] is NO_ANSWER.
     """
-    if asked := os.environ.pop(_ASKED, ""):
-        descriptor, *names = asked.split()
-        asker = socket.socket(fileno=int(descriptor))
-    else:
-        asker = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as asker:
         asker.setblocking(False)
         asker.bind("")  # the kernel chooses an abstract name
         names = [name for name in listening() if _ask(asker, name)]
-    with asker:
-        answers: dict[str, StopAnswer | None] = dict.fromkeys(names)
+        answers = dict.fromkeys(names, NO_ANSWER)
         give_up = time.monotonic() + timeout
-        while None in answers.values() and (left := give_up - time.monotonic()) > 0:
+        while NO_ANSWER in answers.values() and (left := give_up - time.monotonic()) > 0:
             if select.select([asker], [], [], left)[0]:
                 data, address = asker.recvfrom(_LARGEST_ANSWER)
-                sender = (address if isinstance(address, bytes) else address.encode())[1:].decode()
-                answers[sender.removeprefix(PREFIX)] = StopAnswer(**json.loads(data))
+                sender = os.fsdecode(address or b"").removeprefix(f"\0{PREFIX}")
+                with suppress(ValueError, TypeError):  # it is of another version
+                    if sender in answers:
+                        answers[sender] = StopAnswer(**json.loads(data))
         return answers
 
 

@@ -24,28 +24,31 @@ import sys
 import time
 from typing import Any
 
-from gait_entrainment.robot.faults import (
-    DEVICE_SILENT,
-    DRIVER_FAILED,
-    HOST_LOOP_LATE,
-    STOPPED,
-    DeviceError,
-    Fault,
-)
+from gait_entrainment.robot.faults import DRIVER_FAILED, STOPPED, DeviceError, Fault
 from gait_entrainment.robot.pulse_train import PulseTrain
 from gait_entrainment_drivers.device import Reading, TorqueDevice
 from gait_entrainment_drivers.device_lock import DeviceLock
 from gait_entrainment_drivers.link import Link, Sample
-from gait_entrainment_drivers.monitor import NEAR_ZERO_SHARE, NOT_FALLING, Monitor
+from gait_entrainment_drivers.monitor import NEAR_ZERO_SHARE, NOT_FALLING, Monitor, torque_scale
 from gait_entrainment_drivers.stop_channel import StopAnswer, StopListener
 
+DEVICE_SILENT = Fault(
+    "device_silent",
+    "The device sent no reply for longer than the limit: see to its power and wiring, or to what"
+    " else loads this computer.",
+)
+HOST_LOOP_LATE = Fault(
+    "host_loop_late",
+    "The loop that times the torque woke up later than the limit: see to what else loads this"
+    " computer.",
+)
 HOST_SILENT = Fault(
     "host_silent",
     "The process that holds the robot fell silent for longer than the limit: it is frozen, or "
     "this computer is overloaded.",
 )
 # Before the device is disabled it is asked for zero torque: this often, so that a lost frame does
-# not matter, and on until its torque has run down to this share of its peak, or for this long [s].
+# not matter, and on until torque has run down to this share of its scale, or for this long [s].
 _ZERO_TICKS = 5
 _RUN_DOWN_SHARE = 0.02
 _RUN_DOWN_TIME = 0.2
@@ -64,19 +67,19 @@ class TorqueLoop:
 
     def __init__(self, link: Link, device: TorqueDevice, settings: Any) -> None:
         self._link, self._device, self._settings = link, device, settings
-        self._stop_channel = StopListener(device.name.replace(" ", "_"))
+        self._stop_channel = StopListener(device.name)
         self._period = 1 / settings.rate
         capabilities = device.capabilities
-        self._gone = _RUN_DOWN_SHARE * capabilities.peak_torque
-        self._near_zero = NEAR_ZERO_SHARE * capabilities.peak_torque
-        self._monitor = Monitor(settings, capabilities.peak_torque, capabilities.torque_bandwidth)
+        self._gone = _RUN_DOWN_SHARE * torque_scale(capabilities)
+        self._near_zero = NEAR_ZERO_SHARE * torque_scale(capabilities)
+        self._monitor = Monitor(settings, capabilities)
         self._lock: DeviceLock | None = None  # while the device is open
         self._train: PulseTrain | None = None  # onsets in steady time
         self._faults: tuple[Fault, ...] = ()
         self._enabled = self._closing = False
-        self._halted = False  # no torque until the device is opened anew
+        self._halted = False  # no torque in the life of this process any more
         self._samples: list[Sample] = []  # not handed over yet
-        self._askers: list[str | bytes] = []  # of a stop, not answered yet
+        self._askers: list[str | bytes | None] = []  # of a stop, not answered yet
         self._ended_at = math.inf  # when torque was ended [s]
         self._measured = math.nan  # torque measured last [N m]
         self._heard_at = self._answered_at = self._due = time.monotonic()
@@ -143,7 +146,7 @@ class TorqueLoop:
             return None
 
     def _end_torque(self, fault: Fault | None = None) -> None:
-        """Ask for zero torque from now on, for this reason, until the device is opened anew."""
+        """Ask for zero torque from now on, for this reason, for good."""
         self._train = None
         if not self._halted:
             self._halted, self._ended_at = True, time.monotonic()
@@ -215,7 +218,6 @@ class TorqueLoop:
             self._link.send("done", kind, error)
 
     def _open(self) -> None:
-        self._faults, self._halted, self._ended_at = (), False, math.inf
         self._lock = DeviceLock(self._device.address)
         self._device.open()
         self._link.send("identity", self._device.identity)

@@ -6,7 +6,7 @@
 import math
 import time
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from gait_entrainment.robot.faults import Fault
@@ -75,15 +75,16 @@ class MisbehavingDevice(TorqueDevice):
             time.sleep(timeout)
             return None
         return {
-            "push 12 N m": Reading(12.0, 0.1),
-            "push the wrong way": Reading(-reading.torque, 0.1),
+            "push 12 N m": replace(reading, torque=12.0),
+            "push the wrong way": replace(reading, torque=-reading.torque),
             "answer 40 ms late": self._late(reading, now),
             "repeat one reply": self._repeated(reading, does),
-            "stick at 2 rad": Reading(reading.torque, 2.0),
-            "spin": Reading(reading.torque, 0.1, 60.0),
-            "heat up": Reading(reading.torque, 0.1, 0.0, 120.0),
-            "report an error": Reading(reading.torque, 0.1, faults=(OVERHEATED,)),
-            "measure NaN": Reading(math.nan, 0.1),
+            "stick at 2 rad": replace(reading, angle=2.0),
+            "spin": replace(reading, velocity=60.0),
+            "heat up": replace(reading, temperature=120.0),
+            "report an error": replace(reading, faults=(OVERHEATED,)),
+            "measure NaN": replace(reading, torque=math.nan),
+            "lose the angle": replace(reading, angle=math.nan),
         }.get(does, reading)
 
     def _follow(self, torque: float, now: float) -> float:
@@ -96,7 +97,7 @@ class MisbehavingDevice(TorqueDevice):
         self._past.append((now, reading.torque))
         while len(self._past) > 1 and self._past[1][0] < now - 0.04:
             self._past.popleft()
-        return Reading(self._past[0][1], 0.1)
+        return replace(reading, torque=self._past[0][1])
 
     def _repeated(self, reading: Reading, does: str) -> Reading:
         if does != "repeat one reply" or self._frozen is None:

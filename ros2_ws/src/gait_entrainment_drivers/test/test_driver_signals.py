@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from gait_entrainment_drivers.signals import STOPPING
+from gait_entrainment_commands.signals import STOPPING
 
 from .emulator_process import emulator, read_trace, until
 

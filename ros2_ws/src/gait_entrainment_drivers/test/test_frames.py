@@ -24,6 +24,7 @@ from gait_entrainment_drivers.ak_mit import (
 )
 from gait_entrainment_drivers.ak_mit_can import AkMitCanOptions, AkMotorOnCan
 from gait_entrainment_drivers.ak_motor_emulator import EmulatedAkMotor
+from gait_entrainment_drivers.monitor import SECOND_MASTER
 from gait_entrainment_drivers.odrive import (
     CLEAR_ERRORS,
     CLOSED_LOOP,
@@ -57,6 +58,7 @@ class Wire:
         self.strongest = 0.0  # torque that the motor ever showed [N m]
         self.waiting = []
         self.lost = set()  # ids of frames that get lost on the way to the motor
+        self.echo = False  # the adapter returns what was sent
         self.now = 0.0
 
     def send(self, message):
@@ -70,6 +72,9 @@ class Wire:
             message.arbitration_id, data, remote=message.is_remote_frame, now=self.now
         )
         self.motor.advance(self.now + 0.5)
+        if not message.is_remote_frame:
+            self.command = message
+            self.waiting += [message] * self.echo
         self.strongest = max(self.strongest, abs(self.motor.torque))
         self.waiting += [
             can.Message(arbitration_id=identifier, data=answer, is_extended_id=False)
@@ -148,6 +153,27 @@ def test_an_odrive_whose_heartbeat_stays_away_is_a_fault_by_name(monkeypatch):
     wire.lost.add(frame_id(0, HEARTBEAT))
     monkeypatch.setattr(odrive_can, "HEARTBEAT_LOST", 0.0)
     assert faults_of(robot) == (odrive_can.NO_HEARTBEAT,)
+
+
+def test_an_odrive_that_tells_its_angle_no_longer_does_not_stay_at_it(monkeypatch):
+    robot, wire = odrive()
+    robot.enable()
+    assert [robot.exchange(0.0, 0.01), robot.exchange(0.0, 0.01)][1].angle == 0.0
+    wire.lost.add(frame_id(0, ENCODER))
+    monkeypatch.setattr(odrive_can, "HEARTBEAT_LOST", 0.0)
+    assert math.isnan(robot.exchange(0.0, 0.01).angle)
+
+
+@pytest.mark.parametrize("make", [ak, odrive])
+@pytest.mark.parametrize("echo", [False, True])
+def test_who_sends_the_very_same_commands_is_a_second_master_an_echo_is_none(make, echo):
+    robot, wire = make()
+    robot.enable()
+    for tick in range(150):
+        wire.echo = echo and tick % 3 > 0  # some get lost
+        assert SECOND_MASTER not in robot.exchange(0.0, 0.01).faults
+    wire.waiting += [wire.command] * (120 if echo else 1)
+    assert SECOND_MASTER in robot.exchange(0.0, 1.0).faults
 
 
 @pytest.mark.parametrize("error", [HOT, 0])

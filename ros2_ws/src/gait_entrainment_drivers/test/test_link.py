@@ -44,3 +44,15 @@ def test_what_several_threads_send_comes_once_and_in_their_order(ends):
         thread.join()
     for name in ("alive", "stop", "cancel"):
         assert [number for kind, number in received if kind == name] == list(range(COUNT))
+
+
+def test_a_message_longer_than_the_sockets_buffer_comes_whole_and_a_stop_behind_it(ends):
+    ours, theirs = ends
+    train = "x" * 1_000_000
+    ours.send("train", train)
+    ours.send("stop")
+    received = []
+    while len(received) < 2:
+        received += theirs.received()
+        ours.send_samples([])
+    assert received == [("train", train), ("stop",)]

@@ -4,6 +4,7 @@
 """What was proved of a robot is remembered for exactly its options, and never makes a fuss."""
 
 import json
+import socket
 from importlib.metadata import version
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import pytest
 from gait_entrainment.robot import DeviceError
 from gait_entrainment_drivers.proof import keep_proof, proof_of
 
+KEY = f"{socket.gethostname()}/x:"  # of the driver x
 ROBOT = r"ak_mit_can:channel=can0,note=a\,b"
 
 
@@ -41,10 +43,19 @@ def test_only_the_same_options_are_the_same_robot():
         assert proof_of(other) is None
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", "3", '{"x:": 3}', '{"x:": {"within": 1}}', "\0"])
+def test_what_was_proved_on_another_computer_with_the_same_home_proves_nothing(state, monkeypatch):
+    keep_proof(ROBOT, 0.05)
+    monkeypatch.setattr("socket.gethostname", lambda: "another")
+    assert state.exists()
+    assert proof_of(ROBOT) is None
+
+
+@pytest.mark.parametrize(
+    "text", ["", "{", "[]", "3", '{"KEY": 3}', '{"KEY": {"within": 1}}', "\0"]
+)
 def test_a_file_that_cannot_be_read_proves_nothing_and_is_replaced(state, text):
     state.parent.mkdir()
-    state.write_text(text)
+    state.write_text(text.replace("KEY", KEY))
     assert proof_of("x") is None
     keep_proof("x", 0.05)
     assert proof_of("x").within == 0.05
@@ -72,4 +83,4 @@ def test_without_a_state_folder_it_is_in_the_home(tmp_path, monkeypatch):
     monkeypatch.setenv("HOME", str(tmp_path))
     keep_proof("x", 0.05)
     file = tmp_path / ".local/state/gait_entrainment/proofs.json"
-    assert json.loads(file.read_text())["x:"]["within"] == 0.05
+    assert json.loads(file.read_text())[KEY]["within"] == 0.05

@@ -6,15 +6,20 @@
 import math
 import os
 import signal
+import socket
 import time
 
 import pytest
-from misbehaving_device import PEAK, MisbehavingOptions, MisbehavingRobot
+from misbehaving_device import PEAK, MisbehavingDevice, MisbehavingOptions, MisbehavingRobot
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.robot import DeviceError, PulseTrain
 from gait_entrainment.robot.guard import GuardedRobot
-from gait_entrainment_drivers.stop_channel import listening, stop_all
+from gait_entrainment_drivers.host_timed import LoopOptions
+from gait_entrainment_drivers.link import Link
+from gait_entrainment_drivers.monitor import Monitor, MonitorSettings
+from gait_entrainment_drivers.stop_channel import NO_ANSWER, listening, stop_all
+from gait_entrainment_drivers.torque_loop import TorqueLoop
 
 from .emulator_process import until
 
@@ -89,6 +94,7 @@ def bench(tmp_path):
         ("heat up", "too_hot"),
         ("report an error", "overheated"),
         ("measure NaN", "reading_not_finite"),
+        ("lose the angle", "reading_not_finite"),
         ("answer no more", "device_silent"),
         ("raise", "driver_failed"),
     ],
@@ -178,14 +184,37 @@ def test_a_stop_of_a_motor_that_goes_on_pushing_says_to_cut_the_power(bench):
     device.until(lambda: "torque_not_falling" in device.faults())
 
 
-def test_a_frozen_loop_gives_no_answer(bench):
-    device = bench()
+def test_a_frozen_loop_gives_no_answer_and_is_named(bench):
+    device = bench(host_silence=0.1)
+    device.push()
     pid = device.driver._process.pid
     os.kill(pid, signal.SIGSTOP)
     try:
-        assert stop_all(0.2)[f"bench_device/{pid}"] is None
+        assert stop_all(0.2)[f"bench_device/{pid}"] is NO_ANSWER
+        device.until(device.faults)
+        assert device.faults() == ["torque_loop_silent"]
     finally:
         os.kill(pid, signal.SIGCONT)
+    asked = len(device.commands())
+    device.until(lambda: len(device.commands()) > asked + 20)
+    assert {torque for _, torque in device.commands()[asked:]} == {0.0}
+
+
+def test_a_stop_that_comes_before_the_device_is_opened_is_not_forgotten():
+    options = MisbehavingOptions()
+    ours, theirs = map(Link, socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET))
+    loop = TorqueLoop(theirs, MisbehavingDevice(options), options)
+    stop_all(0.0)
+    for step in ("open", "enable"):
+        ours.send(step)
+    loop._listen()
+    ours.send("train", PulseTrain.periodic(Side.LEFT, time.monotonic_ns(), 1.0, 1, HEIGHT, 1.0))
+    loop._tick()
+    assert loop._samples == []  # sent
+    *_, (_, (sample,)) = ours.received()
+    assert sample.commanded == 0.0
+    loop._closing = True
+    loop.serve()
 
 
 def test_a_closed_robot_listens_no_more(bench):
@@ -204,6 +233,13 @@ def test_the_last_thing_before_disabling_is_zero(bench):
     *commands, disabled = [torque for _, torque in device.commands()]
     assert math.isnan(disabled)
     assert commands[-5:] == [0.0] * 5
+
+
+def test_a_strong_motor_is_judged_by_what_a_person_is_to_feel():
+    bands = [
+        Monitor(MonitorSettings(), LoopOptions().capabilities(peak)).band for peak in (18.0, 390.0)
+    ]
+    assert bands == pytest.approx([0.12 * 18, 0.12 * 30])
 
 
 def test_peak_of_the_bench_device_is_above_what_is_asked_for():

@@ -12,10 +12,17 @@ import pytest
 from gait_entrainment_nodes.messaging import environment
 from gait_entrainment_nodes.messaging.environment import (
     UnusableEnvironmentError,
+    dds_variables,
     require_usable_environment,
 )
 
-VARIABLES = ("RMW_IMPLEMENTATION", "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOG_DIR", "ROS_HOME")
+VARIABLES = (
+    "RMW_IMPLEMENTATION",
+    "ROS_AUTOMATIC_DISCOVERY_RANGE",
+    "FASTRTPS_DEFAULT_PROFILES_FILE",
+    "ROS_LOG_DIR",
+    "ROS_HOME",
+)
 
 
 @pytest.fixture(autouse=True)
@@ -66,3 +73,18 @@ def test_full_shared_memory_is_named(variables):
     variables.setattr(environment.shutil, "disk_usage", lambda _: used._replace(free=4096))
     with pytest.raises(UnusableEnvironmentError, match="/dev/shm is full"):
         require_usable_environment()
+
+
+@pytest.mark.parametrize("left_over", ["SYSTEM_DEFAULT", "LOCALHOST"])
+def test_what_a_run_has_chosen_is_no_wish_of_the_next(left_over, variables):
+    first = dds_variables(real_time=False)
+    paced = dds_variables(real_time=True)
+    assert first != paced
+    for name, value in {**paced, "ROS_AUTOMATIC_DISCOVERY_RANGE": left_over}.items():
+        variables.setenv(name, value)
+    assert dds_variables(real_time=False) == first
+    assert dds_variables(real_time=True) == paced
+    variables.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET")
+    variables.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", "/mine.xml")
+    for real_time in (False, True):
+        assert set(dds_variables(real_time=real_time).values()) == {"SUBNET", "/mine.xml"}

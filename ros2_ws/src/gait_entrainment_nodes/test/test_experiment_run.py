@@ -188,7 +188,7 @@ def test_in_real_time_each_owes_what_it_does_by_itself():
     bench.begin()
     bench.promise(valid_until=to_time(10 * SECOND + 1))
     for k in range(3):  # the walk goes on, and the robot tells no more
-        bench.report(10 * SECOND + k)
+        bench.report((10 + k) * SECOND)
         assert bench.after(1.0) is None
     assert blamed(bench.after(0.1)) == ("perturbator has been silent for 3 s", "perturbator")
 
@@ -229,6 +229,23 @@ def test_a_walker_that_ends_before_the_protocol_does_has_failed(bench):
     bench.report(10 * SECOND + HALF, state=Progress.FINISHED)
     expected = "walker_sim ended the run after 0 strides of 4"
     assert blamed(bench.run.failure) == (expected, "walker_sim")
+
+
+@pytest.mark.parametrize("pace", [1.0, 0.9, 0.0, -1.0])
+def test_a_walk_that_stands_still_or_lags_is_as_good_as_silent(monkeypatch, pace):
+    monkeypatch.setattr("time.time_ns", lambda: 10 * SECOND)
+    bench = Bench(real_time=True)
+    bench.begin()
+    for tick in range(100):
+        bench.report(round((10 + pace * tick) * SECOND))
+        bench.promise()
+        if bench.after(1.0):
+            break
+    if pace == 1.0:
+        assert bench.run.failure is None
+    else:
+        assert blamed(bench.run.failure) == ("walker_sim has been silent for 3 s", "walker_sim")
+        assert (1 - pace) * tick < 0.5 + TIMEOUT + 1.0 + 0.1
 
 
 def test_a_source_may_count_from_before_it_was_asked(monkeypatch):

@@ -12,6 +12,7 @@ stop.
 
 import errno
 import ipaddress
+import math
 import os
 import secrets
 import socket
@@ -19,7 +20,6 @@ import sys
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from http.cookies import SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -61,9 +61,10 @@ class Access:
         return cls(host, {look_token or made(8): LOOK, token or made(8): ACT})
 
     @classmethod
-    def of_environment(cls, host: str) -> "Access":
-        """Return the access with the tokens of the environment, where no other user sees them."""
-        return cls.of(host, *os.environ.get(TOKENS_VARIABLE, "").split())
+    def of_environment(cls, host: str, token: str = "") -> "Access":
+        """Return the access with the tokens of the environment, unless another one is chosen."""
+        tokens = [token] if token else os.environ.get(TOKENS_VARIABLE, "").split()[:2]
+        return cls.of(host, *tokens)
 
     @property
     def environment(self) -> dict[str, str]:
@@ -97,15 +98,19 @@ class Access:
                 found = role
         return found
 
-    def knows(self, name: str) -> bool:
-        """Whether a name in a request is one of this host, and not one that leads to it."""
+    def knows(self, place: str) -> bool:
+        """Whether a place in a request has a name of this host, not one that leads to it."""
+        try:
+            name = urlsplit(f"//{place}").hostname or ""
+        except ValueError:  # nor any name at all
+            return False
         if self.host in LOOPBACK:
             return name in LOOPBACK
         try:
             ipaddress.ip_address(name)
         except ValueError:
-            own = socket.gethostname()
-            return name in {self.host, "localhost", own, f"{own}.local"}
+            own = socket.gethostname().lower()
+            return name in {self.host.lower(), "localhost", own, f"{own}.local"}
         return True
 
 
@@ -121,9 +126,9 @@ class Gate:
             await self._app(scope, receive, send)
             return
         headers = {k.decode("latin-1"): v.decode("latin-1") for k, v in scope["headers"]}
-        cookies = {
-            key: morsel.value for key, morsel in SimpleCookie(headers.get("cookie", "")).items()
-        }
+        # Beside ours come those of whatever else this host serves, which need not be well-formed.
+        pairs = (pair.strip().partition("=") for pair in headers.get("cookie", "").split(";"))
+        cookies = {name: value for name, _, value in pairs}
         if refusal := self._refusal(scope, headers):
             await _answer(scope, send, 403, refusal)
             return
@@ -137,11 +142,9 @@ class Gate:
                 scope, send, 401, f"{wrong}: open the address that entrain page has printed"
             )
             return
-        if given and scope["type"] == "http":
+        if given and self._access.tokens and scope["type"] == "http":
             cookie = self._cookie(_TOKEN, given)
-            await _answer(
-                scope, send, 303, "", [("location", scope["path"]), ("set-cookie", cookie)]
-            )
+            await _answer(scope, send, 303, "", [("location", "/"), ("set-cookie", cookie)])
             return
         browser = cookies.get(self._name(_BROWSER), "")
         cookie = ""
@@ -150,20 +153,21 @@ class Gate:
             cookie = self._cookie(_BROWSER, browser)
         scope.setdefault("state", {}).update(role=role, browser=browser)
 
-        async def send_with_cookie(message: Any) -> None:
-            if cookie and message["type"] == "http.response.start":
-                message["headers"] = [*message["headers"], (b"set-cookie", cookie.encode())]
+        async def send_more(message: Any) -> None:
+            if message["type"] == "http.response.start":
+                more = [(b"x-frame-options", b"DENY")]  # a click within another site's page acts
+                more += [(b"set-cookie", cookie.encode())] if cookie else []
+                message["headers"] = [*message["headers"], *more]
             await send(message)
 
-        await self._app(scope, receive, send_with_cookie)
+        await self._app(scope, receive, send_more)
 
     def _refusal(self, scope: Any, headers: dict[str, str]) -> str:
         """Return why a request is refused, whoever makes it; an empty text if it is not."""
         host = headers.get("host", "")
-        if not self._access.knows(urlsplit(f"//{host}").hostname or ""):
+        if not self._access.knows(host):
             return "this host has another name: open the address that entrain page has printed"
-        origin = headers.get("origin")
-        if origin is not None and urlsplit(origin).netloc != host:
+        if headers.get("origin", f"http://{host}").partition("://")[2] != host:
             return "another site must not use this page"
         navigates = headers.get("sec-fetch-mode") == "navigate" and scope.get("method") == "GET"
         if headers.get("sec-fetch-site") in ("cross-site", "same-site") and not navigates:
@@ -174,7 +178,8 @@ class Gate:
         return f"{cookie}_{self._port}"
 
     def _cookie(self, name: str, value: str) -> str:
-        return f"{self._name(name)}={value}; Path=/; HttpOnly; SameSite=Strict"
+        # Lax: a link elsewhere that leads here finds the same browser, with its seat and token.
+        return f"{self._name(name)}={value}; Path=/; HttpOnly; SameSite=Lax"
 
 
 async def _answer(
@@ -194,24 +199,22 @@ class Seat:
     """
     The operator's seat: one browser acts at a time, until another takes over.
 
-    ``timeout`` is how long a browser may be silent before it counts as away [s].
+    ``timeout`` is how long its holder may be silent before it counts as away [s].
     """
 
     def __init__(self, timeout: float) -> None:
         self.timeout = timeout
         self.holder = ""
-        self._heard: dict[str, float] = {}  # by browser, steady time [s]
+        self._heard_at = -math.inf  # steady time [s]
 
     def heard(self, browser: str, *, watching: bool) -> None:
         """Note a sign of life; a page that is closed or hidden gives none from now on."""
-        if watching:
-            self._heard[browser] = time.monotonic()
-        else:
-            self._heard.pop(browser, None)
+        if browser == self.holder:
+            self._heard_at = time.monotonic() if watching else -math.inf
 
     def take(self, browser: str) -> None:
-        """Take the seat, whoever has it."""
-        self.holder = browser
+        """Take the seat, whoever has it, by a click: a sign of life itself."""
+        self.holder, self._heard_at = browser, time.monotonic()
 
     def offer(self, browser: str) -> None:
         """Take the seat if nobody has it."""
@@ -220,7 +223,7 @@ class Seat:
     @property
     def watched(self) -> bool:
         """Whether the operator's page is open, in front and answers."""
-        return time.monotonic() - self._heard.get(self.holder, -1e9) < self.timeout
+        return time.monotonic() - self._heard_at < self.timeout
 
 
 def listen(host: str, port: int, option: str = "--port") -> socket.socket:
@@ -233,9 +236,10 @@ def listen(host: str, port: int, option: str = "--port") -> socket.socket:
         listener.listen(128)
     except OSError as error:
         listener.close()
-        if error.errno == errno.EADDRINUSE:
-            taken = f"{option}: {port} is taken by another program"
-            raise UsageError(f"{taken}; choose another, or 0 for a free one") from None
+        causes = {errno.EADDRINUSE: "taken by another program", errno.EACCES: "for root alone"}
+        if (cause := causes.get(error.errno or 0)) is not None:
+            told = f"{option}: {port} is {cause}; choose another, or 0 for a free one"
+            raise UsageError(told) from None
         raise UsageError(
             f"--host: {host}: {error.strerror}; allowed: an address of here"
         ) from None

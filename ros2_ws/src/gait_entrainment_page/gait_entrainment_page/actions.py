@@ -3,10 +3,13 @@
 
 """What is done from the page: the stop, and the commands that it starts."""
 
+import asyncio
 import os
 import subprocess
 import tempfile
+import threading
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Protocol
 
@@ -14,6 +17,9 @@ from gait_entrainment.errors import EntrainmentError
 from gait_entrainment_drivers.stop_channel import stop_all
 
 _TOLD = 12  # last lines of a command
+_PULSES = "ok    limits"  # how the line of a checklist begins that tells the pulses
+# Threads of the stop alone, which no other action takes, and those that it waits for.
+_STOPS, _ASKED = ThreadPoolExecutor(16, "stop"), ThreadPoolExecutor(16, "ask")
 
 
 class ActionError(EntrainmentError):
@@ -42,17 +48,26 @@ def stop(nodes: Nodes | None) -> list[str]:
     """
     Bring every robot of this machine to zero torque, as `entrain stop` does; return the answers.
 
-    If this machine drives none, that of another one is asked over ROS.
+    The one that the page shows may be driven by another machine: it is asked over ROS, too, and
+    its answer is waited for if this machine drives none.
     """
+    asked = None
+    if nodes is not None and "stop" in nodes.offered():
+        asked = _ASKED.submit(attempted, partial(nodes.ask, "stop"))
     answers = stop_all()
-    lines = [f"{name}: {a.message if a else 'no answer'}" for name, a in answers.items()]
-    done = all(answer and answer.done for answer in answers.values())
+    lines = [f"{name}: {answer.message}" for name, answer in answers.items()]
+    done = all(answer.done for answer in answers.values())
     if not answers:
-        if nodes is None or "stop" not in nodes.offered():
+        if asked is None:
             return ["no robot is driven by this machine"]
-        done, answer = attempted(partial(nodes.ask, "stop"))
+        done, answer = asked.result()
         lines = [f"asked over ROS: {answer}"]
     return lines if done else [*lines, "not everybody confirmed the stop: cut the power"]
+
+
+async def stop_at_once(nodes: Nodes | None) -> list[str]:
+    """Stop as ``stop`` does, whatever else the web server waits for."""
+    return await asyncio.get_running_loop().run_in_executor(_STOPS, stop, nodes)
 
 
 class Command:
@@ -68,6 +83,7 @@ class Command:
         self.words = tuple(words)
         self._heartbeat = ("--heartbeat",) if heartbeat else ()
         self._process: subprocess.Popen[bytes] | None = None
+        self._starting = threading.Lock()
         self._output = tempfile.TemporaryFile()  # noqa: SIM115, as long as the page
         self.name = ""
 
@@ -78,31 +94,33 @@ class Command:
 
     def start(self, *, preflight: bool = False) -> str:
         """Start it, or its checklist; ActionError if one of them goes on."""
-        if self.runs:
-            raise ActionError(f"entrain {self.name} goes on: wait for its end, or stop it")
         kind, *options = self.words
         words = [*self.words, *self._heartbeat]
         if preflight:
             session = ["--session"] if kind == "session" else []
             words = ["preflight", *session, *options]
-        self.name = words[0]
-        self._output.seek(0)
-        self._output.truncate()
-        self._process = subprocess.Popen(
-            ["entrain", *words],
-            env={**os.environ, "PYTHONUNBUFFERED": "1"},  # each line as it is printed
-            stdin=subprocess.DEVNULL,
-            stdout=self._output,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-        )
+        with self._starting:  # a double click comes in two threads
+            if self.runs:
+                raise ActionError(f"entrain {self.name} goes on: wait for its end, or stop it")
+            self.name = words[0]
+            self._output.seek(0)
+            self._output.truncate()
+            self._process = subprocess.Popen(
+                ["entrain", *words],
+                env={**os.environ, "PYTHONUNBUFFERED": "1"},  # each line as it is printed
+                stdin=subprocess.DEVNULL,
+                stdout=self._output,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+            )
         return f"entrain {self.name} has started"
 
     def told(self, *, outcome: bool = True) -> list[str]:
         """
         Return the last lines that the command has printed, and how it ended.
 
-        Without ``outcome`` only the latter of a run that ended well: the rest tells the condition.
+        Without ``outcome`` nothing that tells the condition: of a run that ended well only the
+        latter, of a checklist not what is asked for.
         """
         if self._process is None:
             return []
@@ -112,6 +130,7 @@ class Command:
         code = self._process.poll()
         if self.name == "run" and not (outcome or code):
             lines = []
+        lines = [line for line in lines if outcome or not line.startswith(_PULSES)]
         if code is not None:
             lines.append(f"entrain {self.name} has ended with exit code {code}")
         return lines

@@ -69,8 +69,11 @@ class BagSource:
         self.show(self.end)
 
     def show(self, instant: int) -> None:
-        """Bring the view to an instant [ns]."""
+        """Bring the view to an instant [ns], unless another is asked for before its turn comes."""
+        self._asked_for = instant
         with self._lock:  # of the reader: the view stays free meanwhile
+            if instant != self._asked_for:
+                return
             samples = self._samples(instant)
             fresh = View(blinded=self.view.blinded)
             fresh.version = self.view.version + 1

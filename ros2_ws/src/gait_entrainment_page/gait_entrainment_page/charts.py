@@ -45,9 +45,8 @@ def period_chart(view: View) -> Options:
 def lag_chart(view: View) -> Options:
     """Return the phase lag over the strides, double stance shaded, in ms and % of the stride."""
     lags: Points = [[n, 1e3 * lag] for n, lag in view.lags]
-    series = [
-        _line("phase lag: pulse onset minus toe-off", lags, BLACK, symbol="circle", symbolSize=7)
-    ]
+    name = f"phase lag: pulse onset minus {view.lag_refers_to}"
+    series = [_line(name, lags, BLACK, symbol="circle", symbolSize=7)]
     series[0]["lineStyle"]["width"] = 1
     stance = 1e3 * statistics.median(view.stances) if view.stances else math.nan
     values = [lag for _, lag in lags] + [0.0]

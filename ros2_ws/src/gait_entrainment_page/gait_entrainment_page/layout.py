@@ -20,7 +20,7 @@ from nicegui import ui
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment_page.access import ACT, Access, Seat, one_line
-from gait_entrainment_page.actions import Command, Nodes, attempted, stop
+from gait_entrainment_page.actions import Command, Nodes, attempted, stop_at_once
 from gait_entrainment_page.bag_source import BagSource
 from gait_entrainment_page.charts import lag_chart, period_chart, torque_chart
 from gait_entrainment_page.server import Server, state_of
@@ -32,9 +32,9 @@ _WORDS = 5
 _CHARTS = 10
 # Less room than this on the disk of the record is told as a warning [bytes].
 _LITTLE = 2 * 10**9
-_HEAD = (
-    """<link rel="stylesheet" href="/static/page.css"><script src="/static/page.js"></script>"""
-)
+_HEAD = """<link rel="stylesheet" href="/static/page.css?{0}">
+<script src="/static/page.js?{0}"></script>""".format(time.time_ns())  # never an earlier version
+_WATCHING = {b"watching": True, b"gone": False}
 _OF_SESSION = {
     "pause": "Pause before the next block",
     "go_on": "Go on",
@@ -51,25 +51,12 @@ _HEARTBEAT = (
 
 class Page:
     """
-    The page, served from when it is made until it is closed; it tells people where.
+    The page, served at a socket from when it is made until it is closed; it tells people where.
 
-    Parameters
-    ----------
-    view
-        Gives the view that is shown.
-    seat, access
-        Who acts, and who may.
-    listener
-        The socket to serve at.
-    nodes, command
-        What can be asked of the nodes, and what can be started; None for a bag.
-    heartbeat
-        Whether the page is the operator's sign of life.
-    record
-        Folder of the record, whose disk is looked after.
-    bag
-        The bag that is shown, if it is none of a live run.
-
+    ``view`` gives the view that is shown; ``seat`` and ``access`` say who acts, and who may;
+    ``nodes`` and ``command`` what can be asked of the nodes, and started, None for a ``bag``.
+    ``heartbeat`` is whether the page is the operator's sign of life, ``record`` the folder whose
+    disk is looked after.
     """
 
     def __init__(
@@ -93,7 +80,13 @@ class Page:
         app.add_api_route("/alive", self._alive, methods=["POST"])
         app.mount("/static", StaticFiles(directory=Path(__file__).with_name("static")))
         ui.page("/", title="gait_entrainment")(self._show)
-        ui.run_with(app, show_welcome_message=False, binding_refresh_interval=None, tailwind=False)
+        ui.run_with(
+            app,
+            language="en-US",
+            show_welcome_message=False,
+            binding_refresh_interval=None,
+            tailwind=False,
+        )
         self._server = Server(app, listener, access)
         access.tell(self._server.port)
 
@@ -105,14 +98,16 @@ class Page:
 
     async def _stop(self) -> list[str]:
         """Stop every robot of this machine; whoever may look may stop."""
-        return await asyncio.to_thread(stop, self.nodes)
+        return await stop_at_once(self.nodes)
 
     async def _alive(self, request: Request) -> dict[str, float]:
         role, browser = state_of(request)
-        watching = (await request.body()) == b'{"watching":true}'
+        # A page in the background says neither: another one of its browser may be in front.
+        watching = _WATCHING.get(await request.body())
         if watching and role == ACT:
             self.seat.offer(browser)
-        self.seat.heard(browser, watching=watching)
+        if watching is not None:
+            self.seat.heard(browser, watching=watching)
         return {"now": 1e3 * time.time()}
 
     # The page
@@ -160,21 +155,23 @@ class Shown:
 
     def build(self) -> None:
         """Make the elements."""
-        with ui.element("div").classes("top"):
-            self._fact("part", "part of the protocol")
-            self._fact("stride", "stride")
-            self._fact("left", "time left")
-            ui.element("div").classes("grow")
-            self._fact("measured", "torque measured")
-            ui.html('<button id="stop" type="button">STOP</button>', sanitize=False)
-        for banner in ("told", "lost"):
-            ui.element("div").classes("banner alarm").props(f'id="{banner}" role="alert"')
+        with ui.element("header"):
+            with ui.element("div").classes("top"):
+                with ui.element("div").classes("facts"):
+                    self._fact("part", "part of the protocol")
+                    self._fact("stride", "stride")
+                    self._fact("left", "time left")
+                    ui.element("div").classes("grow")
+                    self._fact("measured", "torque measured")
+                ui.html('<button id="stop" type="button">STOP</button>', sanitize=False)
+            for banner in ("told", "lost"):
+                ui.element("div").classes("banner alarm").props(f'id="{banner}" role="alert"')
+            self._label("alarm", "banner alarm")
         ui.element("div").classes("banner warn").props('id="clock"')
         if self.page.heartbeat:
             self._label("heartbeat", "banner warn", _HEARTBEAT)
         if self.page.view().blinded:
             self._label("blinded", "banner warn", _BLINDED)
-        self._label("alarm", "banner alarm")
         if self.page.bag is not None:
             self._seek(self.page.bag)
         with ui.element("div").classes("panels"):
@@ -328,7 +325,7 @@ class Shown:
             self._set("lag", f"lag {view.lag()}")
         alarm = state.message if view.part == "failed" else ""
         if faults := view.faults():
-            alarm = f"Robot: {faults}. {view.measured()} measured. {alarm}"
+            alarm = f"Robot: {faults}. Measured: {view.measured()}. {alarm}"
         self._set("alarm", alarm)
         if bag is not None:
             self._set("instant", _clock((view.now - bag.start) / NANOSECONDS_PER_SECOND))
@@ -354,7 +351,7 @@ class Shown:
         command, nodes = self.page.command, self.page.nodes
         offered = nodes.offered() if nodes is not None else set()
         going_on = view.going_on or (command is not None and command.runs)
-        session, waits = view.session(time.monotonic())
+        session, waits = view.session()
         self._set("session", session)
         self.labels["session"].classes(replace="said waits" if waits else "said")
         usable = {"preflight": not going_on, "start": not going_on, "note": True}
@@ -371,11 +368,9 @@ class Shown:
         self._tell_script()
 
     def _tell_script(self) -> None:
-        acting = self.page.heartbeat and self.acts
-        if acting != getattr(self, "_told_script", None):
-            self._told_script = acting
-            told = json.dumps({"heartbeat": self.page.heartbeat, "acting": acting})
-            ui.run_javascript(f"Object.assign(entrain, {told})")
+        """Tell the script what it must know, and that what is shown is of now."""
+        told = {"heartbeat": self.page.heartbeat, "acting": self.acts}
+        ui.run_javascript(f"entrain.told({json.dumps(told)})")
 
     def _record_words(self, view: View) -> list[tuple[str, str]]:
         if self.page.bag is not None:
@@ -395,7 +390,7 @@ class Shown:
             rows.append(("disk", f"{free / 1e9:.1f} GB free{little}"))
         rows += [
             (name.rpartition("/")[2], f"{level}: {message}" if level != "ok" else message)
-            for name, level, message in view.node_words(time.monotonic())
+            for name, level, message in view.node_words()
             if not name.endswith(("bag_recorder", "operator_page", SESSION))
         ]
         return rows

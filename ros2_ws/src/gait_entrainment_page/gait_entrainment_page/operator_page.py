@@ -24,6 +24,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
+from gait_entrainment.errors import UsageError
 from gait_entrainment.settings import setting, settings_of
 from gait_entrainment_msgs.msg import Note
 from gait_entrainment_msgs.srv import AskSession
@@ -92,6 +93,10 @@ class Settings:
     record: str = setting("", "folder of the record, whose disk is looked after")
     command: tuple[str, ...] = texts("words of the entrain run or session that the page may start")
 
+    def __post_init__(self) -> None:
+        if self.blinded and self.foxglove:
+            raise UsageError("foxglove: offers what a blinded page hides; allowed: 0")
+
 
 class OperatorPage(Participant):
     """ROS side of the page."""
@@ -104,7 +109,7 @@ class OperatorPage(Participant):
         super().__init__("operator_page")
         self.begin_participation(settings=Settings, fixed=settings_of(Settings))
         settings = self.settings
-        self.view = View(blinded=settings.blinded)
+        self.view = View(blinded=settings.blinded, clock=time.monotonic)
         access = Access.of_environment(settings.host)
         listener = listen(settings.host, settings.port)
         self._foxglove: Any = None
@@ -184,7 +189,7 @@ class OperatorPage(Participant):
         if self._foxglove is not None:
             self._foxglove.send(topic, data, received)
         if topic is topics.DIAGNOSTICS:
-            self.view.take_diagnostics(message, time.monotonic())
+            self.view.take_diagnostics(message)
             return
         self.view.take(topic.name, message)
         if topic is topics.GAIT_EVENTS:

@@ -17,17 +17,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from gait_entrainment.conventions import (
-    NANOSECONDS_PER_SECOND,
-    EventKind,
-    Side,
-    nanoseconds_of,
-)
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side, nanoseconds_of
 from gait_entrainment.gait.verdict import Reason, Verdict
-from gait_entrainment.robot import DeviceError, DeviceLimits, LimitError, find_driver
+from gait_entrainment.robot import DeviceError, DeviceLimits, find_driver
 from gait_entrainment.settings import settings_of
 from gait_entrainment_bags import topic_names as names
-from gait_entrainment_bags.messages import MessageError, event_of, member_of, side_of, state_of
+from gait_entrainment_bags.messages import MessageError, event_of, state_of
 from gait_entrainment_commands.outcome import MEANINGS
 
 # Strides and pulses in the charts: more would not be told apart on a screen.
@@ -39,7 +34,10 @@ _EVENTS_COUNTED = 10
 _LINES_KEPT = 8
 # States of a node come once a second; without one for so long it is called silent [s], as in rqt.
 STALE_AFTER = 5.0
+# A torque that was measured longer ago is told with its age [s].
+_OLD = 1.0
 PARTS = ("waiting", "baseline", "pulses", "washout", "finished", "failed", "rest")
+_OVER = ("finished", "failed")
 STATUSES = ("inactive", "active", "stopped", "fault")
 _ACTIVE = STATUSES.index("active")
 _LEVELS = ("ok", "warning", "error", "stale")
@@ -58,7 +56,7 @@ class NodeState:
     level: str  # ok, warning, error or stale
     message: str
     values: dict[str, str]
-    heard_at: float  # on the clock of whoever calls [s]
+    heard_at: float  # on the clock of the view [s]
 
 
 class View:
@@ -67,11 +65,13 @@ class View:
 
     Stamps are nanoseconds, as recorded; ``version`` grows with what the charts are made of. A
     ``blinded`` one says nothing of the robot and the protocol by which a block would be known; its
-    charts, lag and verdict are not to be shown.
+    charts, lag and verdict are not to be shown. The ``clock`` [s] tells how long ago something was
+    heard; without one it is the time of the record.
     """
 
-    def __init__(self, *, blinded: bool = False) -> None:
+    def __init__(self, *, blinded: bool = False, clock: Callable[[], float] | None = None) -> None:
         self.lock, self.blinded = threading.RLock(), blinded
+        self._clock = clock or (lambda: self.now / NANOSECONDS_PER_SECOND)
         self._take: dict[str, Callable[[Any], None]] = {
             names.EXPERIMENT_STATE: self._on_state,
             names.STRIDES: self._on_stride,
@@ -87,6 +87,9 @@ class View:
         self.version = 0
         self.nodes: dict[str, NodeState] = {}
         self.notes: deque[tuple[int, str, str]] = deque(maxlen=_LINES_KEPT)
+        # A run that follows may be told of after the robot that it uses.
+        self.setup: Any = None  # latest AnkleRobotSetup
+        self.simulated = False  # the robot: what it measures is computed
         self._reset()
 
     def _reset(self) -> None:
@@ -97,12 +100,12 @@ class View:
         self.strides: deque[tuple[int, float]] = deque(maxlen=STRIDES_SHOWN)  # number, period [s]
         # Of each pulse: stride, phase lag [s].
         self.lags: deque[tuple[int, float]] = deque(maxlen=STRIDES_SHOWN)
+        self.lag_refers_to = "toe-off"  # or the heel strike, where no toe-offs are detected
         # The latest double stances before a toe-off of the perturbed leg [s].
         self.stances: deque[float] = deque(maxlen=_EVENTS_COUNTED)
         self.verdict: Any = None  # latest Entrainment
         self.robots: dict[Side, Any] = {}  # latest AnkleRobotState of each ankle that has one
-        self.setup: Any = None  # latest AnkleRobotSetup
-        self.simulated = False  # the robot: what it measures is computed
+        self._heard_at: dict[Side, float] = {}  # when it came
         self.legs: tuple[float, ...] = ()  # hips and ankles, left and right [rad]
         self.event: Any = None  # latest GaitEvent
         self.events = 0
@@ -119,34 +122,36 @@ class View:
     def take(self, topic: str, message: Any) -> None:
         """Take a message of a topic, by its relative name; one without a meaning is left out."""
         if (run := getattr(message, "run", 0)) and self.state is not None:
-            if run < self.state.run:
-                return
-            if run > self.state.run:
+            # Runs of another command are counted anew, and its state comes from one node.
+            if run > self.state.run or (topic == names.EXPERIMENT_STATE and self._begins(message)):
                 self._reset()
-        try:
-            self._take[topic](message)
-        except MessageError:
-            return
+            elif run < self.state.run:
+                return
         if hasattr(message, "header"):
             self.now = max(self.now, nanoseconds_of(message.header.stamp))
+        with contextlib.suppress(MessageError, ValueError):
+            self._take[topic](message)
 
-    def take_diagnostics(self, message: Any, heard_at: float) -> None:
-        """Take what nodes say of themselves; ``heard_at`` is any clock's time [s]."""
+    def _begins(self, state: Any) -> bool:
+        """Whether an ExperimentState is of another run than the latest one."""
+        over = not self.going_on and PARTS[min(state.phase, len(PARTS) - 1)] not in _OVER
+        return state.run < self.state.run or state.stride < self.state.stride or over
+
+    def take_diagnostics(self, message: Any) -> None:
+        """Take what nodes say of themselves."""
         for status in message.status:
-            name = status.name.partition(":")[0]
+            # Of our nodes; what others say of their parts stands side by side.
+            name = status.name.removesuffix(": state").removesuffix(": run")
             level = _LEVELS[min(int.from_bytes(status.level, "little"), 3)]
             values = {pair.key: pair.value for pair in status.values}
-            self.nodes[name] = NodeState(level, status.message, values, heard_at)
+            self.nodes[name] = NodeState(level, status.message, values, self._clock())
 
     def _on_state(self, message: Any) -> None:
-        # Runs of two commands have the same number.
-        if self.state is not None and message.stride < self.state.stride:
-            self._reset()
         self.state = message
         self.version += 1
 
     def _on_stride(self, message: Any) -> None:
-        self.side = side_of(message)
+        self.side = Side(message.side)
         self.strides.append((message.number, message.period))
         start, end = nanoseconds_of(message.start), nanoseconds_of(message.header.stamp)
         self.torque = self._torque_between(start, end)
@@ -171,11 +176,14 @@ class View:
 
     def _on_phase(self, message: Any) -> None:
         self.lags.append((message.stride, message.phase_lag))
+        if not math.isnan(message.phase_lag):
+            refers = getattr(message, "toe_off", None)  # which bags of earlier versions lack
+            known = refers is None or nanoseconds_of(refers)
+            self.lag_refers_to = "toe-off" if known else "heel strike"
         self.version += 1
 
     def _on_verdict(self, message: Any) -> None:
-        for kind, field in (Verdict, "verdict"), (Reason, "reason"):
-            member_of(kind, field, getattr(message, field))
+        Verdict(message.verdict), Reason(message.reason)  # raises for one that is unknown here
         self.verdict = message
         self.version += 1
 
@@ -192,17 +200,16 @@ class View:
             self.stances.append(passed / NANOSECONDS_PER_SECOND)
 
     def _on_robot(self, message: Any) -> None:
-        side, reading = side_of(message), state_of(message)
-        self.robots[side] = message
+        side, reading = Side(message.side), state_of(message)
+        self.robots[side], self._heard_at[side] = message, self._clock()
         if self.side in (None, side):
             self._readings.append((reading.stamp, reading.commanded, reading.measured))
 
     def _on_setup(self, message: Any) -> None:
-        side = side_of(message)
         self.setup = message
         if self.side is None:
-            self.side = side
-        with contextlib.suppress(DeviceError, LimitError):  # a driver that is not installed here
+            self.side = Side(message.side)
+        with contextlib.suppress(DeviceError):  # a driver that is not installed here
             self.simulated = find_driver(message.driver).simulated
 
     def _on_trouble(self, message: Any) -> None:
@@ -227,7 +234,7 @@ class View:
     @property
     def going_on(self) -> bool:
         """Whether a run has begun and not ended."""
-        return self.state is not None and self.part not in ("finished", "failed")
+        return self.state is not None and self.part not in _OVER
 
     @property
     def period(self) -> float:
@@ -246,18 +253,25 @@ class View:
         return f"{self.part}, {name or self.state.block} of {blocks} blocks"
 
     def time_left(self) -> float:
-        """Return how long the rest takes at the period of the last strides [s]; NaN if unknown."""
+        """
+        Return how long the rest takes at the period of the last strides [s]; NaN if unknown.
+
+        A blinded operator is told whole half minutes: more would tell the period.
+        """
         if self.part == "finished":
             return 0.0
         if not self.going_on:
             return _NAN
-        return float(max(self.state.strides - self.state.stride, 0) * self.period)
+        left = float(max(self.state.strides - self.state.stride, 0) * self.period)
+        return 30.0 * math.ceil(left / 30) if self.blinded and math.isfinite(left) else left
 
     def lag(self) -> str:
         """Return the latest phase lag, and where in the stride it lies."""
         if not self.lags:
             return "no pulse yet"
         stride, lag = self.lags[-1]
+        if math.isnan(lag):
+            return f"unknown: no {self.lag_refers_to} near"
         period = dict(self.strides).get(stride) or (self.strides[-1][1] if self.strides else _NAN)
         percent = f" = {_signed(100 * lag / period, 1)} % of the stride" if period > 0 else ""
         return f"{_signed(1e3 * lag, 0)} ms{percent}"
@@ -304,7 +318,10 @@ class View:
         torque = robot.measured_torque
         if math.isnan(torque):
             return "not measured"
-        return _torque(torque) + (" (simulated)" if self.simulated else "")
+        if self.simulated:  # it tells what changes
+            return f"{_torque(torque)} (simulated)"
+        age = self._clock() - self._heard_at[Side(robot.side)]
+        return _torque(torque) + (f", {age:.0f} s ago" if age > _OLD else "")
 
     def faults(self) -> str:
         """Return the faults of the robot on either ankle, empty if there are none."""
@@ -357,26 +374,28 @@ class View:
             rows += [] if exact else [("known after", f"{known / 1e6:.0f} ms")]
         if len(self._strikes) > 1:
             span = (self._strikes[-1] - self._strikes[0]) / NANOSECONDS_PER_SECOND
-            if span > 0:
+            if self.blinded:  # a rate is a stride period
+                rows.append(("events", str(self.events)))
+            elif span > 0:
                 rows.append(("rate", f"{60 * (len(self._strikes) - 1) / span:.1f} steps a minute"))
         return rows
 
-    def session(self, now: float) -> tuple[str, bool]:
+    def session(self) -> tuple[str, bool]:
         """Return how a session stands that somebody conducts, and whether it was paused."""
-        for name, level, message in self.node_words(now):
+        for name, level, message in self.node_words():
             if name.endswith(SESSION) and level != "stale":
                 return message, level == "warning"
         return "", False
 
-    def node_words(self, now: float) -> list[tuple[str, str, str]]:
+    def node_words(self) -> list[tuple[str, str, str]]:
         """
-        Return name, level and message of every node; ``now`` is on the clock of `heard_at`.
+        Return name, level and message of every node.
 
         Those that have ended with their run, as all do between two blocks, are left out.
         """
         rows = []
         for name, state in sorted(self.nodes.items()):
-            silent = now - state.heard_at
+            silent = self._clock() - state.heard_at
             stale = silent > STALE_AFTER
             if stale and self.state is not None and not self.going_on:
                 continue

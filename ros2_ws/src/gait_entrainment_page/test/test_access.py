@@ -26,7 +26,7 @@ HERE = {"host": "127.0.0.1:8080"}
 FAR = Access("0.0.0.0", {TOKEN: ACT, LOOK_TOKEN: LOOK})
 
 
-def asked(access, headers, query="", kind="http", method="GET"):
+def asked(access, headers, query="", kind="http", method="GET", path="/"):
     """Send a request through a gate; return status, headers, and the scope behind it."""
     sent, passed = [], []
 
@@ -39,7 +39,7 @@ def asked(access, headers, query="", kind="http", method="GET"):
         sent.append(message)
 
     scope = {
-        "type": kind, "path": "/", "query_string": query.encode(), "method": method,
+        "type": kind, "path": path, "query_string": query.encode(), "method": method,
         "headers": [(k.encode(), v.encode()) for k, v in headers.items()],
     }  # fmt: skip
     asyncio.run(Gate(app, access, 8080)(scope, None, send))
@@ -49,9 +49,10 @@ def asked(access, headers, query="", kind="http", method="GET"):
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1:8080", "localhost:8080", "[::1]:8080"])
-def test_this_host_may_look_and_act(host):
-    status, _, scope = asked(Access.of("127.0.0.1"), {"host": host})
+def test_this_host_may_look_and_act_but_not_within_the_page_of_another(host):
+    status, headers, scope = asked(Access.of("127.0.0.1"), {"host": host})
     assert (status, scope["state"]["role"]) == (200, ACT)
+    assert ("x-frame-options", "DENY") in headers
 
 
 @pytest.mark.parametrize(
@@ -61,6 +62,8 @@ def test_this_host_may_look_and_act(host):
         HERE | {"origin": "http://evil.example"},
         HERE | {"origin": "null"},
         HERE | {"origin": "http://127.0.0.1:9999"},
+        HERE | {"origin": "http://["},
+        {"host": "[::1"},
         HERE | {"sec-fetch-site": "cross-site", "sec-fetch-mode": "no-cors"},
         {},
     ],
@@ -77,17 +80,34 @@ def test_a_link_on_another_site_may_lead_here():
     assert asked(Access.of("127.0.0.1"), headers)[0] == 200
 
 
+@pytest.mark.parametrize("query", ["", "token=x", "token=a;%20Path=/x"])
+def test_who_is_known_keeps_his_seat_whatever_else_this_host_has_set(query):
+    others = 'theme={"dark": true}; bare; a[b]=1; path=/; session="x y'
+    known = HERE | {"cookie": f"{others}; entrain_page_browser_8080=me"}
+    status, headers, scope = asked(Access.of("127.0.0.1"), known, query)
+    assert (status, scope["state"]["browser"]) == (200, "me")
+    assert "set-cookie" not in dict(headers)
+
+
+def test_the_name_of_a_host_has_no_case(monkeypatch):
+    monkeypatch.setattr("socket.gethostname", lambda: "Lab-PC")
+    far = Access.of("0.0.0.0", TOKEN)
+    assert far.addresses(8080)[1][1] == f"http://Lab-PC:8080/?token={TOKEN}"
+    assert asked(far, {"host": "Lab-PC:8080"}, f"token={TOKEN}")[0] == 303
+
+
 def test_beyond_this_host_a_token_is_asked_for_once():
     far = {"host": "10.0.0.7:8080"}
     assert asked(FAR, far)[0] == 401
     assert asked(FAR, far, "token=nonsense")[0] == 401
     assert asked(FAR, far, kind="websocket")[0] == "websocket.close"
     for token, role in ((TOKEN, ACT), (LOOK_TOKEN, LOOK)):
-        status, headers, scope = asked(FAR, far, f"token={token}")
+        status, headers, scope = asked(FAR, far, f"token={token}", path="//evil.example/")
         assert (status, scope) == (303, None)  # the token leaves the address
         cookie = dict(headers)["set-cookie"]
         assert "HttpOnly" in cookie
-        assert "SameSite=Strict" in cookie
+        assert "SameSite=Lax" in cookie
+        assert dict(headers)["location"] == "/"
         _, _, scope = asked(FAR, far | {"cookie": cookie.partition(";")[0]})
         assert scope["state"]["role"] == role
 

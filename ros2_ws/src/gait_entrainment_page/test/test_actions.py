@@ -1,11 +1,21 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the page starts, with which words, and what of its output a blinded operator is told."""
+"""What the page does: the stop, and what it starts, with which words, told to whom."""
+
+import asyncio
+import contextlib
+import subprocess
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
 
 import pytest
 
-from gait_entrainment_page.actions import ActionError, Command
+from gait_entrainment_drivers.stop_channel import StopAnswer
+from gait_entrainment_page.actions import ActionError, Command, stop, stop_at_once
+
+CUT = "not everybody confirmed the stop: cut the power"
 
 
 @pytest.fixture
@@ -45,6 +55,17 @@ def test_a_blinded_operator_is_told_of_a_run_only_that_it_ended_or_why_it_failed
     assert told(("session", "well"), outcome=False)[0] == "session well"  # neutral by itself
 
 
+def test_a_blinded_operator_is_not_told_what_the_checklist_is_about():
+    command = Command(["run", "file.yaml"])
+    command._output.write(b"ok    limits     40 pulses of 10 N m\nFAIL  stop       not pressed\n")
+    command._output.flush()
+    command.name = "preflight"
+    with subprocess.Popen(["true"]) as command._process:
+        pass
+    assert [line[:10] for line in command.told(outcome=False)] == ["FAIL  stop", "entrain pr"]
+    assert "10 N m" in command.told()[0]
+
+
 def test_one_goes_on_at_a_time(tmp_path, monkeypatch):
     (tmp_path / "entrain").write_text("#!/bin/sh\nexec sleep 60\n")
     (tmp_path / "entrain").chmod(0o755)
@@ -57,3 +78,61 @@ def test_one_goes_on_at_a_time(tmp_path, monkeypatch):
     finally:
         command._process.kill()
         command._process.wait()
+
+
+def test_a_double_click_starts_one(monkeypatch):
+    both, started = threading.Barrier(2), []
+
+    def begin(words, **_):
+        with contextlib.suppress(threading.BrokenBarrierError):
+            both.wait(0.2)  # for the second one, which does not come
+        started.append(words)
+        return subprocess.CompletedProcess(words, 0)
+
+    monkeypatch.setattr(subprocess, "Popen", begin)
+    monkeypatch.setattr(Command, "runs", property(lambda self: self._process is not None))
+    command = Command(["run"])
+    with ThreadPoolExecutor(2) as clicks:
+        errors = [click.exception() for click in [clicks.submit(command.start) for _ in "12"]]
+    assert len(started) == 1
+    assert sum(isinstance(error, ActionError) for error in errors) == 1
+
+
+@pytest.mark.parametrize(
+    ("here", "elsewhere", "told"),
+    [
+        ({}, "zero", ["asked over ROS: zero"]),
+        ({}, "", ["asked over ROS: no answer", CUT]),
+        ({"motor/1": StopAnswer(done=True, message="zero")}, "zero", ["motor/1: zero"]),
+        ({"motor/1": None}, "zero", ["motor/1: no answer", CUT]),
+    ],
+)
+def test_a_stop_asks_the_robot_that_is_shown_wherever_it_is(here, elsewhere, told, monkeypatch):
+    asked = threading.Event()
+
+    def ask(what):
+        assert what == "stop"
+        asked.set()
+        if not elsewhere:
+            raise ActionError("no answer")
+        return elsewhere
+
+    monkeypatch.setattr("gait_entrainment_page.actions.stop_all", lambda: here)
+    assert stop(SimpleNamespace(ask=ask, offered=lambda: {"stop"})) == told
+    assert asked.wait(10)
+
+
+def test_a_stop_waits_for_no_other_action(monkeypatch):
+    monkeypatch.setattr("gait_entrainment_page.actions.stop_all", dict)
+    answers = threading.Event()
+
+    async def while_others_wait():
+        asyncio.get_running_loop().set_default_executor(ThreadPoolExecutor(1))
+        waits = asyncio.create_task(asyncio.to_thread(answers.wait))
+        try:
+            return await asyncio.wait_for(stop_at_once(None), 10)
+        finally:
+            answers.set()
+            await waits
+
+    assert asyncio.run(while_others_wait()) == ["no robot is driven by this machine"]

@@ -3,6 +3,7 @@
 
 """A recorded bag at any instant, against what is known of the committed one."""
 
+import contextlib
 from pathlib import Path
 
 import pytest
@@ -43,6 +44,19 @@ def test_at_any_instant_it_shows_what_had_been_by_then(source, share):
     # A stride of the committed walk lasts 1.88 to 1.94 s.
     assert abs(len(strides) - (instant - source.start) / 1.91e9) < 2
     assert source.view.now == instant
+
+
+def test_of_instants_asked_for_meanwhile_only_the_latest_is_shown(source, monkeypatch):
+    @contextlib.contextmanager
+    def waited_for():
+        with monkeypatch.context() as meanwhile:
+            meanwhile.setattr(source, "_lock", contextlib.nullcontext())
+            source.show(source.end)
+        yield
+
+    monkeypatch.setattr(source, "_lock", waited_for())
+    source.show(source.start)
+    assert source.view.now == source.end
 
 
 def without(path, out, *topics):

@@ -10,9 +10,16 @@ import struct
 import pytest
 from rclpy.serialization import serialize_message
 
+from gait_entrainment.errors import UsageError
 from gait_entrainment_msgs.msg import Stride
 from gait_entrainment_nodes.messaging.topics import STRIDES
 from gait_entrainment_page.access import listen
+from gait_entrainment_page.operator_page import Settings
+
+
+def test_a_blinded_page_offers_nothing():
+    with pytest.raises(UsageError, match="foxglove: offers what a blinded page hides"):
+        Settings(blinded=True, foxglove=8765)
 
 
 def test_a_client_is_offered_a_topic_and_receives_its_messages():

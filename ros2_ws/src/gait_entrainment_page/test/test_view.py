@@ -48,23 +48,23 @@ def robot(at, commanded, measured, faults=(), side=RIGHT):
     )  # fmt: skip
 
 
-def walk(view, first, last, strides, readings=20, height=10.0):
+def walk(view, first, last, strides, readings=20, height=10.0, period=PERIOD):
     """Walk strides of one second: toe-off at 0.6 s, behind a double stance of 0.2 s."""
     for number in range(first, last + 1):
-        start = number * PERIOD
+        start = number * period
         view.take("gait_events", event(start, STRIKE, RIGHT))
-        view.take("gait_events", event(start + PERIOD * 4 // 10, STRIKE, LEFT))
-        view.take("gait_events", event(start + PERIOD * 6 // 10, TOE_OFF, RIGHT))
+        view.take("gait_events", event(start + period * 4 // 10, STRIKE, LEFT))
+        view.take("gait_events", event(start + period * 6 // 10, TOE_OFF, RIGHT))
         for reading in range(readings):
             torque = height if reading == readings // 2 else 0.0
-            at = start + PERIOD * reading // readings
+            at = start + period * reading // readings
             view.take("perturbator/state", robot(at, torque, torque / 2))
         view.take(
             "gait/pulse_phases",
             Message(header=header(start), run=1, stride=number, phase_lag=-0.1),
         )
-        end = start + PERIOD
-        stride = Message(header=header(end), run=1, side=RIGHT, number=number, period=1.0)
+        end, seconds = start + period, period / NANOSECONDS_PER_SECOND
+        stride = Message(header=header(end), run=1, side=RIGHT, number=number, period=seconds)
         stride.start = stamp(start)
         view.take("gait/strides", stride)
         view.take("experiment/state", state(number, strides))
@@ -133,16 +133,32 @@ def test_each_of_two_ankles_is_told_if_they_differ():
     assert max(commanded for _, commanded, _ in view.torque) == 3.0
 
 
-@pytest.mark.parametrize(("driver", "simulated"), [("ideal", True), ("not_here:a=1", False)])
-def test_a_simulated_torque_is_called_so(driver, simulated):
+def test_a_torque_that_was_measured_long_ago_is_told_with_its_age():
+    now = 100.0
+    view = View(clock=lambda: now)
+    view.take("perturbator/state", robot(PERIOD, 9.0, 9.0))
+    assert view.measured() == "+9.00 N m"
+    now = 107.0
+    assert view.measured() == "+9.00 N m, 7 s ago"
+    recorded = View()
+    recorded.take("perturbator/state", robot(PERIOD, 9.0, 9.0))
+    walk(recorded, 5, 5, 10, readings=0)  # through a hole in the record
+    assert recorded.measured() == "+9.00 N m, 5 s ago"
+
+
+def test_a_simulated_torque_is_called_so_in_each_run():
     view = View()
-    view.take(
-        "perturbator/setup",
-        Message(header=header(0), run=1, side=RIGHT, driver=driver, armed_by="", watchdog="",
-                limit_names=["torque"], limits=[30.0]),
+    setup = Message(
+        header=header(0), run=1, side=RIGHT, driver="ideal", armed_by="", watchdog="",
+        limit_names=["torque"], limits=[30.0],
     )  # fmt: skip
-    view.take("perturbator/state", robot(PERIOD, 0.0, 0.0))
-    assert ("simulated" in view.measured()) is simulated
+    for _ in range(2):  # of which the second has the same number, and its robot is told of first
+        view.take("perturbator/setup", setup)
+        view.take("experiment/state", state(0, 5, phase=1))
+        view.take("perturbator/state", robot(PERIOD, 0.0, 0.0))
+        assert "simulated" in view.measured()
+        assert dict(view.robot_words())["limits"] == "torque 30 N m"
+        walk(view, 1, 5, 5)
 
 
 def test_another_run_begins_anew_also_of_another_command():
@@ -153,8 +169,27 @@ def test_another_run_begins_anew_also_of_another_command():
     walk(view, 1, 5, 20)
     view.take("experiment/state", state(0, 20, phase=1, run=2))
     assert list(view.strides) == []
-    walk(view, 1, 2, 20)  # of the run before, on its way for long
+    view.take("gait/strides", Message(run=1))  # of the run before, on its way for long
     assert list(view.strides) == []
+    walk(view, 1, 2, 20)  # of another command, whose runs are counted anew
+    assert len(view.strides) == 1  # from its first state on
+    trouble = Message(header=header(0), run=1, message="refused: 12 N m")
+    view.take("experiment/state", state(0, 20, phase=5))
+    view.take("perturbator/trouble", trouble)
+    assert list(view.troubles) == ["refused: 12 N m"]
+    view.take("experiment/state", state(0, 20, phase=1))
+    assert list(view.troubles) == []
+
+
+def test_a_lag_is_told_from_what_it_refers_to_or_as_unknown():
+    view = View()
+    walk(view, 1, 2, 10)
+    lag = Message(header=header(PERIOD), run=1, stride=2, phase_lag=-0.1, toe_off=stamp(0))
+    view.take("gait/pulse_phases", lag)
+    assert lag_chart(view)["series"][0]["name"].endswith("onset minus heel strike")
+    lag.phase_lag = math.nan
+    view.take("gait/pulse_phases", lag)
+    assert view.lag() == "unknown: no heel strike near"
 
 
 def everything(view):
@@ -163,7 +198,7 @@ def everything(view):
     return *words, view.robot_words(), view.sensor_words()
 
 
-def conditioned(torque, lag, verdict, name, *, blinded, **of_robot):
+def conditioned(torque, lag, verdict, name, period=PERIOD, *, blinded, **of_robot):
     """Return the view of a run in which pulses of a torque have come and one is under way."""
     view = View(blinded=blinded)
     view.take(
@@ -171,8 +206,8 @@ def conditioned(torque, lag, verdict, name, *, blinded, **of_robot):
         Message(header=header(0), run=1, side=RIGHT, driver="odrive_can", armed_by="A",
                 watchdog="", limit_names=["torque", "rate"], limits=[30.0, abs(torque) / 0.01]),
     )  # fmt: skip
-    walk(view, 1, 3, 10, height=torque)
-    at = 4 * PERIOD
+    walk(view, 1, 3, 10, height=torque, period=period)
+    at = 4 * period
     view.take("gait/pulse_phases", Message(header=header(at), run=1, stride=3, phase_lag=lag))
     told = Message(header=header(at), run=1, verdict=verdict, reason=0, drift=lag, window=10)
     told.drift_interval = told.pulse_period = told.mean_period = lag
@@ -186,8 +221,9 @@ def conditioned(torque, lag, verdict, name, *, blinded, **of_robot):
 
 
 CONDITIONS = st.tuples(
-    st.floats(-50, 50), st.floats(-0.5, 0.5), st.integers(0, 4), st.sampled_from(["sham", "real"])
-)
+    st.floats(-50, 50), st.floats(-0.5, 0.5), st.integers(0, 4), st.sampled_from(["sham", "real"]),
+    st.integers(PERIOD * 97 // 100, PERIOD * 103 // 100),
+)  # fmt: skip
 
 
 @settings(derandomize=True, deadline=None, max_examples=25)
@@ -212,12 +248,18 @@ def test_whether_torque_falls_after_a_fault_is_told_to_everybody():
 
 
 def test_a_node_that_falls_silent_is_called_so():
-    view = View()
+    now = 100.0
+    view = View(clock=lambda: now)
     status = Message(name="ns/walker_sim: state", level=b"\0", message="ready", values=[])
-    view.take_diagnostics(Message(status=[status]), heard_at=100.0)
-    assert view.node_words(101.0) == [("ns/walker_sim", "ok", "ready")]
-    later = 100.0 + STALE_AFTER + 1
-    assert view.node_words(later) == [("ns/walker_sim", "stale", "silent for 6 s")]
+    view.take_diagnostics(Message(status=[status]))
+    now = 101.0
+    assert view.node_words() == [("ns/walker_sim", "ok", "ready")]
+    now = 100.0 + STALE_AFTER + 1
+    assert view.node_words() == [("ns/walker_sim", "stale", "silent for 6 s")]
+    status.name, status.level, status.message = "camera: exposure", b"\2", "dark"
+    fine = Message(name="camera: temperature", level=b"\0", message="fine", values=[])
+    view.take_diagnostics(Message(status=[status, fine]))  # of another's parts, each is told
+    assert [level for _, level, _ in view.node_words()] == ["error", "ok", "stale"]
 
 
 VALUES = st.floats()
@@ -233,19 +275,18 @@ def test_whatever_comes_can_be_shown(messages):
             view.take("gait_events", event(at, number % 3, number % 4))
         elif kind == "robot":
             view.take("perturbator/state", robot(at, one, other, side=number % 3))
-        elif kind == "verdict":
-            judged = Message(header=header(at), verdict=number % 6, reason=number % 9, window=5)
-            judged.drift = judged.drift_interval = judged.mean_period = judged.pulse_period = one
-            judged.entrained_since_stride = 0
-            view.take("gait/entrainment", judged)
         elif kind == "state":
             view.take("experiment/state", state(number % 7, 7, phase=number % 8))
+        elif kind == "verdict":
+            told = Message(header=header(at), run=1, verdict=number % 6, reason=number % 10)
+            told.drift = one
+            told.drift_interval = told.pulse_period = told.mean_period = other
+            told.entrained_since_stride = told.window = number
+            view.take("gait/entrainment", told)
         else:
             message = Message(header=header(at), run=1, side=number % 3, number=number)
             message.start, message.period = stamp(at - PERIOD), one
             view.take("gait/strides", message)
-            lag = Message(header=header(at), run=1, stride=number, phase_lag=other)
-            view.take("gait/pulse_phases", lag)
     assert view.part
     assert view.lag()
     assert view.verdict_words()

@@ -19,12 +19,7 @@ from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
 from gait_entrainment.gait import GaitEvent, GaitLimits
 from gait_entrainment_sensors.detection import ChosenDetector, Detection
 from gait_entrainment_sensors.numbering import Numbering
-from gait_entrainment_sensors.recording import (
-    RecordingError,
-    Stream,
-    column_numbers,
-    read_table,
-)
+from gait_entrainment_sensors.recording import RecordingError, Stream, column_numbers, read_table
 
 COLUMNS: dict[str, dict[str, Any]] = {
     "onset": {"Description": "Instant of the event, by the clock of the recording", "Units": "s"},

@@ -170,14 +170,12 @@ class StudyFindings:
     @property
     def rows(self) -> Rows:
         """What is told of them, in words."""
+        phase = told(self.direction.phase, "{:.3f} of the stride")
         return [
             ("persons that entrained in some block", shown(self.entrained, "%", 100)),
             ("basin found, both sides, mean", shown(self.basin_mean, "% of the stride")),
             ("basin, standard deviation", shown(self.basin_deviation, "% of the stride")),
-            (
-                "mean phase of those that entrained",
-                told(self.direction.phase, "{:.3f} of the stride"),
-            ),
+            ("mean phase of those that entrained", phase),
             ("its resultant length over persons", told(self.direction.resultant, "{:.3f}")),
             ("Rayleigh's p over persons", told(self.rayleigh, "{:.2g}")),
         ]

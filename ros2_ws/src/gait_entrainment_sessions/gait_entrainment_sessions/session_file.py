@@ -154,10 +154,9 @@ class _Reader:
             if not (text := str(values.get(name, "1"))).isascii() or not text.isalnum():
                 where = given[name].where
                 raise SessionError(f"{where}: {name}: {text!r}; allowed: letters and digits")
-        own = {name: values[name] for name in settings_of(Session) if name in values}
-        person = Person(
-            **{n: values[key] for n in settings_of(Person) if (key := f"person.{n}") in values}
-        )
+        own = {name: value for name, value in values.items() if "." not in name}
+        section = "person."
+        person = Person(**{k.removeprefix(section): v for k, v in values.items() if section in k})
         told = {f"walker.{n}": Entry(v, about[0]) for n, v in person.walker.items()}
         told |= {key: entry for key, entry in given.items() if key.startswith("limits.")}
         common = self._protocol(given)

@@ -9,6 +9,7 @@ import pytest
 
 from gait_entrainment_sessions import folder as folder_module
 from gait_entrainment_sessions.folder import SessionFolder
+from gait_entrainment_sessions.runs import is_sealed
 from gait_entrainment_sessions.session_file import SessionError, read_session
 
 BLIND = ("rest: 30", "blind: true")
@@ -181,11 +182,17 @@ def test_a_blinded_session_stands_by_numbers(begun):
     assert begun(BLIND).standing() == "next: block 1 of 2"
 
 
-def test_a_sealed_session_tells_no_name_before_it_is_unblinded(begun):
+def test_a_sealed_session_tells_no_name_before_it_is_unblinded(begun, tmp_path):
     folder = begun(BLIND)
     assert folder.names() == ["block 1", "block 2"]
     assert folder.plan["blocks"] is None
     assert "faster" not in (folder.path / "session.json").read_text()
+    bag = folder.path / "bags/block-01"
+    (bag.parent / "block-02").mkdir(parents=True)
+    bag.mkdir()
+    (tmp_path / "link").symlink_to(bag)
+    ways = (bag, bag / "block-01_0.mcap", bag.parent / "block-02/../block-01", tmp_path / "link")
+    assert all(is_sealed(way) for way in ways)
     assert (folder.path / "key.json").stat().st_mode & 0o222 == 0
     assert folder.unblind() == ["faster", "slower"]
     assert folder.names() == folder.unblind() == ["faster", "slower"]

@@ -7,6 +7,7 @@ import csv
 import json
 import math
 import re
+from dataclasses import replace
 from itertools import groupby
 
 import pytest
@@ -14,10 +15,11 @@ from pyarrow import parquet
 
 from gait_entrainment.protocol import read_protocol
 from gait_entrainment.simulation import simulate
-from gait_entrainment_bags import BagError
+from gait_entrainment_bags import BagError, BagReader
 from gait_entrainment_bags.recorded_run import read_run
 from gait_entrainment_sessions.findings import Findings, StudyFindings
 from gait_entrainment_sessions.report import page
+from gait_entrainment_sessions.report.checks import checks_of
 from gait_entrainment_sessions.runs import Place, PlacedRun, is_sealed, places_in, read_runs
 from gait_entrainment_sessions.tables import TABLES, write_tables
 
@@ -131,6 +133,18 @@ def test_each_block_of_a_protocol_has_a_row_of_its_own_and_its_parts(tmp_path):
         ("slower", "drifting"),
     ]
     assert [round(float(row["offset"]), 2) for row in found] == [-2.59, 0.87]
+
+
+@pytest.mark.parametrize(
+    ("given", "finding"), [(0, "none was asked for"), (1, "1 of 1 pulses compared")]
+)
+def test_torque_is_compared_where_some_was_asked_for(bag, given, finding):
+    run = read_run(bag)
+    sham = [(side, replace(timing, torque=0.0)) for side, timing in run.delivered]
+    run = replace(run, delivered=tuple(sham[given:]) + run.delivered[:given])
+    with BagReader(bag) as reader:
+        (check,) = (one for one in checks_of(run, reader) if one.name == "torque")
+    assert (check.state, check.finding.endswith(finding)) == ("good", True)
 
 
 @pytest.mark.parametrize("text", ["pulses: {count: 0}\n", "baseline: 1\npulses: {period: 1.8}\n"])

@@ -77,13 +77,15 @@ class GaitWatch:
         if period is not None:
             self._own.append(period)
 
-    def stopped(self, now: int) -> str:
-        """Return why nobody seems to walk at an instant [ns], or an empty text."""
+    def stopped(self, now: int, expected: float = math.inf) -> str:
+        """
+        Return why nobody seems to walk at an instant [ns], or an empty text.
+
+        As long as no stride of the person is known, one of the ``expected`` period [s] counts.
+        """
         if self._latest is None:
             return ""
-        stride = self.median
-        if math.isnan(stride):
-            stride = self.limits.stride_most
+        stride = statistics.median(self._own or [min(self.limits.stride_most, expected)])
         silent = (now - self._latest) / NANOSECONDS_PER_SECOND
         if silent <= self.limits.silence * stride:
             return ""

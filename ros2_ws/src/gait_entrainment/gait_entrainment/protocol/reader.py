@@ -52,24 +52,13 @@ def read_protocol(
     to_run: bool = False,
 ) -> Protocol:
     """
-    Read and validate a protocol.
+    Read and validate a protocol: the default, or of what one says, a YAML file or its text.
 
-    Parameters
-    ----------
-    source
-        Path of a YAML file, the text of one (with a line break), what one says, or None for the
-        default.
-    overrides
-        Values that replace those of the file: dotted field name -> (value, who says so), for
-        instance ``{"pulses.width": (0.2, "--width")}``. A text is read as what it stands for.
-    to_run
-        Hold the pulses against the limits, and see that there is such a driver, too.
-
-    Raises
-    ------
-    ProtocolError
-        One line: place, field, what is allowed.
-
+    A text has a line break in it. ``overrides`` replace values of the source: dotted field name
+    -> (value, who says so), as ``{"pulses.width": (0.2, "--width")}``; a text is read as what it
+    stands for.
+    ``to_run`` holds the pulses against the limits, and sees that there is such a driver, too.
+    Raises ProtocolError: one line with place, field, and what is allowed.
     """
     if isinstance(source, str | Path):
         name, _, root = composed(source)

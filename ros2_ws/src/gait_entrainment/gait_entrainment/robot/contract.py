@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.robot.faults import DeviceError, Fault
+from gait_entrainment.robot.faults import DeviceError, Fault, LimitError
 from gait_entrainment.robot.profile import TorqueProfile
 from gait_entrainment.robot.pulse_train import PulseTrain
 
@@ -26,6 +26,12 @@ class Capabilities:
     simulated: bool  # lives in simulated time: promises ahead, touches no clock and no person
     state_rate: float  # states per second [Hz]; 0 if there is one per change of torque
     torque_bandwidth: float = math.inf  # -3 dB: how fast its torque follows the command [Hz]
+
+    def __post_init__(self) -> None:
+        """Raise LimitError for what cannot be: a device is held against these."""
+        for name in ("peak_torque", "torque_rate", "torque_bandwidth"):
+            if not (value := getattr(self, name)) > 0:
+                raise LimitError(f"capabilities.{name}: {value:g}; allowed: above 0")
 
 
 @dataclass(frozen=True)

@@ -95,12 +95,12 @@ def driver_on(text: str, side: Side) -> str:
 
 def find_driver(text: str, side: Side = Side.RIGHT) -> Driver:
     """
-    Load the driver that a text names, and check its options on an ankle.
+    Load the driver that a text names, for an ankle; options of the other one are checked too.
 
     Raises LimitError if there is none of that name, or an option is unknown or out of range;
     DeviceError if the driver cannot be loaded.
     """
-    name, _, options = driver_on(text, side).partition(":")
+    name = text.partition(":")[0]
     target = OWN_DRIVERS.get(name) or driver_names().get(name)
     if target is None:
         known = ", ".join(driver_names())
@@ -113,7 +113,11 @@ def find_driver(text: str, side: Side = Side.RIGHT) -> Driver:
         ) from None
     if not (isinstance(robot, type) and issubclass(robot, AnkleRobot)):
         raise LimitError(f"driver: {name} ({target}) is no AnkleRobot: derive it from that class")
-    return Driver(name, robot, read_options(f"driver: {name}", robot.Options, options))
+    options = {
+        leg: read_options(f"driver: {name}", robot.Options, driver_on(text, leg).partition(":")[2])
+        for leg in Side
+    }
+    return Driver(name, robot, options[side])
 
 
 def split_options(text: str) -> list[str]:

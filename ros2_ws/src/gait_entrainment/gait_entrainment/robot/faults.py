@@ -30,25 +30,8 @@ class Fault:
 
 
 STOPPED = Fault("stopped", "The stop was called.")
-OPERATOR_SILENT = Fault(
-    "operator_silent",
-    "An operator fell silent: a terminal or a page is closed, or a process is frozen.",
-)
-DEADMAN_SILENT = Fault(
-    "deadman_silent", "The emergency stop fell silent: it was let go, or its node has ended."
-)
 EXPERIMENT_SILENT = Fault(
     "experiment_silent", "The experiment sent no horizon for longer than the limit."
-)
-DEVICE_SILENT = Fault(
-    "device_silent",
-    "The device sent no reply for longer than the limit: see to its power and wiring, or to what"
-    " else loads this computer.",
-)
-HOST_LOOP_LATE = Fault(
-    "host_loop_late",
-    "The loop that times the torque woke up later than the limit: see to what else loads this"
-    " computer.",
 )
 TORQUE_EXCEEDED = Fault(
     "torque_exceeded", "More torque was delivered than the limit and its margin allow."

@@ -41,6 +41,8 @@ from gait_entrainment.robot.pulse_train import PulseTrain
 
 # How often the watchdog looks whether the experiment has fallen silent [s].
 _WATCH_PERIOD = 0.01
+# A device's clock may be ahead of the run's by so much [ns].
+_AHEAD = NANOSECONDS_PER_SECOND // 10
 # After so long without a pulse [ns] the next ones are another train, whose first ones rise anew.
 _PAUSE = 5 * NANOSECONDS_PER_SECOND
 
@@ -68,6 +70,8 @@ class GuardedRobot:
         self.partner: GuardedRobot | None = None  # on the other ankle: one stops with the other
         self._configured = self._active = self._in_run = False
         self._begun = 0  # pulses scheduled since the latest pause
+        self._read_until = 0  # stamp of the latest state [ns]
+        self._offset = time.time_ns() - time.monotonic_ns()  # from steady time to a real run's
         self._armed_until = -math.inf  # steady time [s]
         self._delivered_torque = _DeliveredTorque(self.limits)
         self._last_heard = math.inf  # steady time [s]
@@ -95,7 +99,7 @@ class GuardedRobot:
 
     @property
     def armed(self) -> bool:
-        """Whether torque is allowed; a device in simulated time needs no arming."""
+        """Whether torque is allowed."""
         return time.monotonic() < self._armed_until
 
     # Lifecycle. Each step raises DeviceError if it is not its turn or the driver fails.
@@ -122,7 +126,7 @@ class GuardedRobot:
             raise DeviceError("the device is active already; deactivate it first")
         self._call(self._robot.activate)
         self._active = True
-        self._armed_until = math.inf if self.capabilities.simulated else -math.inf
+        self.disarm()
         if not self.capabilities.simulated:
             # The interpreter's end kills the threads of a driver: zero torque comes before it.
             atexit.register(self.close)
@@ -136,6 +140,10 @@ class GuardedRobot:
         if not self.capabilities.simulated:
             self._armed_until = time.monotonic() + self.limits.arming
 
+    def disarm(self) -> None:
+        """Accept no train until armed again; a device in simulated time needs no arming."""
+        self._armed_until = math.inf if self.capabilities.simulated else -math.inf
+
     def begin(self, start: int) -> None:
         """
         Start the account of a run at an instant [ns]; the train of an earlier run is dropped.
@@ -145,6 +153,7 @@ class GuardedRobot:
         self._refuse_inactive()
         self._call(lambda: self._robot.begin(start))
         self.train, self.delivered, self.promised_until = None, 0, start
+        self._read_until, self._offset = 0, time.time_ns() - time.monotonic_ns()
         self._delivered_torque = _DeliveredTorque(self.limits)
         self._in_run = True
         self.heard()
@@ -266,8 +275,7 @@ class GuardedRobot:
         try:
             profile.check(begin, until)
         except ProfileError as error:
-            self.stop(DRIVER_FAILED)
-            raise DeviceError(f"the driver broke its contract: {error}") from None
+            raise self._breach(str(error)) from None
         self.delivered += len(profile.onsets)
         self.dose.pulses += len(profile.onsets)
         self.dose.impulse += sum(_impulse(*piece) for piece in profile.pieces)
@@ -278,12 +286,27 @@ class GuardedRobot:
         return profile
 
     def read(self) -> Sequence[RobotState]:
-        """Return the states since the last call; a fault in one of them latches."""
-        states = self._call(self._robot.read)
+        """
+        Return the states since the last call; a fault in one of them latches.
+
+        Raises DeviceError if the driver fails, or if a state is one that no device can have.
+        """
+        states = self._call(lambda: tuple(self._robot.read()))
+        able, until = self.capabilities, self.promised_until
+        if not able.simulated:
+            until = time.monotonic_ns() + self._offset + _AHEAD
         for state in states:
             for fault in state.faults:
                 if fault not in self.faults:
                     self.stop(fault)
+            measured = state.measured if able.measures_torque and not state.faults else 0.0
+            before, self._read_until = self._read_until, state.stamp
+            finite = math.isfinite(state.commanded + measured)
+            if not (finite and before <= state.stamp <= until):
+                raise self._breach(f"{state} after {before} and by {until} ns")
+            # In simulated time it is a sensor with flaws that shows more than there is.
+            if abs(measured) > self._delivered_torque.most and not able.simulated:
+                self.stop(TORQUE_EXCEEDED)
         return states
 
     # Guarding
@@ -318,6 +341,11 @@ class GuardedRobot:
                 raise
             raise DeviceError(f"the driver failed: {type(error).__name__}: {error}") from error
 
+    def _breach(self, how: str) -> DeviceError:
+        """Bring the torque to zero; return the error that says how the driver broke its word."""
+        self.stop(DRIVER_FAILED)
+        return DeviceError(f"the driver broke its contract: {how}")
+
     def _quietly(self, function: Callable[[], None]) -> None:
         """Call the driver on the way out: an error becomes a fault, and the way goes on."""
         try:
@@ -340,7 +368,7 @@ class _DeliveredTorque:
 
     def __init__(self, limits: DeviceLimits) -> None:
         margin = 1 + limits.overshoot
-        self._torque = limits.torque * margin
+        self.most = limits.torque * margin  # [N m]
         self._impulse = limits.impulse * margin
         self._window = round(limits.stride * NANOSECONDS_PER_SECOND)
         self._pieces: deque[tuple[int, int, float]] = deque()  # begin, end [ns], magnitude [N m]
@@ -352,7 +380,7 @@ class _DeliveredTorque:
         for begin, end, torque in profile.pieces:
             if torque == 0:
                 continue
-            if abs(torque) > self._torque:
+            if abs(torque) > self.most:
                 found = found or TORQUE_EXCEEDED
             self._pieces.append((begin, end, abs(torque)))
             self._sum += _impulse(begin, end, torque)

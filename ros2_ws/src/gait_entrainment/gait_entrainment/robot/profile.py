@@ -71,19 +71,9 @@ class TorqueProfile:
         """
         Hold the profile against the contract.
 
-        Parameters
-        ----------
-        begin
-            Where the profile before ends [ns].
-        until
-            Up to where it was asked for [ns]; None if that is not known.
-
-        Raises
-        ------
-        ProfileError
-            if it does not adjoin the one before, goes beyond what was asked for, its pieces are
-            not ascending, finite and one for each time, or its onsets not ascending and within.
-
+        Raises ProfileError if it does not adjoin the one before, which ends at ``begin`` [ns],
+        goes beyond ``until`` [ns], if that is known, its pieces are not ascending, finite and one
+        for each time, or its onsets not ascending and within.
         """
         if not self.times or len(self.times) != len(self.torques):
             raise ProfileError("a profile needs one torque for each time, and at least one")

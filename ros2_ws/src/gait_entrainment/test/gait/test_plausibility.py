@@ -94,9 +94,11 @@ def gait(conductor, strides, *, stray=(), short=0.25):
     return stamp
 
 
-def test_a_gait_that_stops_under_pulses_ends_the_run_and_one_that_goes_on_does_not():
-    conductor = Conductor(Protocol())
-    stamp = gait(conductor, 17)
+@pytest.mark.parametrize("baseline", [15, 2, 1])
+def test_a_gait_that_stops_under_pulses_ends_the_run_and_one_that_goes_on_does_not(baseline):
+    pulses = PulsePlan(period=STRIDE / SECOND, period_offset=None)
+    conductor = Conductor(Protocol(baseline=baseline, pulses=pulses))
+    stamp = gait(conductor, baseline - 1)  # before the second strike no stride is known
     assert conductor.due(stamp)
     conductor.horizon(stamp - STRIDE + round(1.4 * STRIDE))
     with pytest.raises(GaitError, match="the gait has stopped"):

@@ -82,6 +82,8 @@ def test_only_a_comma_and_a_backslash_before_one_need_a_backslash():
         ("emulated:delay=soon", "delay: 'soon'; allowed: 0 to 0.5 s"),
         ("emulated:delay=nan", "delay: 'nan'; allowed"),
         ("emulated:delay=0.6", "delay: '0.6'; allowed"),
+        ("emulated:left.delya=0.1", "option 'delya=0.1'; allowed: bandwidth"),
+        ("emulated:right.delay=0.1,left.delay=0.6", "delay: '0.6'; allowed"),
         ("emulated:state_rate=300", "state_rate: 300 Hz; allowed: a divisor of 1000"),
     ],
 )

@@ -5,6 +5,8 @@
 
 import itertools
 import math
+import time
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -21,6 +23,7 @@ from gait_entrainment.robot import (
     PlannedPulses,
     Pulse,
     PulseTrain,
+    RobotState,
     Shape,
     TorqueProfile,
     find_driver,
@@ -251,6 +254,52 @@ def test_only_the_pulses_of_the_protocol_are_asked_for():
     for changes in ({"torque": -13.1}, {"duration": 0.11}, {"count": 5}, {"torque": math.nan}):
         with pytest.raises(LimitError, match="not of the protocol's pulses; allowed: at most"):
             planned.check(train(**changes), 0)
+
+
+STATE = RobotState(SECOND, 0.0, 0.0, math.nan)
+
+
+@pytest.mark.parametrize("simulated", [True, False])
+@pytest.mark.parametrize(
+    ("states", "words"),
+    [
+        ([STATE, replace(STATE, stamp=SECOND - 1)], f"{SECOND - 1}.* after {SECOND}"),
+        ([replace(STATE, commanded=math.inf)], "commanded=inf"),
+        ([replace(STATE, measured=math.nan)], "measured=nan"),
+        ([replace(STATE, stamp=2 * time.time_ns())], r"broke its contract: .* by \d+ ns"),
+        (None, "the driver failed: TypeError"),
+    ],
+)
+def test_states_that_cannot_be_end_the_torque(monkeypatch, states, words, simulated):
+    guard, driver = ready(simulated=simulated)
+    guard.promise(2 * SECOND)
+    monkeypatch.setattr(driver, "read", lambda: states)
+    with pytest.raises(DeviceError, match=words):
+        guard.read()
+    assert [fault.name for fault in guard.faults] == ["driver_failed"]
+    assert driver.calls[-1] == "stop"
+    guard.close()
+
+
+@pytest.mark.parametrize(("simulated", "faults"), [(True, []), (False, ["torque_exceeded"])])
+def test_more_torque_in_a_state_than_the_limit_latches_but_for_an_emulated_sensor(
+    monkeypatch, simulated, faults
+):
+    guard, driver = ready(DeviceLimits(torque=10.0, overshoot=0.2), simulated)
+    guard.promise(2 * SECOND)
+    for torque, found in ((-12.0, []), (-12.1, faults)):
+        states = [replace(STATE, measured=torque)]
+        monkeypatch.setattr(driver, "read", lambda states=states: states)
+        guard.read()
+        assert [fault.name for fault in guard.faults] == found
+    guard.close()
+
+
+@pytest.mark.parametrize("name", ["peak_torque", "torque_rate", "torque_bandwidth"])
+@pytest.mark.parametrize("value", [math.nan, -1.0])
+def test_a_device_says_what_it_can_do(name, value):
+    with pytest.raises(LimitError, match=rf"capabilities\.{name}: .*; allowed: "):
+        replace(find_driver("emulated").make(Side.LEFT).capabilities, **{name: value})
 
 
 def test_a_stop_latches_until_closed_and_configured():

@@ -87,6 +87,8 @@ def show_bag(options: argparse.Namespace) -> int:
 
     if not options.bag.exists():
         raise UsageError(f"{options.bag}: no such file or folder")
+    if options.foxglove != "0":
+        raise UsageError("--foxglove: offers a live run; Foxglove opens a bag by itself")
     bag = BagSource(options.bag, blinded=options.blinded or is_sealed(options.bag))
     given = checked_page(options, None)
     from gait_entrainment_page.layout import Page

@@ -20,7 +20,6 @@ from gait_entrainment_bringup.run_options import (
     checked_session,
 )
 from gait_entrainment_drivers.proof import keep_preflight
-from gait_entrainment_drivers.signals import stop_on_signals
 
 _TIMEOUT = Setting("how long to wait for the stop", unit="s", least=0.0, most=3600.0)
 DESCRIPTION = (
@@ -52,8 +51,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Go through the checklist; 1 if a point of it fails."""
-    # However it is ended, the robot is brought to rest, as in a run.
-    stop_on_signals()
     timeout = _TIMEOUT.parse("--timeout", options.timeout)
     options.real_time = options.unproved = True  # a lacking proof is a point that fails
     if options.session:

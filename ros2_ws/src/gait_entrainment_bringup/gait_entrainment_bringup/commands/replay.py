@@ -17,7 +17,6 @@ from gait_entrainment_bringup.node_list import MOVED, parameter_arguments, repla
 from gait_entrainment_bringup.run_options import check_output
 from gait_entrainment_bringup.supervisor import supervised
 from gait_entrainment_commands.outcome import outcome_of, summary
-from gait_entrainment_drivers.signals import stop_on_signals
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 
 DESCRIPTION = "Play a bag to the gait analyzer, and compare with what was recorded live."
@@ -53,7 +52,6 @@ def run(options: argparse.Namespace) -> int:
         options.rate = _RATE.parse("--rate", options.rate)
     if options.out is not None:
         check_output(options.out)
-    stop_on_signals()
     recorded = read_run(options.bag, torques=False, **told_of_record(options))
     with claimed_domain() as domain:
         results = replay(options, domain)

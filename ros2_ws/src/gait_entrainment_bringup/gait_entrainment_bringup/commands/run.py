@@ -33,7 +33,6 @@ from gait_entrainment_bringup.run_options import (
     claimed_folder,
 )
 from gait_entrainment_bringup.supervisor import Supervisor, supervised
-from gait_entrainment_drivers.signals import stop_on_signals
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 from gait_entrainment_page.access import Access
 
@@ -86,8 +85,6 @@ def check_nodes(options: argparse.Namespace, protocol: Protocol) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run one experiment and print its outcome."""
-    # Stopping from outside takes the same path as Ctrl-C: torque first, then the rest.
-    stop_on_signals()
     protocol, bag = checked_run(options)
     check_nodes(options, protocol)
     exactly = options.out is not None

@@ -15,7 +15,6 @@ from gait_entrainment_bringup.node_list import PAGE, Parameters, parameter_argum
 from gait_entrainment_bringup.run_options import add_conduct_options, checked_session
 from gait_entrainment_bringup.session_run import SessionRun
 from gait_entrainment_bringup.supervisor import supervised
-from gait_entrainment_drivers.signals import stop_on_signals
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 from gait_entrainment_sessions.dataset import complete
 from gait_entrainment_sessions.folder import SessionFolder
@@ -73,8 +72,6 @@ def run(options: argparse.Namespace) -> int:
             raise UsageError("--out: missing; allowed: a folder for the tables")
         _print_paths(write_tables(read_runs(options.path), options.out, options.format))
         return 0
-    # Stopping from outside takes the same path as Ctrl-C: torque first, then the rest.
-    stop_on_signals()
     return _conduct(checked_session(options.path, options), options)
 
 

@@ -18,7 +18,6 @@ from gait_entrainment.settings import Setting, settings_of
 from gait_entrainment_drivers.conformance.bench import DriverBench, Result, Tolerances, run_check
 from gait_entrainment_drivers.conformance.checks import CHECKS, silent_host
 from gait_entrainment_drivers.proof import keep_proof
-from gait_entrainment_drivers.signals import stop_on_signals
 
 # Where the check of a running node is found: it needs ROS, which this package does not know.
 NODE_CHECK = "gait_entrainment.node_check"
@@ -153,8 +152,6 @@ def _check_driver(
     options: argparse.Namespace, checks: Iterable[Callable[[Any], None]]
 ) -> Iterator[Result]:
     """Check a driver; what a real device proves of a silent host is remembered."""
-    # However it is ended, the robot is brought to rest: suspended it would stay enabled.
-    stop_on_signals()
     tolerances, driver = _tolerances(options), find_driver(options.driver)
     if not driver.simulated:
         if not options.arm:
@@ -178,7 +175,6 @@ def _check_node(options: argparse.Namespace, tolerances: Tolerances) -> Iterator
     found = list(entry_points(group=NODE_CHECK))
     if not found:
         raise DeviceError("--node needs the package gait_entrainment_nodes, and ROS")
-    stop_on_signals()
     check: Callable[..., Iterator[Result]] = found[0].load()
     side, real_time = Side[options.side.upper()], options.real_time
     return check(options.node, side, tolerances, real_time=real_time, arm=options.arm)

@@ -20,21 +20,25 @@ DESCRIPTION = (
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     parser.add_argument("--json", action="store_true", help="print one JSON object")
+    # Whoever is in a hurry mistypes: nothing keeps it from stopping.
+    parser.add_argument("words", nargs="*", help=argparse.SUPPRESS)
 
 
 def run(options: argparse.Namespace) -> int:
     """Stop everything; 1 if there is nothing to stop, or somebody did not confirm it."""
     answers = stop_all()
     if options.json:
-        told = {name: answer and asdict(answer) for name, answer in answers.items()}
-        print(json.dumps({"stopped": told}))
+        print(json.dumps({"stopped": {name: asdict(a) for name, a in answers.items()}}))
     else:
         for name, answer in answers.items():
-            print(f"{name}: {answer.message if answer else 'does not answer'}")
+            print(f"{name}: {answer.message}")
     if not answers:
-        print("entrain stop: no robot is driven by this machine", file=sys.stderr)
+        nobody = "no robot is driven by this machine: if one pushes, cut its power"
+        print(f"entrain stop: {nobody}", file=sys.stderr)
         return 1
-    failed = [name for name, answer in answers.items() if answer is None or not answer.done]
+    if options.words:
+        print(f"entrain stop: unknown words: {' '.join(options.words)}", file=sys.stderr)
+    failed = [name for name, answer in answers.items() if not answer.done]
     if failed:
         print(
             f"entrain stop: {', '.join(failed)} did not confirm the stop: cut the power",

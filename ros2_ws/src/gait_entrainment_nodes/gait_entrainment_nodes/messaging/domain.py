@@ -41,11 +41,7 @@ def claimed_domain() -> Iterator[int]:
     and so do the ports by which runs would hear each other: a claim holds between users and
     between containers that share a network, and ends with the process, however that ends.
 
-    Raises
-    ------
-    DomainError
-        if ROS_DOMAIN_ID is not a domain, or another run has claimed it or all domains.
-
+    Raises DomainError if ROS_DOMAIN_ID is not a domain, or another run has claimed it or all.
     """
     wanted = wanted_domain()
     for domain in DOMAINS if wanted is None else [wanted]:

@@ -88,12 +88,15 @@ def dds_variables(*, real_time: bool) -> dict[str, str]:
     time are for one host, so whoever looks for peers on others keeps the common ones.
     """
     reach, file = "ROS_AUTOMATIC_DISCOVERY_RANGE", "FASTRTPS_DEFAULT_PROFILES_FILE"
-    ours = str(shared_file(PACKAGE, "config/fastdds.xml"))
-    chosen = {reach: os.environ.get(reach, "LOCALHOST"), file: os.environ.get(file, ours)}
+    common, paced = (
+        str(shared_file(PACKAGE, f"config/{name}.xml")) for name in ("fastdds", "fastdds_real_time")
+    )
+    chosen = {reach: os.environ.get(reach) or "LOCALHOST", file: os.environ.get(file) or common}
+    if chosen[file] == paced:  # not by the user, but by what has started this process
+        chosen = {reach: "LOCALHOST", file: common}
     alone = chosen[reach] == "LOCALHOST" and not os.environ.get("ROS_STATIC_PEERS")
-    if real_time and alone and chosen[file] == ours:
-        ours = str(shared_file(PACKAGE, "config/fastdds_real_time.xml"))
-        return {reach: "SYSTEM_DEFAULT", file: ours}
+    if real_time and alone and chosen[file] == common:
+        return {reach: "SYSTEM_DEFAULT", file: paced}
     return chosen
 
 

@@ -116,16 +116,10 @@ def _align(data: bytearray, place: int, size: int) -> int:
 
 class MessageTemplate:
     """
-    The bytes of one message, ready to be filled with other numbers.
+    The bytes of one message with a header, ready to be filled with other numbers.
 
-    Parameters
-    ----------
-    message
-        A ROS message with a header.
-    fields
-        The names of the doubles that change, with dots for nested ones, and how many there are:
-        the length of an array, or how many doubles adjoin from that field on.
-
+    ``fields`` are the names of the doubles that change, with dots for nested ones, and how many
+    there are: the length of an array, or how many doubles adjoin from that field on.
     """
 
     def __init__(self, message: Any, fields: Mapping[str, int]) -> None:
@@ -153,13 +147,8 @@ class MessageTemplate:
         """
         Return one serialized message per sample.
 
-        Parameters
-        ----------
-        stamps
-            Instants [ns since 1970], shape (n,), int64.
-        columns
-            Values of each field, shape (n, number of its doubles).
-
+        ``stamps`` are instants [ns since 1970], shape (n,), int64; each of ``columns`` has the
+        values of a field, shape (n, number of its doubles).
         """
         table = np.tile(self._bytes, (len(stamps), 1))
         rows = table.view(self._layout)[:, 0]

@@ -85,7 +85,8 @@ class Run:
         self._covered: dict[int, int] = {}  # by profiles of each ankle [ns since 1970]
         self._closed: set[int] = set()  # ankles whose robots have answered the closing horizon
         self._planning = False  # pulses were requested, and there is no answer yet
-        self._began: int | None = None  # start of the walk minus steady time [ns]; in real time
+        # Real time: start of the walk, as late and as early as it may be, minus steady time [ns].
+        self._began: tuple[int, int] | None = None
         self._shown: tuple[Part, int] | None = None
         self.forgive()
 
@@ -112,7 +113,8 @@ class Run:
             later = max(start - now, 0) / NANOSECONDS_PER_SECOND
             self._progress_at = self._clock() + later
             if self._real_time:  # a source may count from an instant before it was asked
-                self._began = max(start, now) - round(self._clock() * NANOSECONDS_PER_SECOND)
+                steady = round(self._clock() * NANOSECONDS_PER_SECOND)
+                self._began = max(start, now) - steady, min(start, now) - steady
 
     def fail(self, error: ExperimentError) -> None:
         """End the run, if it is not over."""
@@ -180,7 +182,7 @@ class Run:
             self.fail(ExperimentError(f"{self.walker} reports what is {lead}", self.walker))
             return
         if self._progress is None:  # else this one only repeats that an answer is owed
-            self._progress_at = self._clock()
+            self._progress_at = min(self._clock(), self._owed_from(progress))
         self._progress = progress
         if self._recorded_grant >= self._grant:
             self._recorded_at = self._clock()
@@ -224,7 +226,14 @@ class Run:
         """Return the latest stamp [ns since 1970] that can be over: no walker goes unasked."""
         if self._began is None:  # lock-step
             return self.promised_until
-        return self._began + round(self._clock() * NANOSECONDS_PER_SECOND) + STAMP_TOLERANCE
+        return self._began[0] + round(self._clock() * NANOSECONDS_PER_SECOND) + STAMP_TOLERANCE
+
+    def _owed_from(self, progress: msg.Progress) -> float:
+        """Return since when [s, steady] more is owed: one that lags would hide a gait's stop."""
+        if self._began is None or self.conductor is None:
+            return math.inf
+        about = (nanoseconds_of(progress.header.stamp) - self._began[1]) / NANOSECONDS_PER_SECOND
+        return about + self.conductor.longest_lookahead
 
     def _note_stop(self) -> None:
         if self.stopped_at is None:

@@ -20,16 +20,10 @@ _FLAT_DIGITS = 9
 
 class Footing:
     """
-    Follows a walker over level ground by the foot that lies flat.
+    Follows a walker, whose lengths are in [m], over level ground by the foot that lies flat.
 
     At least one posture in every double stance is needed to take the step; without it the walk
     goes on, but a place may be off by a few centimetres from then on.
-
-    Parameters
-    ----------
-    leg_length, foot_length
-        Of the walker [m].
-
     """
 
     def __init__(self, leg_length: float, foot_length: float) -> None:
@@ -39,15 +33,7 @@ class Footing:
         self._heel = 0.0  # x of the flat foot's heel [m]; 0 at first
 
     def place(self, hips: Sequence[float], ankles: Sequence[float]) -> tuple[float, float]:
-        """
-        Return where the mass is, (x, z) [m] with z = 0 on the ground.
-
-        Parameters
-        ----------
-        hips, ankles
-            Joint angles [rad], each [left, right].
-
-        """
+        """Return where the mass is, (x, z) [m], by angles [rad], [left, right]; ground: z = 0."""
         length = self._leg_length
         # Where both lie flat, at heel strike, it is the leg ahead that leads from now on.
         stance = min(

@@ -23,6 +23,7 @@ from rclpy.utilities import remove_ros_args
 
 from gait_entrainment.errors import EntrainmentError, UsageError
 from gait_entrainment_bags import NothingToPlayError
+from gait_entrainment_commands.signals import STOPPING
 from gait_entrainment_nodes.messaging.environment import come_before_others
 from gait_entrainment_nodes.nodes.late import PERIOD
 from gait_entrainment_nodes.nodes.parameters import HELP, HelpRequestedError
@@ -33,14 +34,10 @@ LONGEST_SLEEP = 0.1
 
 def run_node(make_node: Callable[[], Any]) -> int:
     """
-    Run a node until it is finished, it fails, or SIGINT or SIGTERM arrives.
+    Run a node until it is finished, it fails, or a signal arrives that stops.
 
-    Returns
-    -------
-    int
-        0 for a clean stop, 1 for a failure, 2 for an argument or a parameter that was refused;
-        the reason is one line on standard error, after the traceback of an unforeseen failure.
-
+    Returns 0 for a clean stop, 1 for a failure, 2 for an argument or a parameter that was refused;
+    the reason is one line on standard error, after the traceback of an unforeseen failure.
     """
     stop_requested = False
     node: Any = None
@@ -52,7 +49,7 @@ def run_node(make_node: Callable[[], Any]) -> int:
             node.stopping = True
 
     # rclpy's own handlers shut the context down at once: no last message could be sent.
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in STOPPING:
         signal.signal(number, request_stop)
     name = sys.argv[0].rpartition("/")[2]
     try:

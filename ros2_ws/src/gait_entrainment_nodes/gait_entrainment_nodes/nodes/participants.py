@@ -51,18 +51,10 @@ class ClockOffset:
 
 class Participants:
     """
-    The participants of an experiment before a run.
+    The participants of an experiment before a run: any nodes in its namespace with ``~/ready``.
 
-    Parameters
-    ----------
-    node
-        The experiment, whose other clients have been made: discovery announces clients in the
-        order in which they were made, so a participant that answers here knows all of them.
-    names
-        Of the participants, in the experiment's namespace: any nodes that offer ``~/ready``.
-    waiting
-        What the experiment's coroutines wait with.
-
+    The other clients of the experiment, ``node``, have been made: discovery announces clients in
+    the order in which they were made, so a participant that answers here knows all of them.
     """
 
     def __init__(self, node: Participant, names: Sequence[str], waiting: Waiting) -> None:

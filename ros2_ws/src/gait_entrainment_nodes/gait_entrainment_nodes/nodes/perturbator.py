@@ -9,7 +9,6 @@ it will change (perturbator_run.py). It knows nothing of gait. Torque ends with 
 cancelling, with the latched stop service and with the process, whatever ends that.
 """
 
-import math
 import time
 from dataclasses import dataclass
 from typing import Any
@@ -31,7 +30,7 @@ from gait_entrainment.robot import (
     find_driver,
     make_robots,
 )
-from gait_entrainment.robot.faults import DEADMAN_SILENT, NOT_STOPPED, OPERATOR_SILENT
+from gait_entrainment.robot.faults import NOT_STOPPED
 from gait_entrainment.settings import setting
 from gait_entrainment_bags.messages import MessageError, nanoseconds_of, train_of
 from gait_entrainment_drivers.proof import require_proof
@@ -45,10 +44,11 @@ from gait_entrainment_nodes.nodes.goal_server import GoalServer
 from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.parameters import texts
 from gait_entrainment_nodes.nodes.participant import Participant
-from gait_entrainment_nodes.nodes.perturbator_run import Result, Run, do_with_all, setups
+from gait_entrainment_nodes.nodes.perturbator_run import Run, SignsOfLife, do_with_all, setups
 from gait_entrainment_nodes.nodes.rclpy_internals import TolerantLifecycleNode
 from gait_entrainment_nodes.nodes.stop_thread import StopThread
 
+Result = DeliverPulseTrain.Result
 # How often what a real robot has measured is promised [s].
 MEASURED_PERIOD = 0.01
 
@@ -123,14 +123,15 @@ class Perturbator(Participant, TolerantLifecycleNode):
         self._latest_run = 0  # number of the latest run
         self._foreign_seal = ""  # of the latest horizon that was not of who conducts the run
         self._look_at: float | None = None  # when to look after a real robot, steady time [s]
-        # When the operators, by name, and the emergency stop were heard last, steady time [s].
-        self._operators_at: dict[str, float] = {}
-        self._deadman_at = -math.inf
+        self._signs = SignsOfLife()
+        self._pressed = False  # the emergency stop, for all that it has said
         self._stop_thread = StopThread(self.get_name(), self._stop_at_once)
 
         self.subscribe(topics.HORIZON, self._on_horizon)
         self.subscribe(topics.OPERATOR_HEARTBEAT, self._on_heartbeat)
-        self.subscribe(topics.EMERGENCY_STOP, self._on_emergency_stop)
+        # A button may keep what it says for who comes later, or say it once to who is there.
+        for qos in (topics.SAID_ONCE, topics.HEARTBEAT):
+            self.subscribe(topics.EMERGENCY_STOP._replace(qos=qos), self._on_emergency_stop)
         self.create_service(Trigger, "~/stop", self.on_stop_service)
         self.create_service(Trigger, "~/arm", self._on_arm_service)
         name = "~/deliver_pulse_train"
@@ -159,9 +160,10 @@ class Perturbator(Participant, TolerantLifecycleNode):
         """
         settings = self.settings
         try:
-            if self._stop_latched:
-                self._stop_latched = False
+            if self._take_stop():
                 raise DeviceError("the stop service was called; configure again to release it")
+            if self._pressed and self.count_publishers("~/emergency_stop"):
+                raise DeviceError("the emergency stop is pressed; release it first")
             driver = find_driver(settings.driver)
             if self.get_parameter("use_sim_time").value and not driver.simulated:
                 raise DeviceError(
@@ -174,6 +176,8 @@ class Perturbator(Participant, TolerantLifecycleNode):
         except (LimitError, DeviceError) as error:
             return self._refuse(error)
         self._robots, self._reported, self._armed_by = robots, (), ""
+        if self._take_stop():  # while they were being connected
+            self._stop_at_once()
         self.note_state(DiagnosticStatus.OK, "configured")
         return TransitionCallbackReturn.SUCCESS
 
@@ -271,6 +275,11 @@ class Perturbator(Participant, TolerantLifecycleNode):
             self.diagnose(self._now, DiagnosticStatus.OK, "armed")
         return response
 
+    def _take_stop(self) -> bool:
+        """Whether somebody stopped while there was no robot; told once."""
+        stopped, self._stop_latched = self._stop_latched, False
+        return stopped
+
     def _stop_at_once(self) -> StopAnswer:
         """Bring the torque to zero and keep it there; from any thread."""
         robots = self._robots.values()
@@ -291,33 +300,24 @@ class Perturbator(Participant, TolerantLifecycleNode):
         return response
 
     def _on_emergency_stop(self, message: Any) -> None:
-        self._deadman_at = time.monotonic()
+        self._signs.hear_stop()
+        self._pressed = message.data
         if message.data:
             self._stop_at_once()
             self._report_faults("the emergency stop was pressed")
 
     def _on_heartbeat(self, message: Any) -> None:
-        self._operators_at[message.data] = time.monotonic()
+        self._signs.hear_operator(message.data)
 
     def _require_signs_of_life(self) -> None:
         """End the torque if an operator, or who holds the emergency stop, is not there."""
-        robots, settings, now = self._robots.values(), self.settings, time.monotonic()
+        robots = self._robots.values()
         if all(robot.train is None for robot in robots):
             return
-        heard, wanted = self._operators_at, list(filter(None, settings.operators))
-        operators = {name: heard.get(name, -math.inf) for name in wanted} or {
-            "every operator": max(heard.values(), default=-math.inf)
-        }
-        for watched, timeout, fault in (
-            (operators, settings.operator_timeout, OPERATOR_SILENT),
-            ({"the emergency stop": self._deadman_at}, settings.deadman_timeout, DEADMAN_SILENT),
-        ):
-            silent = [name for name, at in watched.items() if timeout and now - at > timeout]
-            if silent:
-                for robot in robots:
-                    robot.stop(fault)
-                names = " and ".join(silent)
-                self._report_faults(f"{names} silent for {timeout:g} s: {fault.meaning}")
+        for fault, told in self._signs.missing(self.settings):
+            for robot in robots:
+                robot.stop(fault)
+            self._report_faults(told)
 
     def _end_torque(self, reason: str, outcome: int = Result.STOPPED) -> None:
         """Bring the torque to zero now, whatever was promised."""
@@ -389,9 +389,8 @@ class Perturbator(Participant, TolerantLifecycleNode):
         """Publish a message; the client that asked for pulses hears of each."""
         super().publish(topic, message)
         if topic is topics.PULSES:
-            number, onset = message.number, message.header.stamp
-            feedback = DeliverPulseTrain.Feedback(number=number, onset=onset)
-            self._server.publish_feedback(feedback, message.side)
+            told = DeliverPulseTrain.Feedback(number=message.number, onset=message.header.stamp)
+            self._server.publish_feedback(told, message.side)
 
     def _on_horizon(self, message: Horizon) -> None:
         """Answer a horizon with the torque up to it, promised."""
@@ -400,8 +399,9 @@ class Perturbator(Participant, TolerantLifecycleNode):
         enabled = robots and all(robot.enabled for robot in robots.values())
         if not robots or not (enabled if new else self.run is not None):
             return
-        if new:
-            self._end_torque("another run began")
+        if new and self.run is not None:
+            self.run.interrupt("another run began")
+            self._armed_by = ""
         elif self.run is not None and message.seal != self.run.seal:
             if message.seal != self._foreign_seal:  # told once
                 self._foreign_seal = message.seal

@@ -9,6 +9,7 @@ without length, after which there is no torque that could be stopped.
 """
 
 import math
+import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict
@@ -17,6 +18,7 @@ from typing import Any
 from gait_entrainment.conventions import Side
 from gait_entrainment.robot import (
     DeviceError,
+    Fault,
     GuardedRobot,
     LimitError,
     Pulse,
@@ -34,6 +36,42 @@ from gait_entrainment_nodes.messaging.goals import seal_of
 from gait_entrainment_nodes.messaging.stamps import header, to_time
 
 Result = DeliverPulseTrain.Result
+_ANY = "every operator"
+_OPERATOR_SILENT = Fault(
+    "operator_silent",
+    "An operator fell silent: a terminal or a page is closed, or a process is frozen.",
+)
+_DEADMAN_SILENT = Fault(
+    "deadman_silent", "The emergency stop fell silent: it was let go, or its node has ended."
+)
+
+
+class SignsOfLife:
+    """When those who have to be heard while torque may come were, on steady time [s]."""
+
+    def __init__(self) -> None:
+        self._operators: dict[str, float] = {}
+        self._stop = -math.inf
+
+    def hear_operator(self, name: str) -> None:
+        """Note a heartbeat."""
+        self._operators[name] = self._operators[_ANY] = time.monotonic()
+
+    def hear_stop(self) -> None:
+        """Note that the emergency stop said something."""
+        self._stop = time.monotonic()
+
+    def missing(self, settings: Any) -> Iterator[tuple[Fault, str]]:
+        """Tell of whom no sign came in time, by the perturbator's settings: a fault, in words."""
+        now, wanted = time.monotonic(), list(filter(None, settings.operators)) or [_ANY]
+        operators = {name: self._operators.get(name, -math.inf) for name in wanted}
+        for heard, timeout, fault in (
+            (operators, settings.operator_timeout, _OPERATOR_SILENT),
+            ({"the emergency stop": self._stop}, settings.deadman_timeout, _DEADMAN_SILENT),
+        ):
+            silent = [name for name, at in heard.items() if now - at > timeout > 0]
+            if silent:
+                yield fault, f"{' and '.join(silent)} silent for {timeout:g} s: {fault.meaning}"
 
 
 def do_with_all(
@@ -133,6 +171,12 @@ class Run:
         for ankle in self._ankles.values():
             ankle.tell_end(outcome, reason, fault=fault)
 
+    def interrupt(self, reason: str) -> None:
+        """End the torque; real robots must be armed again: why it was not over is to be seen."""
+        self.end_torque(Result.STOPPED, reason)
+        for ankle in self._ankles.values():
+            ankle.robot.disarm()
+
 
 class AnkleRun:
     """The robot on one ankle in a run."""
@@ -211,7 +255,8 @@ class AnkleRun:
     def _deliver(self) -> None:
         robot = self.robot
         first, train = robot.delivered, robot.train
-        profile = robot.promise(self._horizon)
+        # A horizon that goes back takes back no promise.
+        profile = robot.promise(max(self._horizon, robot.promised_until))
         states = robot.read()
         if profile.valid_until > profile.times[0]:
             last = self._last and profile.valid_until == self._horizon

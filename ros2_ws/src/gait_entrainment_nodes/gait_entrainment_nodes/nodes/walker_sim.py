@@ -30,12 +30,7 @@ from gait_entrainment_msgs.srv import StartRun
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.environment import PUNCTUAL
 from gait_entrainment_nodes.messaging.raw_messages import MessageTemplate
-from gait_entrainment_nodes.messaging.stamps import (
-    LOCK_STEP_START,
-    START_DELAY,
-    header,
-    to_time,
-)
+from gait_entrainment_nodes.messaging.stamps import LOCK_STEP_START, START_DELAY, header, to_time
 from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.participant import Participant
 from gait_entrainment_nodes.nodes.walker_run import Stretch, WalkerRun

@@ -7,8 +7,11 @@
 const entrain = { heartbeat: false, acting: false };
 
 (() => {
-  const OFF = 2000; // by which a clock may differ [ms]
+  const OFF = 2000, OLD = 4000; // by which a clock may differ, and how old what is shown may be [ms]
   let lost = 0; // signs of life in a row that nobody answered
+  let toldAt = performance.now();
+  const isOld = () => performance.now() - toldAt > OLD;
+  entrain.told = (what) => { Object.assign(entrain, what); toldAt = performance.now(); };
   const byId = (id) => document.getElementById(id);
   const tell = (id, text) => { const box = byId(id); if (box && box.textContent !== text) box.textContent = text; };
 
@@ -17,13 +20,14 @@ const entrain = { heartbeat: false, acting: false };
     if (performance.now() - asked < 400) return; // the click behind a press
     asked = performance.now();
     tell("told", "Stopping …");
+    const late = setTimeout(() => tell("told", "STOP: no answer yet. Use the switch in your hand, or cut the power."), 1000);
     try {
       const response = await fetch("/stop", { method: "POST" });
       if (!response.ok) throw new Error(await response.text());
       tell("told", "STOP: " + (await response.json()).join("\n"));
     } catch (error) {
       tell("told", "STOP DID NOT ARRIVE: cut the power. " + error.message);
-    }
+    } finally { clearTimeout(late); }
   }
   // At the press: a finger may rest on the button.
   for (const kind of ["pointerdown", "click"])
@@ -33,15 +37,16 @@ const entrain = { heartbeat: false, acting: false };
 
   async function alive() {
     const sent = Date.now();
+    if (window.did_handshake && !window.socket.connected) toldAt = -Infinity;
     try {
-      const body = JSON.stringify({ watching: document.visibilityState === "visible" });
+      const body = document.visibilityState === "visible" ? "watching" : "";
       const signal = AbortSignal.timeout(2000);
       const response = await fetch("/alive", { method: "POST", body, signal });
       if (!response.ok) throw new Error(await response.text());
       const now = (await response.json()).now;
       if (lost > 2) location.reload(); // another server may have come
       lost = 0;
-      tell("lost", "");
+      tell("lost", isOld() ? "What you see is old: nothing comes from the page's server. STOP works." : "");
       const off = ((sent + Date.now()) / 2 - now) / 1000;
       tell("clock", Math.abs(off) * 1000 > OFF
         ? `The clock of this browser is ${off > 0 ? "ahead" : "behind"} by ${Math.abs(off).toFixed(1)} s: times on this page are those of the host.` : "");
@@ -51,22 +56,26 @@ const entrain = { heartbeat: false, acting: false };
     }
     setTimeout(alive, entrain.heartbeat ? 150 : 500);
   }
-  const gone = () => navigator.sendBeacon("/alive", JSON.stringify({ watching: false }));
-  addEventListener("pagehide", gone);
+  const gone = () => navigator.sendBeacon("/alive", "gone");
+  addEventListener("pagehide", () => { if (!document.hidden) gone(); });
   document.addEventListener("visibilitychange", () => { if (document.hidden) gone(); });
-  addEventListener("beforeunload", (event) => { if (entrain.heartbeat && entrain.acting) event.preventDefault(); });
+  // No question stands before STOP when a page that was lost is loaded anew.
+  addEventListener("beforeunload", (event) => { if (entrain.heartbeat && entrain.acting && !isOld()) event.preventDefault(); });
   addEventListener("DOMContentLoaded", alive);
 
   // Angles: hips and ankles, left and right [rad]; lengths are those of the drawing.
+  let posture = [[]];
+  addEventListener("resize", () => entrain.legs(...posture));
   entrain.legs = (angles, perturbed, pushes) => {
     const canvas = document.querySelector("canvas.legs");
-    if (!canvas || !canvas.clientWidth) return;
+    posture = [angles, perturbed, pushes];
+    if (!angles.length || !canvas || !canvas.clientWidth) return;
     const ratio = devicePixelRatio, width = canvas.clientWidth, height = canvas.clientHeight;
     if (canvas.width !== width * ratio || canvas.height !== height * ratio) { canvas.width = width * ratio; canvas.height = height * ratio; }
     const draw = canvas.getContext("2d");
     draw.setTransform(ratio, 0, 0, ratio, 0, 0);
     draw.clearRect(0, 0, width, height);
-    const length = 0.7 * height, foot = 0.22 * length, ground = height - 16;
+    const length = 0.7 * Math.min(width, height), foot = 0.22 * length, ground = height - 16;
     const legs = [0, 1].map((side) => {
       const hip = angles[side], pitch = angles[2 + side] - hip; // of the foot, toe down positive
       const heel = [length * Math.sin(hip), -length * Math.cos(hip)];

@@ -119,15 +119,16 @@ def _section(place: Place, *, drawn: bool) -> RunSection:
 
 
 def _drawn(run: RecordedRun, findings: list[Findings]) -> list[tuple[str, str]]:
-    drawn = run_figures(run)
+    drawn = [*run_figures(run).items()]
     for one in findings:
-        name = f"circle {one.part.name}".strip()
-        drawn[name] = figures.draw_circle(one)
+        if one.part.analysis.pulses:
+            name = f": {one.part.name}" if one.part.name else ""
+            drawn.append((f"circle{name}", figures.draw_circle(one)))
     salt = f"{findings[0].placed.place.bag}"
     return [
-        (title + name.removeprefix(key), figures.svg_of(drawn[name], salt + name))
+        (title + name.removeprefix(key), figures.svg_of(figure, f"{salt}{number}{name}"))
         for key, title in _TITLES.items()
-        for name in drawn
+        for number, (name, figure) in enumerate(drawn)
         if name.startswith(key)
     ]
 
