@@ -20,7 +20,7 @@ BAG = Path(__file__).parents[2] / "bags" / "paper_example"
 # What is wrong; the options; what the line must name, field and allowed range.
 WRONG_USAGE = {
     "negative width": (["--width=-0.1"], ["width", "-0.1", "1e-09 to 10 s"]),
-    "overlapping pulses": (["--width=0.4", "--period=0.3"], ["width", "0.3", "below the period"]),
+    "overlapping pulses": (["--width=0.4", "--period=0.3"], ["width", "0.3", "above the width"]),
     "weak spring": (["--ankle-stiffness=60"], ["ankle_stiffness", "60", "allowed:"]),
     "NaN": (["--mass=nan"], ["mass", "nan", "above 0"]),
     "infinite": (["--period-offset=inf"], ["period_offset", "inf", "-100"]),
