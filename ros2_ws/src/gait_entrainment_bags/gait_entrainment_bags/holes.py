@@ -3,14 +3,11 @@
 
 """What is missing from the record of a run, by counts, revisions and step numbers."""
 
-import math
 from collections import Counter
 from typing import Any
 
-from gait_entrainment.robot import TorqueProfile
 from gait_entrainment_bags.decoding import decoder_for
 from gait_entrainment_bags.errors import BagError
-from gait_entrainment_bags.messages import MessageError, counts_of, profile_of, stop_of
 from gait_entrainment_bags.metadata import TopicInfo
 
 _COUNTS = "gait_entrainment_msgs/msg/PublishedCounts"
@@ -43,7 +40,7 @@ class RunRecord:
         try:
             message: Any = decoder_for(topic)(data)
             if topic.type == _COUNTS:
-                self._published |= counts_of(message)
+                self._published |= dict(zip(message.topics, message.counts, strict=False))
                 return
             place = topic, message.run, message.side if topic.type == _PROFILE else 0
             numbers = self._numbers.setdefault(place, set())
@@ -53,7 +50,7 @@ class RunRecord:
             numbers.add(message.revision)
             if message.last or message.stop:
                 self._ended.add(place)
-        except (BagError, MessageError, AttributeError):
+        except (BagError, AttributeError):
             return
 
     def holes(self) -> list[str]:
@@ -70,52 +67,3 @@ class RunRecord:
             if topic.type == _PROFILE and place not in self._ended:
                 holes.append(f"{topic.name}: the end of run {run}")
         return holes
-
-
-class ProfileOrder:
-    """
-    Holds each torque profile of an ankle against the one before; instants are [ns since 1970].
-
-    By contract they adjoin. Where they do not, a span is missing, or what was said before was not
-    so; after a stop, and once the run is over, nothing is owed.
-    """
-
-    def __init__(self) -> None:
-        self._owed_from: float | None = None  # where the next one begins; None before the first
-        self._revision = -1
-
-    def take(
-        self, message: Any
-    ) -> tuple[int | None, tuple[int, int] | None, TorqueProfile | None]:
-        """
-        Take a TorqueProfile message.
-
-        Returns the instant from which all that was promised is void, the span before it of which
-        no profile is here, and the profile, each of them None if there is none. Raises
-        MessageError for what is no profile, or comes again or late.
-        """
-        stop = stop_of(message)
-        if stop is not None:
-            self._owed_from = math.inf
-            return stop, None, None
-        profile = profile_of(message)
-        begin, owed = profile.times[0], self._owed_from
-        void = hole = None
-        if owed is None:
-            hole = (0, begin) if message.revision else None
-        elif begin > owed:
-            if message.revision == self._revision + 1:  # nothing lies between: one of them errs
-                raise MessageError("times: do not adjoin those of the revision before")
-            hole = int(owed), begin
-        elif begin < owed < math.inf:
-            if message.revision <= self._revision:
-                raise MessageError(f"revision: {message.revision} after {self._revision}")
-            void = begin
-        self._revision = message.revision
-        self._owed_from = math.inf if message.last else profile.valid_until
-        return void, hole, profile
-
-    def hole_up_to(self, instant: int) -> tuple[int, int] | None:
-        """Return the span up to an instant, the latest of the record, that no profile covers."""
-        owed = self._owed_from or 0
-        return (int(owed), instant) if instant > owed else None

@@ -23,8 +23,7 @@ from gait_entrainment_bags.reader import BagReader
 FASTEST = float("inf")
 """Rate at which every message is due at once: whoever takes them sets the pace."""
 
-# Nobody waits for the ticks of a longer silence [ns], such as before a message whose log time is
-# years ahead.
+# Nobody waits for the ticks of a longer silence [ns], as before a log time that is years ahead.
 _LONGEST_TICKING = 3600 * NANOSECONDS_PER_SECOND
 # Messages are read ahead in this many batches of this many messages.
 _BATCHES, _BATCH = 8, 500
@@ -44,8 +43,8 @@ class Playback:
     Played are the topics of these names, from ``start_offset`` seconds into the bag, to which a
     loop returns, for ``duration`` seconds. The rate is in seconds of the bag per second, above 0;
     `FASTEST` is no pace at all. The clock ticks every ``clock_period`` seconds of the bag from
-    the start on, 0: never; so a listener sees the same ticks at every rate, but for those of an
-    hour's silence, which `FASTEST` leaves out.
+    the start on, 0: never; so a listener sees the same ticks at every rate, but for an hour's
+    silence, which `FASTEST` skips.
 
     Raises BagError if a number is out of range or a topic is not in the bag, NothingToPlayError if
     none has a message; UnreadableBagError, from every method that moves on, if the bag is damaged.

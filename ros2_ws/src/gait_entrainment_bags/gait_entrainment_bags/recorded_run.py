@@ -206,8 +206,7 @@ def _lost(bag: BagReader) -> int | None:
     published: dict[str, int] = {}
     names = [n for n, topic in bag.topics.items() if topic.type.endswith("/PublishedCounts")]
     for _, message in bag.decoded(names):
-        with suppress(messages.MessageError):
-            published |= messages.counts_of(message)
+        published |= dict(zip(message.topics, message.counts, strict=False))
     lost = sum(max(n - bag.counts.get(name, n), 0) for name, n in published.items())
     told = bag.custom_data.get("messages_lost")
     if told is None or (RECOVERY_KEY in bag.custom_data and not published):

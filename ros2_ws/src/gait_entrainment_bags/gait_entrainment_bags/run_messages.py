@@ -20,9 +20,8 @@ from gait_entrainment.gait.analyzer import Result
 from gait_entrainment_bags import messages, topic_names
 from gait_entrainment_bags.decoding import decoder_for
 from gait_entrainment_bags.errors import BagError
-from gait_entrainment_bags.holes import ProfileOrder
 from gait_entrainment_bags.mcap_records import BagMessage
-from gait_entrainment_bags.messages import pulse_of, side_of, state_of
+from gait_entrainment_bags.messages import ProfileOrder, pulse_of, side_of, state_of
 from gait_entrainment_bags.reader import BagReader
 from gait_entrainment_commands.timing import MeasuredOnsets
 

@@ -3,12 +3,9 @@
 
 """The client of a replay: starts the player, and collects what the analyzer publishes."""
 
-from contextlib import suppress
-
 from std_srvs.srv import Trigger
 from tqdm import tqdm
 
-from gait_entrainment_bags.messages import MessageError, counts_of
 from gait_entrainment_bringup.supervisor import Supervisor
 from gait_entrainment_bringup.watch import Watch
 from gait_entrainment_msgs.msg import PublishedCounts
@@ -84,5 +81,4 @@ class ReplayClient(Client):
 
     def _on_counts(self, message: PublishedCounts) -> None:
         if message.node.rpartition("/")[2] == "gait_analyzer":
-            with suppress(MessageError):
-                self._counts = counts_of(message)
+            self._counts = dict(zip(message.topics, message.counts, strict=False))

@@ -22,13 +22,8 @@ def _option(field: str) -> str:
 
 def add_protocol_options(parser: argparse.ArgumentParser) -> None:
     """Add the protocol file and the options that override its fields."""
-    parser.add_argument(
-        "protocol",
-        nargs="?",
-        type=Path,
-        metavar="PROTOCOL.yaml",
-        help="default: the paper's example",
-    )
+    told = "default: the paper's example"
+    parser.add_argument("protocol", nargs="?", type=Path, metavar="PROTOCOL.yaml", help=told)
     fields = parser.add_argument_group("fields of the protocol")
     limits = parser.add_argument_group("limits of what the person may get")
     for field, setting in FIELDS.items():

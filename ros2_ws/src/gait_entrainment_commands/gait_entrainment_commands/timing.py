@@ -34,8 +34,8 @@ def measured_onset(
     """
     Find where a torque first rises through a fraction of a pulse's height.
 
-    ``stamps`` [ns] ascend from before the pulse on, ``torques`` [N m] are measured at them, not
-    finite if none was. A negative ``height`` [N m] is crossed downwards; ``fraction`` is in (0, 1).
+    ``stamps`` [ns] ascend from before the pulse on, ``torques`` [N m] are measured at them, NaN if
+    none was. A negative ``height`` [N m] is crossed downwards; ``fraction`` is in (0, 1).
 
     Returns the index of the first state past the crossing, and the instant of the crossing [ns],
     interpolated linearly between two states; None if the torque never gets there, or is over the

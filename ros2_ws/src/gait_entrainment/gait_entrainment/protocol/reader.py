@@ -146,12 +146,13 @@ def entries_in(
     seen: set[str] = set()
     for key_node, value_node in node.value:
         where = f"{name}:{key_node.start_mark.line + 1}"
-        if not isinstance(key_node, yaml.ScalarNode):
-            raise ProtocolError(f"{where}: the name of a field must be a single word")
-        key = prefix + key_node.value
+        key = prefix + (key_node.value if isinstance(key_node, yaml.ScalarNode) else "?")
         if key in seen:
             raise ProtocolError(f"{where}: {key}: appears twice; keep one")
         seen.add(key)
+        text = key in allowed and allowed[key].kind is str
+        listed = text and isinstance(value_node, yaml.SequenceNode)
+        items = value_node.value if listed else [value_node]
         if key == "blocks" and allowed is FIELDS:
             if not isinstance(value_node, yaml.SequenceNode) or not value_node.value:
                 raise ProtocolError(f"{where}: blocks: must be a list of at least one block")
@@ -161,31 +162,18 @@ def entries_in(
             yield key, Entry(value_node, where)
         elif any(field.startswith(f"{key}.") for field in allowed):
             yield from entries_in(value_node, name, allowed, f"{key}.")
-        elif key not in allowed or "." in key_node.value:  # a section's field has one place
+        elif key not in allowed or "." in key.removeprefix(
+            prefix
+        ):  # a section's field has one place
             inside = [field.removeprefix(prefix) for field in allowed if field.startswith(prefix)]
             known = ", ".join(sorted({field.partition(".")[0] for field in inside}))
             raise ProtocolError(f"{where}: {key}: unknown field; allowed: {known}")
-        elif allowed[key].kind is str:  # as written, also if YAML would make a number of it
-            listed = isinstance(value_node, yaml.SequenceNode)
-            words = value_node.value if listed else [value_node]
-            if not all(isinstance(word, yaml.ScalarNode) for word in words):
-                raise ProtocolError(f"{where}: {key}: must be a single value, or a list of such")
-            yield key, Entry(", ".join(word.value for word in words), where)
-        elif not isinstance(value_node, yaml.ScalarNode):
+        elif not all(isinstance(item, yaml.ScalarNode) for item in items):
             raise ProtocolError(f"{where}: {key}: must be a single value")
+        elif text:  # as written, also if YAML would make a number of it
+            yield key, Entry(", ".join(item.value for item in items), where)
         else:
-            kind = allowed[key].kind
-            try:
-                value = yaml.SafeLoader("").construct_object(value_node)
-            except Exception:  # an unknown tag, a month 13: PyYAML passes on what it runs into
-                raise ProtocolError(
-                    f"{where}: {key}: {value_node.value[:40]!r} cannot be read as a value"
-                ) from None
-            if kind in (int, float):
-                _require_plain_number(where, key, value_node, value)
-            number = isinstance(value, int | float) and isinstance(value, bool) is (kind is bool)
-            if value is not None and not number:
-                value = value_node.value  # is told as it was written
+            value = _meant(f"{where}: {key}", allowed[key].kind, value_node)
             yield _spelled_out(key, Entry(value, where))
 
 
@@ -195,15 +183,25 @@ def _spelled_out(key: str, entry: Entry) -> tuple[str, Entry]:
     return ("both_legs", entry._replace(value=True)) if both else (key, entry)
 
 
-def _require_plain_number(where: str, key: str, node: yaml.ScalarNode, value: object) -> None:
-    """Raise ProtocolError for what YAML 1.1 takes for another number than people do, or a text."""
-    if node.style in ("'", '"'):
-        raise ProtocolError(f"{where}: {key}: {node.value!r} is a text: leave out the quotes")
+def _meant(where: str, kind: type, node: yaml.ScalarNode) -> object:
+    """
+    Return a number, a switch or nothing; else what is written, so that it is told like this.
+
+    Raises ProtocolError for what YAML 1.1 takes for another number than people do, or a text.
+    """
+    if kind in (int, float) and node.style in ("'", '"'):
+        raise ProtocolError(f"{where}: {node.value!r} is a text: leave out the quotes")
+    try:
+        value = yaml.SafeLoader("").construct_object(node)
+    except Exception:  # an unknown tag, a month 13: PyYAML passes on what it runs into
+        raise ProtocolError(f"{where}: {node.value[:40]!r} cannot be read as a value") from None
     other_base = isinstance(value, int) and re.match(r"[-+]?0[0-9_box]", node.value)
     if other_base or (isinstance(value, int | float) and ":" in node.value):
         raise ProtocolError(
-            f"{where}: {key}: {node.value} is {value} in YAML; write it as a decimal number"
+            f"{where}: {node.value} is {value} in YAML; write it as a decimal number"
         )
+    fits = isinstance(value, int | float) and isinstance(value, bool) is (kind is bool)
+    return value if fits or value is None else node.value
 
 
 def _merged(entries: Mapping[str, Entry], replacing: Mapping[str, Entry]) -> dict[str, Entry]:

@@ -73,7 +73,7 @@ class TorqueProfile:
 
         Raises ProfileError if it does not adjoin the one before, which ends at ``begin`` [ns],
         goes beyond ``until`` [ns], if that is known, its pieces are not ascending, finite and one
-        for each time, or its onsets not ascending and within.
+        for each time, or its onsets not ascending within.
         """
         if not self.times or len(self.times) != len(self.torques):
             raise ProfileError("a profile needs one torque for each time, and at least one")

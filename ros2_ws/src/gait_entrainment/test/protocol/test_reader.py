@@ -92,7 +92,7 @@ def test_what_is_written_reads_back_the_same(
         ("baseline: 0x10", ("baseline: 0x10 is 16 in YAML",)),
         ("baseline: 1:30", ("baseline: 1:30 is 90 in YAML",)),
         ("rest: 1:30.0", ("rest: 1:30.0 is 90.0 in YAML",)),
-        ("? [rest]\n: 1", ("name of a field", "single word")),
+        ("? [rest]\n: 1", ("?: unknown field",)),
         ("driver: [[ideal]]", ("driver", "single value")),
         ('baseline: "5"', ("baseline: '5' is a text: leave out the quotes",)),
         ("pulses: {width: '0.1'}", ("pulses.width: '0.1' is a text",)),

@@ -16,7 +16,6 @@ import struct
 import time
 from collections import Counter
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from operator import itemgetter
 from typing import Any
@@ -36,7 +35,6 @@ from gait_entrainment_bags import (
     find_definition,
 )
 from gait_entrainment_bags import QosProfile as OfferedQos
-from gait_entrainment_bags.messages import MessageError, counts_of
 from gait_entrainment_msgs.msg import Progress, PublishedCounts
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.raw_messages import message_class
@@ -324,8 +322,8 @@ class BagRecorder(Participant):
     def _on_counts(self, data: bytes) -> None:
         """Take a publisher's final counts."""
         message = deserialize_message(data, PublishedCounts)
-        with suppress(MessageError):
-            self._published[message.node.rpartition("/")[2]] = counts_of(message)
+        node = message.node.rpartition("/")[2]
+        self._published[node] = dict(zip(message.topics, message.counts, strict=False))
         if self._final_at is None and self._expected <= self._published.keys():
             self._final_at = time.monotonic()
 

@@ -9,8 +9,8 @@ from typing import Any
 from gait_entrainment.conventions import Side
 from gait_entrainment.gait import Entrainment, GaitAnalyzer, PulsePhase, Stride, VerdictSettings
 from gait_entrainment.gait.analyzer import Result
-from gait_entrainment_bags.holes import ProfileOrder
 from gait_entrainment_bags.messages import (
+    ProfileOrder,
     event_of,
     nanoseconds_of,
     pulse_of,

@@ -12,8 +12,7 @@ from gait_entrainment.parameters import Variation, WalkerParameters
 from gait_entrainment.robot import ProfileError, TorqueProfile
 from gait_entrainment.walker import Ending, Samples, Transition, Walker
 
-# A walker of human size is promised at most so much torque at once [s]: an experiment asks for a
-# stride, and it would walk for hours before it heard anybody again.
+# A walker of human size is promised at most so much at once [s], where a stride is asked for.
 _LONGEST_PROMISE = 1000.0
 
 
