@@ -64,6 +64,7 @@ def actions() -> dict[str, Callable[[EntrainRun], None]]:
         found[f"kill {node}"] = lambda run, n=node: os.kill(run.nodes[n], signal.SIGKILL)
         found[f"freeze {node}"] = lambda run, n=node: os.kill(run.nodes[n], signal.SIGSTOP)
     found["kill torque loop"] = lambda run: os.kill(torque_loop(run), signal.SIGKILL)
+    found["freeze torque loop"] = lambda run: os.kill(torque_loop(run), signal.SIGSTOP)
     found["kill entrain run"] = lambda run: os.kill(run.process.pid, signal.SIGKILL)
     found["freeze entrain run"] = lambda run: os.kill(run.process.pid, signal.SIGSTOP)
     for name in STOPPING:

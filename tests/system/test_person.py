@@ -119,7 +119,7 @@ def test_a_walker_from_outside_plays_the_role(tmp_path, monkeypatch):
     monkeypatch.setenv("ROS_DOMAIN_ID", "231")  # which no run takes by itself
     outside = subprocess.Popen([sys.executable, EXAMPLE])
     try:
-        options = ("--real-time", "--walker=person", "--elsewhere=gait_detector", "--json")
+        options = ("--real-time", "--walker=person", "--elsewhere=walker", "--json")
         with entrain_run(tmp_path / "bag", *options, *SHORT) as run:
             outcome = run.outcome()
         assert outside.poll() is None  # how rclpy ends it is another matter

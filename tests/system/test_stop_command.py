@@ -18,7 +18,13 @@ import pytest
 from harness import entrain_run
 from test_drivers import entrain
 
-from gait_entrainment_drivers.stop_channel import PREFIX, StopAnswer, StopListener, stop_all
+from gait_entrainment_drivers.stop_channel import (
+    PREFIX,
+    StopAnswer,
+    StopListener,
+    listening,
+    stop_all,
+)
 
 
 def test_stop_from_the_command_line_ends_a_run(tmp_path):
@@ -29,6 +35,15 @@ def test_stop_from_the_command_line_ends_a_run(tmp_path):
         assert re.search(r"perturbator/\d+: the stop is latched", out)
         assert run.wait() == 1
         assert "stopped: The stop was called." in run.text
+
+
+def test_a_stop_is_not_forgotten_before_there_is_a_robot(tmp_path):
+    with entrain_run(tmp_path / "bag", "--real-time") as run:
+        while not any(name.startswith("entrain_run/") for name in listening()):
+            time.sleep(0.01)
+        stop_all(0.0)
+        assert run.wait() == 1
+        assert "entrain run: the stop was called" in run.text
 
 
 def test_stop_that_finds_nobody_says_so():

@@ -58,14 +58,8 @@ def pressed_key() -> str:
 
 
 def _is_attended() -> bool:
-    """
-    Whether keys come to this process.
-
-    A job in the background that touches its terminal is suspended by that, run and all.
-    """
-    if not os.isatty(0):
-        return False
+    """Whether keys come here: a job in the background that touches its terminal is suspended."""
     try:
-        return os.tcgetpgrp(0) == os.getpgrp()
+        return os.isatty(0) and os.tcgetpgrp(0) == os.getpgrp()
     except OSError:  # it is not the terminal that controls jobs
         return True

@@ -48,11 +48,7 @@ def check_heartbeat(options: argparse.Namespace, protocol: Protocol | None) -> N
 
 
 def checked_page(options: argparse.Namespace, protocol: Protocol | None) -> dict[str, Any]:
-    """
-    Return the node's parameters, and put its tokens into the environment.
-
-    Raises UsageError.
-    """
+    """Return the node's parameters, its tokens into the environment; raises UsageError."""
     check_heartbeat(options, protocol)
     access = Access.of_environment(options.host, options.token)
     port = _PORT.parse("--port", options.port)
@@ -68,10 +64,5 @@ def checked_page(options: argparse.Namespace, protocol: Protocol | None) -> dict
     with listen(options.host, port) as listener:
         port = listener.getsockname()[1]
     os.environ.update(access.environment)
-    return {
-        "host": options.host,
-        "port": port,
-        "heartbeat": options.heartbeat,
-        "blinded": options.blinded,
-        "foxglove": foxglove,
-    }
+    given = {name: getattr(options, name) for name in ("host", "heartbeat", "blinded")}
+    return given | {"port": port, "foxglove": foxglove}

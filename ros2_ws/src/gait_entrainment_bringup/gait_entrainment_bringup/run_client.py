@@ -14,6 +14,7 @@ from gait_entrainment_bringup.node_list import RUN_CLIENT
 from gait_entrainment_bringup.operator_console import Operator, keys_at_once
 from gait_entrainment_bringup.supervisor import Supervisor
 from gait_entrainment_bringup.watch import Watch
+from gait_entrainment_drivers.stop_channel import StopAnswer, StopListener
 from gait_entrainment_msgs.action import RunProtocol
 from gait_entrainment_nodes.messaging.client import Client
 from gait_entrainment_nodes.messaging.environment import come_before_others
@@ -37,13 +38,14 @@ def conduct(
     quiet: bool,
     real_time: bool,
     silence: float,
+    early: StopListener,
 ) -> None:
     """
     Conduct a protocol through the experiment node to its end, and watch the processes meanwhile.
 
     ``on_start`` is called once the experiment has accepted it. In ``real_time`` this process comes
-    before others. Nodes that nobody else watches may be silent for ``silence`` [s].
-    Raises NodeError if the run fails.
+    before others. Nodes that nobody else watches may be silent for ``silence`` [s]. Until the run
+    has begun, ``early`` hears a stop. Raises NodeError if the run fails.
     """
     bar = tqdm(total=protocol.strides, unit="stride", disable=True if quiet else None, leave=False)
     with bar, keys_at_once(), Client(RUN_CLIENT) as client:
@@ -54,6 +56,7 @@ def conduct(
             bar.set_postfix_str(" ".join(latest.values()), refresh=False)
 
         def on_feedback(message: Any) -> None:
+            early.close()
             bar.update(message.feedback.state.stride - bar.n)
 
         client.subscribe(STRIDES, lambda s: show(stride=f"period {s.period:.4f} s"))
@@ -66,6 +69,9 @@ def conduct(
         def look() -> None:
             watch()
             operator()
+            if early.fileno() >= 0 and (askers := early.requests()):
+                early.answer(askers, StopAnswer(True, "the run ends"))
+                raise NodeError("the stop was called", "")
 
         client.each_round = look
         if real_time:

@@ -104,7 +104,8 @@ def test_a_paused_session_waits_and_repeats_the_block_before_it_goes_on(
         desk().repeat("belt stopped")
         desk().note("go on", 1)
 
-    monkeypatch.setattr(session_run.time, "sleep", meanwhile)
+    # Its own clock: other threads of the test's process sleep, too.
+    monkeypatch.setattr(session_run, "time", SimpleNamespace(sleep=meanwhile))
     folder = conduct(ends=first_block())
     assert [bag for _, bag, _ in conduct.conducted] == ["block-01", "block-01_run-2", "block-02"]
     assert [what for what, _, _ in ledger(folder)][:5] == [
@@ -149,7 +150,6 @@ def test_a_repetition_needs_a_block_that_is_done(conduct):
 
 def test_rests_are_counted_down_for_a_person_only(conduct, capsys, monkeypatch):
     slept = []
-    # Its own clock: other threads of the test's process sleep, too.
     clock = SimpleNamespace(monotonic=lambda: sum(slept), sleep=slept.append)
     monkeypatch.setattr(session_run, "time", clock)
     conduct(real_time=True)

@@ -12,7 +12,7 @@ import pytest
 
 from gait_entrainment_bringup import supervisor as module
 from gait_entrainment_bringup.supervisor import LOG_LINES, TIMEOUT, Supervisor
-from gait_entrainment_drivers.signals import STOPPING, stop_on_signals
+from gait_entrainment_commands.signals import STOPPING, stop_on_signals
 
 OBEDIENT = """
 import signal, sys, time

@@ -105,6 +105,8 @@ class HostTimedRobot(AnkleRobot):
         self._promised = 0  # up to this instant [ns]; 0 until a run begins
         self._offset = time.time_ns() - time.monotonic_ns()  # from steady time to stamps
         self._done: dict[str, str] = {}  # answers of the loop: error texts
+        # The loop ends its torque by itself if it is late, and comes no more often than its rate.
+        self._patience = max(options.host_silence, options.lateness + 2 / options.rate)
         self._streams, self._heard_at = False, 0.0  # the loop, and when it was heard last [s]
         self._latest = 0  # stamp of its latest sample [ns]
 
@@ -264,7 +266,7 @@ class HostTimedRobot(AnkleRobot):
         now = time.monotonic()
         if messages or not self._streams:
             self._heard_at = now
-        elif now - self._heard_at > self._options.host_silence:
+        elif now - self._heard_at > self._patience:
             self._miss(_LOOP_SILENT)
         for kind, *content in messages:
             if kind == "samples":

@@ -53,6 +53,9 @@ class StopListener:
     def __init__(self, name: str) -> None:
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
+        os.register_at_fork(
+            after_in_child=self.close
+        )  # what it held open would be stopped in vain
         short = _UNFIT.sub("_", name)[-_LONGEST_NAME:]
         # A process may hold several robots of one name.
         for number in itertools.count(1):

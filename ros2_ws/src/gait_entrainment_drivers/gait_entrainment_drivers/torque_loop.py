@@ -244,8 +244,11 @@ class TorqueLoop:
             with contextlib.suppress(Exception):
                 reading = self._device.exchange(0.0, 0.8 * self._period)
                 torque = math.inf if reading is None else reading.torque
+                if reading is not None:
+                    self._answered_at, self._measured = time.monotonic(), torque
             ticks += 1
             time.sleep(self._period)
+        self._answer_stops(time.monotonic())  # nobody would, once it is disabled
         with contextlib.suppress(Exception):
             self._device.disable()
 

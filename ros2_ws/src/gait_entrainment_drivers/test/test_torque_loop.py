@@ -18,7 +18,7 @@ from gait_entrainment.robot.guard import GuardedRobot
 from gait_entrainment_drivers.host_timed import LoopOptions
 from gait_entrainment_drivers.link import Link
 from gait_entrainment_drivers.monitor import Monitor, MonitorSettings
-from gait_entrainment_drivers.stop_channel import NO_ANSWER, listening, stop_all
+from gait_entrainment_drivers.stop_channel import NO_ANSWER, PREFIX, listening, stop_all
 from gait_entrainment_drivers.torque_loop import TorqueLoop
 
 from .emulator_process import until
@@ -200,21 +200,50 @@ def test_a_frozen_loop_gives_no_answer_and_is_named(bench):
     assert {torque for _, torque in device.commands()[asked:]} == {0.0}
 
 
-def test_a_stop_that_comes_before_the_device_is_opened_is_not_forgotten():
-    options = MisbehavingOptions()
+@pytest.fixture
+def loop():
+    """A loop in this process, and the parent's end of its link."""
+    options = MisbehavingOptions(rate=1000.0)
     ours, theirs = map(Link, socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET))
-    loop = TorqueLoop(theirs, MisbehavingDevice(options), options)
+    made = TorqueLoop(theirs, MisbehavingDevice(options), options)
+    yield made, ours
+    made._closing = True
+    made.serve()
+
+
+def push(parent):
+    now = time.monotonic_ns()
+    parent.send("train", PulseTrain.periodic(Side.LEFT, now, 9.0, 1, HEIGHT, 9.0))
+
+
+def test_a_stop_that_comes_before_the_device_is_opened_is_not_forgotten(loop):
+    made, parent = loop
     stop_all(0.0)
     for step in ("open", "enable"):
-        ours.send(step)
-    loop._listen()
-    ours.send("train", PulseTrain.periodic(Side.LEFT, time.monotonic_ns(), 1.0, 1, HEIGHT, 1.0))
-    loop._tick()
-    assert loop._samples == []  # sent
-    *_, (_, (sample,)) = ours.received()
+        parent.send(step)
+    made._listen()
+    push(parent)
+    made._tick()
+    *_, (_, (sample,)) = parent.received()
     assert sample.commanded == 0.0
-    loop._closing = True
-    loop.serve()
+
+
+def test_who_asked_for_a_stop_is_answered_although_the_device_is_disabled_at_once(loop):
+    made, parent = loop
+    for step in ("open", "enable"):
+        parent.send(step)
+    made._listen()
+    push(parent)
+    while not made._measured > HEIGHT / 2:
+        made._tick()
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as asker:
+        asker.bind("")
+        (name,) = (name for name in listening() if name.startswith("bench_device/"))
+        asker.sendto(b"stop", f"\0{PREFIX}{name}")
+        parent.send("disable")
+        made._listen()
+        asker.settimeout(5.0)
+        assert b"torque is zero, latched" in asker.recv(1000)
 
 
 def test_a_closed_robot_listens_no_more(bench):

@@ -169,7 +169,7 @@ def test_recorder_is_named_if_it_is_what_the_walker_waits_for():
     bench.report(10 * SECOND + HALF)
     bench.promise()
     bench.after(2.0)
-    bench.run.take_recorder_progress(Progress(run=7, grant=0))
+    bench.run.take_recorder_progress(Progress(run=7, header=header(10 * SECOND + HALF)))
     bench.report(11 * SECOND)
     bench.promise()
     assert bench.after(TIMEOUT) is None

@@ -47,3 +47,5 @@ def test_inertial_sensors_are_told_apart_by_name_and_strange_signals_are_refused
         source_of("mine", ("gyro_y", "heel"))
     with pytest.raises(IndexError):  # a joint state of no joint
         ENCODER.reader(("angle",))(sensor_topics(ENCODER)[0].type())
+    unworn = sensor_topics(ENCODER)[0].type(position=[0.3])  # by no robot, so without torque
+    assert ENCODER.reader(("angle", "torque"))(unworn) == (0.3, 0.0)

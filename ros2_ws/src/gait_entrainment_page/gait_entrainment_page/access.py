@@ -36,22 +36,14 @@ LONGEST_NOTE = 500
 
 @dataclass
 class Access:
-    """
-    Who may look and act.
-
-    Without ``tokens`` whoever reaches the page may both: it is then bound to this host.
-    """
+    """Who may look and act: without ``tokens``, whoever reaches a page bound to this host."""
 
     host: str
     tokens: dict[str, str] = field(default_factory=dict)  # role by token
 
     @classmethod
     def of(cls, host: str, token: str = "", look_token: str = "") -> "Access":
-        """
-        Return the access to a page that is bound to a host, with tokens that are made if needed.
-
-        Raises UsageError for a chosen token that is short.
-        """
+        """Return that to a page of a host; raises UsageError for a chosen token that is short."""
         for given in filter(None, (token, look_token)):
             if len(given) < TOKEN_LENGTH or not (given.isascii() and given.isalnum()):
                 raise UsageError(f"--token: allowed: at least {TOKEN_LENGTH} letters and digits")
@@ -138,9 +130,8 @@ class Gate:
         role = self._access.role(token)
         if not role:
             wrong = "the token is wrong" if token else "this page asks for a token"
-            await _answer(
-                scope, send, 401, f"{wrong}: open the address that entrain page has printed"
-            )
+            told = f"{wrong}: open the address that entrain page has printed"
+            await _answer(scope, send, 401, told)
             return
         if given and self._access.tokens and scope["type"] == "http":
             cookie = self._cookie(_TOKEN, given)
@@ -208,17 +199,15 @@ class Seat:
         self._heard_at = -math.inf  # steady time [s]
 
     def heard(self, browser: str, *, watching: bool) -> None:
-        """Note a sign of life; a page that is closed or hidden gives none from now on."""
+        """Note a sign of life, by which a free seat is taken, or that there will be none."""
+        if watching:
+            self.holder = self.holder or browser
         if browser == self.holder:
             self._heard_at = time.monotonic() if watching else -math.inf
 
     def take(self, browser: str) -> None:
         """Take the seat, whoever has it, by a click: a sign of life itself."""
         self.holder, self._heard_at = browser, time.monotonic()
-
-    def offer(self, browser: str) -> None:
-        """Take the seat if nobody has it."""
-        self.holder = self.holder or browser
 
     @property
     def watched(self) -> bool:
@@ -237,12 +226,10 @@ def listen(host: str, port: int, option: str = "--port") -> socket.socket:
     except OSError as error:
         listener.close()
         causes = {errno.EADDRINUSE: "taken by another program", errno.EACCES: "for root alone"}
+        told = f"--host: {host}: {error.strerror}; allowed: an address of here"
         if (cause := causes.get(error.errno or 0)) is not None:
             told = f"{option}: {port} is {cause}; choose another, or 0 for a free one"
-            raise UsageError(told) from None
-        raise UsageError(
-            f"--host: {host}: {error.strerror}; allowed: an address of here"
-        ) from None
+        raise UsageError(told) from None
     return listener
 
 

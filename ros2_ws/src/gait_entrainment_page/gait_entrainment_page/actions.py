@@ -48,21 +48,23 @@ def stop(nodes: Nodes | None) -> list[str]:
     """
     Bring every robot of this machine to zero torque, as `entrain stop` does; return the answers.
 
-    The one that the page shows may be driven by another machine: it is asked over ROS, too, and
-    its answer is waited for if this machine drives none.
+    The one that is shown may be elsewhere: asked over ROS, too, it answers if there is none here.
     """
-    asked = None
-    if nodes is not None and "stop" in nodes.offered():
-        asked = _ASKED.submit(attempted, partial(nodes.ask, "stop"))
+    asked = _ASKED.submit(_ask_over_ros, nodes)
     answers = stop_all()
     lines = [f"{name}: {answer.message}" for name, answer in answers.items()]
     done = all(answer.done for answer in answers.values())
     if not answers:
-        if asked is None:
-            return ["no robot is driven by this machine"]
         done, answer = asked.result()
-        lines = [f"asked over ROS: {answer}"]
+        lines = [answer]
     return lines if done else [*lines, "not everybody confirmed the stop: cut the power"]
+
+
+def _ask_over_ros(nodes: Nodes | None) -> tuple[bool, str]:
+    if nodes is None or "stop" not in nodes.offered():
+        return True, "no robot is driven by this machine"
+    done, answer = attempted(partial(nodes.ask, "stop"))
+    return done, f"asked over ROS: {answer}"
 
 
 async def stop_at_once(nodes: Nodes | None) -> list[str]:
@@ -119,8 +121,7 @@ class Command:
         """
         Return the last lines that the command has printed, and how it ended.
 
-        Without ``outcome`` nothing that tells the condition: of a run that ended well only the
-        latter, of a checklist not what is asked for.
+        Without ``outcome`` nothing that tells the condition: of a run that ended well the latter.
         """
         if self._process is None:
             return []

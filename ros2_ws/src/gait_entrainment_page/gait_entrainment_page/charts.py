@@ -14,9 +14,8 @@ from typing import Any
 
 from gait_entrainment_page.view import View
 
-BLUE, VERMILLION, GREEN, SKY, BLACK, GREY = (
-    "#0072B2", "#D55E00", "#009E73", "#56B4E9", "#1A1A1A", "#5F6B76",
-)  # fmt: skip
+BLUE, VERMILLION, GREEN = "#0072B2", "#D55E00", "#009E73"
+BLACK, GREY = "#1A1A1A", "#5F6B76"
 _FONT = 17  # [px], to be read from two metres
 _LARGEST = 1e9  # nothing that is shown is so large: what is lies outside
 _DARK_GREEN = "#00704F"  # of letters on the shade

@@ -51,12 +51,12 @@ _HEARTBEAT = (
 
 class Page:
     """
-    The page, served at a socket from when it is made until it is closed; it tells people where.
+    The page, served from when it is made until it is closed; it tells people where.
 
-    ``view`` gives the view that is shown; ``seat`` and ``access`` say who acts, and who may;
-    ``nodes`` and ``command`` what can be asked of the nodes, and started, None for a ``bag``.
-    ``heartbeat`` is whether the page is the operator's sign of life, ``record`` the folder whose
-    disk is looked after.
+    ``view`` gives what is shown, ``seat`` and ``access`` tell who acts, and who may, and
+    ``listener`` is the socket to serve at. ``nodes`` can be asked and ``command`` started; for a
+    ``bag`` they are None. The page may be the operator's ``heartbeat``; the disk of the folder
+    ``record`` is looked after.
     """
 
     def __init__(
@@ -79,14 +79,8 @@ class Page:
         app.add_api_route("/stop", self._stop, methods=["POST"])
         app.add_api_route("/alive", self._alive, methods=["POST"])
         app.mount("/static", StaticFiles(directory=Path(__file__).with_name("static")))
-        ui.page("/", title="gait_entrainment")(self._show)
-        ui.run_with(
-            app,
-            language="en-US",
-            show_welcome_message=False,
-            binding_refresh_interval=None,
-            tailwind=False,
-        )
+        ui.page("/", title="gait_entrainment", language="en-US")(self._show)
+        ui.run_with(app, show_welcome_message=False, binding_refresh_interval=None, tailwind=False)
         self._server = Server(app, listener, access)
         access.tell(self._server.port)
 
@@ -104,9 +98,7 @@ class Page:
         role, browser = state_of(request)
         # A page in the background says neither: another one of its browser may be in front.
         watching = _WATCHING.get(await request.body())
-        if watching and role == ACT:
-            self.seat.offer(browser)
-        if watching is not None:
+        if role == ACT and watching is not None:
             self.seat.heard(browser, watching=watching)
         return {"now": 1e3 * time.time()}
 
@@ -319,8 +311,7 @@ class Shown:
         if not view.blinded:
             verdict, figures = view.verdict_words()
             self._set("verdict", verdict)
-            word = verdict.partition(" ")[0]
-            self.labels["verdict"].classes(replace=f"verdict {word}")
+            self.labels["verdict"].classes(replace=f"verdict {verdict.partition(' ')[0]}")
             self._set("figures", figures)
             self._set("lag", f"lag {view.lag()}")
         alarm = state.message if view.part == "failed" else ""

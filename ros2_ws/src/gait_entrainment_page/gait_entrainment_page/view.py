@@ -51,12 +51,12 @@ _NAN = math.nan
 
 @dataclass(frozen=True)
 class NodeState:
-    """What a node last said of itself."""
+    """What a node last said of itself, and when, on the clock of the view [s]."""
 
     level: str  # ok, warning, error or stale
     message: str
     values: dict[str, str]
-    heard_at: float  # on the clock of the view [s]
+    heard_at: float
 
 
 class View:
@@ -177,9 +177,9 @@ class View:
     def _on_phase(self, message: Any) -> None:
         self.lags.append((message.stride, message.phase_lag))
         if not math.isnan(message.phase_lag):
-            refers = getattr(message, "toe_off", None)  # which bags of earlier versions lack
-            known = refers is None or nanoseconds_of(refers)
-            self.lag_refers_to = "toe-off" if known else "heel strike"
+            toe_off = getattr(message, "toe_off", None)  # which bags of earlier versions lack
+            of_strike = toe_off is not None and not nanoseconds_of(toe_off)
+            self.lag_refers_to = "heel strike" if of_strike else "toe-off"
         self.version += 1
 
     def _on_verdict(self, message: Any) -> None:
@@ -209,6 +209,7 @@ class View:
         self.setup = message
         if self.side is None:
             self.side = Side(message.side)
+        self.simulated = False
         with contextlib.suppress(DeviceError):  # a driver that is not installed here
             self.simulated = find_driver(message.driver).simulated
 
@@ -253,17 +254,15 @@ class View:
         return f"{self.part}, {name or self.state.block} of {blocks} blocks"
 
     def time_left(self) -> float:
-        """
-        Return how long the rest takes at the period of the last strides [s]; NaN if unknown.
-
-        A blinded operator is told whole half minutes: more would tell the period.
-        """
+        """Return how long the rest takes [s], by the last strides; NaN if unknown."""
         if self.part == "finished":
             return 0.0
         if not self.going_on:
             return _NAN
         left = float(max(self.state.strides - self.state.stride, 0) * self.period)
-        return 30.0 * math.ceil(left / 30) if self.blinded and math.isfinite(left) else left
+        if self.blinded and math.isfinite(left):  # more would tell the period
+            left = 30.0 * math.ceil(left / 30)
+        return left
 
     def lag(self) -> str:
         """Return the latest phase lag, and where in the stride it lies."""
@@ -305,16 +304,12 @@ class View:
         return not self.blinded and any(torque != 0 for torque in asked)
 
     def measured(self) -> str:
-        """
-        Return the torque as measured; never zero where none was measured.
-
-        A blinded operator learns it once the robot is stopped or has a fault: whether it falls.
-        """
+        """Return the torque as measured; never zero where none was measured."""
         return self._of_each(self._measured) or "nothing heard of the robot"
 
     def _measured(self, robot: Any) -> str:
         if self.blinded and robot.status == _ACTIVE and not self.faults():
-            return "hidden"
+            return "hidden"  # until one must see whether it falls
         torque = robot.measured_torque
         if math.isnan(torque):
             return "not measured"
@@ -388,11 +383,7 @@ class View:
         return "", False
 
     def node_words(self) -> list[tuple[str, str, str]]:
-        """
-        Return name, level and message of every node.
-
-        Those that have ended with their run, as all do between two blocks, are left out.
-        """
+        """Return name, level and message of all nodes but those that ended with their run."""
         rows = []
         for name, state in sorted(self.nodes.items()):
             silent = self._clock() - state.heard_at

@@ -129,11 +129,14 @@ def test_a_port_that_is_taken_is_told():
 
 def test_one_browser_acts_until_another_takes_over():
     seat = Seat(timeout=100.0)
-    seat.offer("a")
-    seat.offer("b")
-    assert seat.holder == "a"
+    seat.heard("a", watching=True)
     seat.heard("b", watching=True)
-    assert not seat.watched
+    assert (seat.holder, seat.watched) == ("a", True)
+    seat.heard("b", watching=False)
+    assert seat.watched
+    seat.heard("a", watching=False)
+    seat.heard("b", watching=True)
+    assert (seat.holder, seat.watched) == ("a", False)
     seat.take("b")
     assert (seat.holder, seat.watched) == ("b", True)
     seat.heard("b", watching=False)

@@ -14,7 +14,7 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from typing import Any, ClassVar
 
 from gait_entrainment.conventions import EventKind, Side
@@ -232,6 +232,11 @@ class Detector(ABC):
             self.counts.held += not self._told_held
             self._told_held = True
 
+    @property
+    def _walked_long(self) -> bool:
+        """Whether a walk would have shown by now what the signal reaches."""
+        return self._time - self._first > _LONG_ENOUGH
+
     def troubles(self, now: float | None = None) -> tuple[str, ...]:
         """
         Return what a person should know of this sensor, each in one line; empty if all is well.
@@ -249,7 +254,7 @@ class Detector(ABC):
                 f"{where}: {self.counts.impossible} samples of up to {self._largest:.3g} cannot "
                 f"be: {self.suspicion}"
             )
-        if self._time - self._first > _LONG_ENOUGH and self._largest < self.reached:
+        if self._walked_long and self._largest < self.reached:
             told.append(
                 f"{where}: never above {self._largest:.3g}, which a walk exceeds: {self.suspicion}"
             )
@@ -286,15 +291,14 @@ def find_detector(text: str) -> ChosenDetector:
     option is unknown or out of range.
     """
     name, _, options = text.partition(":")
-    found = {point.name: point for point in entry_points(group=ENTRY_POINTS)}
+    found = detector_names()
     if name not in found:
-        raise UsageError(f"detector: {name!r} is unknown; allowed: {', '.join(sorted(found))}")
+        raise UsageError(f"detector: {name!r} is unknown; allowed: {', '.join(found)}")
     try:
-        detector = found[name].load()
+        detector = EntryPoint(name, found[name], ENTRY_POINTS).load()
     except (ImportError, AttributeError) as error:
         raise UsageError(
-            f"detector: {name} ({found[name].value}) cannot be loaded: {error}; install what it "
-            "needs"
+            f"detector: {name} ({found[name]}) cannot be loaded: {error}; install what it needs"
         ) from None
     if not (isinstance(detector, type) and issubclass(detector, Detector)):
         raise UsageError(f"detector: {name} is no Detector: derive it from that class")

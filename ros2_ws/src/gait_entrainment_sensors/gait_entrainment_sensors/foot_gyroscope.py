@@ -51,13 +51,19 @@ class FootGyroscopeDetector(GyroscopeDetector):
         self._peak = 0.0  # of push-off; of a swing, its magnitude [rad/s]
         self._fall = math.nan  # when the rate fell from that peak [s]
         self._rest = self._turn = math.nan  # when it came to zero, and left it [s]
+        self._slaps = False
 
     def _stance(self, time: float, before: float, rate: float) -> list[Detection]:
         found: list[Detection] = []
         if rate < -self._swings.threshold:  # a swing, whose toe-off was not seen
             self._begin_swing(time)
             return found
-        if time - self._changed < self.settings.shortest_stance:
+        if self._slaps:  # until it lies flat
+            self._peak = max(rate, self._peak)
+            self._slaps = rate > _FALLEN * self._peak
+            if not self._slaps:
+                self._peak = 0.0
+        if self._slaps or time - self._changed < self.settings.shortest_stance:
             return found
         level = _FALLING * self._peak
         if rate > self._peak:
@@ -103,6 +109,7 @@ class FootGyroscopeDetector(GyroscopeDetector):
         if not certain or time - self._changed < self.settings.shortest_swing:
             return []
         strike, peak = self._turn if turned else self._rest, self._peak
+        self._slaps = turned
         self._enter(swinging=False, time=time)
         self._peak, self._fall = 0.0, math.nan
         if not self._swings.is_step(peak):

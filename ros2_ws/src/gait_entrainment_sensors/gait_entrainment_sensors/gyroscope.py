@@ -9,6 +9,7 @@ Rates count positive where the toes turn down and the shank leans forward. So sw
 
 import math
 from abc import abstractmethod
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
@@ -87,8 +88,9 @@ class GyroscopeDetector(Detector):
 
     def __init__(self, side: Side, settings: Any = None) -> None:
         super().__init__(side, settings)
-        self._mounting: Mounting | None = None
-        self._recorded: list[tuple[float, Sequence[float]]] | None = []
+        self._mountings: deque[Mounting] = deque(maxlen=2)  # as the latest steps tell
+        self._recorded: list[tuple[float, Sequence[float]]] = []
+        self._asked = -math.inf  # when they were last asked [s]
         self._axis = self.settings.axis
         self._pole = _TWO_POLES / self.settings.cutoff
         self._interval = self._keep = math.nan
@@ -103,12 +105,7 @@ class GyroscopeDetector(Detector):
         """Return settings with the axis that a recorded walk tells, unless they name one."""
         if settings.axis is not None:
             return settings
-        recorded = [
-            (time, values)
-            for time, values in zip(times, samples, strict=True)
-            if math.isfinite(time + sum(values))
-        ]
-        found = find_mounting(recorded, foot=cls.foot)
+        found = find_mounting([*zip(times, samples, strict=True)], foot=cls.foot)
         if found is None:
             return settings
         x, y, z = found.axis
@@ -123,30 +120,27 @@ class GyroscopeDetector(Detector):
         self._first_pole = self._rate = math.nan
         self._swinging = False
         self._changed = self._time  # when the stance or swing in progress began [s]
-        if self._recorded is not None:
-            self._recorded = []
 
     def troubles(self, now: float | None = None) -> tuple[str, ...]:
         """Add what the calibration found."""
         told = super().troubles(now)
         where = f"{self.side.name.lower()} {self.name}"
-        if self._axis is None:
+        axis, found = self._axis, self._mountings
+        if axis is None:
             return (*told, f"{where}: the axis is not known yet: walk straight on")
-        found, given = self._mounting, self.settings.axis
-        if found is None or given is None:
+        if not found:
             return told
-        if self.foot and given[1] > 0.9 and found.toes_out(self.side) < -_TOES_IN:
+        if self.foot and axis[1] > 0.9 and all(m.toes_out(self.side) < -_TOES_IN for m in found):
             told = (*told, f"{where}: if x points forward, the toes turn in: on the right feet?")
-        agreement = sum(a * b for a, b in zip(found.axis, given, strict=True))
+        agreement = max(sum(a * b for a, b in zip(m.axis, axis, strict=True)) for m in found)
         if agreement < -0.5:
-            return (*told, f"{where}: put on the other way round: set {found.text}")
+            return (*told, f"{where}: put on the other way round: set {found[-1].text}")
         if agreement < 0.7:
-            return (*told, f"{where}: turns about another axis: set {found.text}")
+            return (*told, f"{where}: turns about another axis: set {found[-1].text}")
         return told
 
     def _take(self, time: float, values: Sequence[float]) -> list[Detection]:
-        if self._recorded is not None:
-            self._calibrate(time, values)
+        self._calibrate(time, values)
         axis = self._axis
         if axis is None:
             return []
@@ -168,18 +162,25 @@ class GyroscopeDetector(Detector):
         return self._stance(time, before, filtered)
 
     def _calibrate(self, time: float, values: Sequence[float]) -> None:
-        """Record the first steps; then find the axis, and what peaks are usual."""
-        assert self._recorded is not None
-        self._recorded.append((time, tuple(values)))
-        if time - self._recorded[0][0] < self.settings.calibration:
+        """Record some steps, find the axis in the first, and hold it against those that follow."""
+        recorded, longest = self._recorded, self.settings.calibration
+        if recorded and time <= recorded[-1][0]:  # the clock has jumped
+            recorded.clear()
+        if not recorded:
+            self._asked = time
+        recorded.append((time, tuple(values)))
+        if time - self._asked < longest:
             return
-        recorded, self._recorded = self._recorded, []
-        self._mounting = find_mounting(recorded, foot=self.foot)
-        if self._mounting is None:
-            return  # nobody walked: go on
-        self._recorded = None
-        if self._axis is None:
-            self._axis = self._mounting.axis
+        latest = [sample for sample in recorded if time - sample[0] <= longest]
+        found = find_mounting(latest, foot=self.foot)
+        if self._axis is None:  # slow strides are few in that time
+            found = found or find_mounting(recorded, foot=self.foot)
+            self._axis = found.axis if found else None
+        if found:
+            self._mountings.append(found)
+        self._recorded = [sample for sample in recorded if time - sample[0] <= 2 * longest]
+        # Before it is known it is asked for again soon.
+        self._asked = time - (0.8 * longest if self._axis is None else 0.0)
 
     def _crossing(self, time: float, before: float, rate: float, level: float) -> float:
         """Return when the rate crossed a level between two samples, the delay taken off."""

@@ -177,6 +177,9 @@ def events_on_plates(
         contacts += ours
         if doubtful:
             told.append(f"plate {index + 1}: {doubtful} contacts of both feet or of neither")
+        if not events:
+            least, most = float(np.min(plate.force)), float(np.max(plate.force))
+            told.append(f"plate {index + 1}: no contact, by forces of {least:.0f} to {most:.0f} N")
     return found + _merged(contacts), tuple(told)
 
 

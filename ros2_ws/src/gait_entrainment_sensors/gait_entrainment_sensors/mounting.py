@@ -3,12 +3,16 @@
 
 """Which way round a gyroscope was put on, from a calibration walk."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gait_entrainment.conventions import Side
+
+Floats = NDArray[np.float64]
 
 # Share of the variance about one axis from which on somebody walks: a leg swings in one plane.
 _LEAST_SHARE = 0.5
@@ -17,6 +21,11 @@ _LEAST_RATE = 0.5
 # Cosine of the angle within which a sensor counts as put on along the shoe or shank: a foot that
 # is turned out, and rolls, swings about an axis of its own, which is not that of its pitch.
 _ALONG = 0.8
+# A foot lies flat for so long while it stands [s]; nor is a gap in the samples longer. And for
+# so long only where nobody walks.
+_FLAT, _LONG = 0.1, 0.5
+# It turns by less than this share of what it turns by otherwise.
+_STILL = 0.15
 # Skewness that leaves no doubt about the sign.
 _LEAST_SKEWNESS = 0.3
 
@@ -50,29 +59,65 @@ def find_mounting(
     Return the axis of foot or shank from samples (time [s], three rates [rad/s]) of some steps.
 
     The leg swings in the sagittal plane: the axis is that of the largest variance. Its sign, of a
-    foot: between two flat stances it turns toes down by 60 degrees and toes up by 20, so the angle
-    is skewed. Of a shank: it leans forward slowly in stance and swings back fast, so the rate is.
+    foot: between two flat stances it turns toes down by 60 degrees and toes up by 20 (Sabatini,
+    IEEE Trans. Biomed. Eng. 52, 217, 2005). Of a shank: it leans forward slowly in stance and
+    swings back fast, so the rate is skewed. Either must show in two strides at least.
     An axis of the sensor that is within 37 degrees is taken instead.
     None if nobody walks, or the sign is not certain.
     """
     times = np.array([time for time, _ in samples])
     rates = np.array([values for _, values in samples], float)
-    rates = rates - rates.mean(axis=0)  # over some strides a leg turns by nothing
-    variances, axes = np.linalg.eigh(rates.T @ rates / max(len(times), 1))
+    known = np.isfinite(rates).all(axis=-1) & np.isfinite(times)
+    times, rates = times[known], rates[known]
+    later = np.diff(np.maximum.accumulate(times), prepend=-np.inf) > 0.0
+    times, rates = times[later], rates[later]
+    if len(times) < 2:
+        return None
+    rates = rates - np.median(rates, axis=0)  # the offset: a leg stands more than it swings
+    variances, axes = np.linalg.eigh(rates.T @ rates / len(times))
     share = float(variances[-1] / max(variances.sum(), 1e-12))
     if share < _LEAST_SHARE or variances[-1] < _LEAST_RATE**2:
         return None
     about = rates @ axes[:, -1]
-    told = -about
-    if foot:
-        angle = np.concatenate([[0.0], np.cumsum((about[1:] + about[:-1]) / 2 * np.diff(times))])
-        told = angle - np.polyval(np.polyfit(times, angle, 1), times)
-    told = told - told.mean()
-    skewness = float(np.mean(told**3) / np.mean(told**2) ** 1.5)
-    if abs(skewness) < _LEAST_SKEWNESS:
+    sign = _sign_of_foot(times, rates, about) if foot else _sign_of_shank(about)
+    if not sign:
         return None
-    axis = swing = axes[:, -1] * np.sign(skewness)
+    axis = swing = axes[:, -1] * sign
     if np.max(np.abs(axis)) > _ALONG:
         axis = np.sign(axis) * (np.abs(axis) > _ALONG)
     x, y, z = axis.tolist()
     return Mounting((x, y, z), tuple(swing.tolist()))
+
+
+def _sign_of_foot(times: Floats, rates: Floats, about: Floats) -> float:
+    """Return the sign of toes down, by the mean angle from one flat stance to the next."""
+    steps, speed = np.diff(times, append=times[-1]), np.linalg.norm(rates, axis=1)
+    moving = speed[speed > _LEAST_RATE]
+    width = min(max(round(_FLAT / float(np.median(steps))), 1), steps.size)
+    level = _STILL * math.sqrt(float(np.mean(moving**2)))
+    still = np.convolve(speed, np.full(width, 1 / width), "same") < level
+    starts, ends = np.flatnonzero(np.diff(still, prepend=False, append=False)).reshape(-1, 2).T
+    # In swing it may be still, too, but not as long as it lies flat before and after that.
+    lasts = np.pad(times[ends - 1] - times[starts], 1)
+    beside = np.minimum(np.maximum(lasts[:-2], lasts[2:]), _LONG)
+    flat = 2 * lasts[1:-1] >= beside
+    areas = []
+    for start, end in zip(ends[flat][:-1], starts[flat][1:], strict=True):
+        if steps[start:end].max() < _FLAT:
+            angle = np.cumsum((about * steps)[start:end])
+            angle -= np.linspace(0.0, angle[-1], angle.size)
+            areas.append(float(angle @ steps[start:end]))
+    alike = [area for area in areas if 2 * abs(area) > max(map(abs, areas))]
+    total = sum(alike)
+    certain = len(alike) > 1 and abs(total) > 0.75 * sum(map(abs, areas))
+    return math.copysign(1.0, total) if certain else 0.0
+
+
+def _sign_of_shank(about: Floats) -> float:
+    """Return the sign of leaning forward, by the skewness of the rate."""
+    told = about.mean() - about
+    skewness = float(np.mean(told**3) / np.mean(told**2) ** 1.5)
+    if abs(skewness) < _LEAST_SKEWNESS:
+        return 0.0
+    swings = np.diff(told * skewness > 0.5 * np.max(told * skewness), prepend=False)
+    return math.copysign(1.0, skewness) if swings.sum() > 2 else 0.0

@@ -36,9 +36,15 @@ class NumberingCounts:
     numbered: int = 0
     repeated: int = 0  # dropped: its place was taken
     implausible: int = 0  # dropped: too early or too late for any place
+    airborne: int = 0  # dropped: toe-offs before the other foot's strike, as in running
     before_first_strike: int = 0  # dropped: a run begins with a heel strike
     missed: int = 0  # places that were passed by without a detection
     restarts: int = 0  # times that the detections fitted together, but not what was known
+
+
+def numbered(found: Detection, step: int) -> GaitEvent:
+    """Return a detection as the event of a step."""
+    return GaitEvent(nanoseconds(found.time), found.kind, found.side, step, found.uncertainty)
 
 
 class Numbering:
@@ -47,9 +53,11 @@ class Numbering:
 
     The first heel strike is step 0; with ``first_side`` it is step 0 or 1, such that strikes of
     that side have even numbers. Strikes and toe-offs of a side return once a stride, so each
-    belongs to the place of its kind and side that is nearest to where the period predicts it: half
-    a stride either way. While the period is not known, to the next such place after the latest
-    event before it. ``limits`` say which strides can be (`gait_entrainment.gait.GaitLimits`).
+    belongs to the place of its kind and side that is nearest to where the period predicts it from
+    the latest strike: half a stride either way. While the period is not known, to the next such
+    place after the latest event. A runner's feet leave the ground before the other one strikes:
+    such toe-offs have no place. ``limits`` say which strides can be
+    (`gait_entrainment.gait.GaitLimits`).
     """
 
     def __init__(self, first_side: Side | None = None, limits: GaitLimits | None = None) -> None:
@@ -82,15 +90,13 @@ class Numbering:
             self._measure(first, detection.time, None if fate else place)
         if fate:
             setattr(self.counts, fate, getattr(self.counts, fate) + 1)
-            self._refused[first] += fate != "repeated"
+            self._refused[first] += fate == "implausible"
             if self._refused[first] < _CONVINCING:
                 return None
             place = self._restart(detection)
         self._refused[first] = 0
         self._accept(detection, place)
-        step = (place + 1) // 2
-        stamp, sure = nanoseconds(detection.time), detection.uncertainty
-        return GaitEvent(stamp, detection.kind, detection.side, step, sure)
+        return numbered(detection, (place + 1) // 2)
 
     def troubles(self) -> tuple[str, ...]:
         """Return what a person should know, each in one line; empty if all is well."""
@@ -101,6 +107,8 @@ class Numbering:
                 f"{counts.repeated} detections repeated an event, {counts.implausible} fitted no "
                 "place in the gait"
             )
+        if counts.airborne:
+            told.append(f"{counts.airborne} toe-offs precede the other foot's strike: running?")
         if counts.missed:
             told.append(f"{counts.missed} events were missed")
         if counts.restarts:
@@ -122,25 +130,41 @@ class Numbering:
     def _place(self, detection: Detection) -> tuple[str, int]:
         """Return as what a detection must be dropped, or an empty text, and its place."""
         time, first, least = detection.time, self._first_place(detection), self.limits.stride_least
-        before = max((p for p, known in self._known.items() if known < time), default=-1)
+        earlier = [p for p, known in self._known.items() if known < time]
+        before = max(earlier, default=-1)
         after = min((p for p, known in self._known.items() if known >= time), default=math.inf)
         same = max((p for p in self._known if (p - first) % _PLACES == 0), default=None)
         if same is not None and abs(time - self._known[same]) < least:
             return "repeated", same
         if before < 0:  # earlier than all that is remembered
             return "implausible", first
-        place = before + 1 + (first - before - 1) % _PLACES  # the next of the kind and side
+        strike = max((p for p in earlier if p % 2 == 0), default=-_PLACES)
+        # Who runs strikes after the other foot's toe-off, and soon.
+        runs = self.period or time - self._known[before] < least
+        since = strike if runs and before - strike < _PLACES else before
+        place = since + 1 + (first - since - 1) % _PLACES  # the next of the kind and side
+        if place == strike + 3 and self._comes_before(strike + 2, time):
+            return "airborne", place
         if self.period:
-            # From the latest event, a quarter of a stride a place: the error is one place at most.
-            strides = (time - self._known[before]) / self.period
-            place = first + _PLACES * round((before - first) / _PLACES + strides)
+            # From that strike, a quarter of a stride a place: the error is one place at most.
+            strides = (time - self._known[since]) / self.period
+            place = first + _PLACES * round((since - first) / _PLACES + strides)
             if place in self._known:
                 return "repeated", place
             if same is not None:
                 least = (1 - self.limits.stride_change) * self.period * (place - same) / _PLACES
                 if time - self._known[same] < least:
                     return "implausible", place
+        before = strike if first % 2 == 0 else before
         return ("" if before < place < after else "implausible"), place
+
+    def _comes_before(self, strike: int, time: float) -> bool:
+        """Whether a time is before that of the other foot's strike, as far as one can know."""
+        if (latest := self._known.get(strike - _PLACES)) is None:
+            return False
+        # Of a stride that is not known yet one step is, and the other may be shorter by a quarter.
+        stride = self.period or 1.75 * (self._known[strike - 2] - latest)
+        return time < latest + stride
 
     def _measure(self, first: int, time: float, place: int | None) -> None:
         """

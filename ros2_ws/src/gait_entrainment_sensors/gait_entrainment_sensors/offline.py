@@ -10,7 +10,8 @@ seconds, ``trial_type``, and columns of our own, which the JSON file beside it d
 
 import csv
 import json
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,8 +19,8 @@ from typing import Any
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind, Side
 from gait_entrainment.gait import GaitEvent, GaitLimits
 from gait_entrainment_sensors.detection import ChosenDetector, Detection
-from gait_entrainment_sensors.numbering import Numbering
-from gait_entrainment_sensors.recording import RecordingError, Stream, column_numbers, read_table
+from gait_entrainment_sensors.numbering import Numbering, numbered
+from gait_entrainment_sensors.recording import RecordingError, Stream, Table, read_table
 
 COLUMNS: dict[str, dict[str, Any]] = {
     "onset": {"Description": "Instant of the event, by the clock of the recording", "Units": "s"},
@@ -58,12 +59,13 @@ def detect(
     """Return the events in recorded signals, in the order of detection; and what was wrong."""
     found: list[Detection] = []
     troubles: list[str] = []
+    end = max((t for s in streams for t in s.times if math.isfinite(t)), default=0.0)
     for stream in streams:
         settings = chosen.detector.calibrated(chosen.settings, stream.times, stream.values)
         detector = chosen.detector(stream.side, settings)
         for time, values in zip(stream.times, stream.values, strict=True):
             found += detector.add(time, values)
-        troubles += detector.troubles()
+        troubles += detector.troubles(end)
     events, told = number(found, chosen.name)
     return events, (*troubles, *told)
 
@@ -72,13 +74,18 @@ def number(
     found: Iterable[Detection], detector: str, limits: GaitLimits | None = None
 ) -> tuple[list[DetectedEvent], tuple[str, ...]]:
     """Return detections numbered, in the order of detection; and what was wrong."""
-    numbering = Numbering(limits=limits)
-    events = [
-        DetectedEvent(detection, event, detector)
-        for detection in sorted(found, key=lambda d: (d.detected_at, d.time))
-        if (event := numbering.add(detection)) is not None
+    numbering, before, events = Numbering(limits=limits), dict[Side, Detection](), []
+    for detection in sorted(found, key=lambda d: (d.detected_at, d.time)):
+        if (event := numbering.add(detection)) is not None:
+            events.append(DetectedEvent(detection, event, detector))
+        elif not events:
+            before[detection.side] = detection  # the latest toe-off of a foot before strike 0
+    begun = [
+        DetectedEvent(d, numbered(d, 0 if side is events[0].event.side else -1), detector)
+        for side, d in before.items()
+        if events
     ]
-    return events, numbering.troubles()
+    return begun + events, numbering.troubles()
 
 
 def write_events(path: Path, events: Iterable[DetectedEvent]) -> None:
@@ -119,56 +126,47 @@ def read_events(path: Path) -> list[GaitEvent]:
     there. Raises RecordingError if a column is missing or a field is none of what is allowed.
     """
     table = read_table(path)
-    if missing := [name for name in ("onset", "trial_type", "side") if name not in table]:
-        raise RecordingError(
-            f"{path}: lacks column {', '.join(missing)}; it has: {', '.join(table)}"
-        )
-    times = _finite(path, "onset", table["onset"])
+    table.require("onset", "trial_type", "side")
+    times = _finite(table, "onset")
     sides = {side.name.lower(): side for side in Side}
-    kinds = [
-        _one_of(path, "trial_type", row, text, KINDS) for row, text in _rows(table, "trial_type")
-    ]
-    feet = [_one_of(path, "side", row, text, sides) for row, text in _rows(table, "side")]
+    kinds, feet = _words(table, "trial_type", KINDS), _words(table, "side", sides)
     sure = [0.0] * len(times)
-    if "uncertainty" in table:
-        sure = _finite(path, "uncertainty", table["uncertainty"])
+    if "uncertainty" in table.columns:
+        sure = _finite(table, "uncertainty", "0 to 1 s", lambda value: 0.0 <= value <= 1.0)
     detections = map(Detection, kinds, feet, times, times, sure)
-    if "step" not in table:
-        return [e.event for e in number(detections, "")[0]]
-    steps = _finite(path, "step", table["step"])
-    events = [
-        GaitEvent(round(d.time * NANOSECONDS_PER_SECOND), d.kind, d.side, int(step), d.uncertainty)
-        for d, step in zip(detections, steps, strict=True)
-    ]
-    return sorted(events, key=lambda event: event.stamp)
+    if "step" in table.columns:
+        steps = _finite(table, "step", "a whole number", float.is_integer)
+        events = [numbered(d, int(step)) for d, step in zip(detections, steps, strict=True)]
+    else:
+        events = [e.event for e in number(detections, "")[0]]
+    # A toe-off before strike 0 is in no stride.
+    known = (e for e in events if e.step > 0 or e.kind is EventKind.HEEL_STRIKE)
+    return sorted(known, key=lambda event: event.stamp)
 
 
 def read_onsets(path: Path) -> list[int]:
     """Return the instants at which pulses began [ns]: the column onset [s] of a table."""
-    table = read_table(path)
-    if "onset" not in table:
-        raise RecordingError(f"{path}: lacks column onset; it has: {', '.join(table)}")
-    onsets = _finite(path, "onset", table["onset"])
+    onsets = _finite(read_table(path), "onset")
     return sorted(round(onset * NANOSECONDS_PER_SECOND) for onset in onsets)
 
 
-def _rows(table: dict[str, list[str]], name: str) -> Iterable[tuple[int, str]]:
-    return enumerate(table[name], 2)
+def _words(table: Table, name: str, allowed: Mapping[str, Any]) -> list[Any]:
+    """Return what the words of a column mean."""
+    meant = [allowed.get(text.strip().lower()) for text in table.columns[name][1]]
+    if None in meant:
+        raise table.refused(meant.index(None), name, ", ".join(allowed))
+    return meant
 
 
-def _one_of(path: Path, name: str, row: int, text: str, allowed: dict[str, Any]) -> Any:
-    if (value := allowed.get(text.strip().lower())) is None:
-        raise RecordingError(
-            f"{path}: row {row}, column {name}: {text!r}; allowed: {', '.join(allowed)}"
-        )
-    return value
-
-
-def _finite(path: Path, name: str, texts: Sequence[str]) -> list[float]:
-    numbers = column_numbers(path, name, texts)
-    for row, value in enumerate(numbers, 2):
-        if not abs(value) < 1e10:  # it may count from 1970
-            raise RecordingError(
-                f"{path}: row {row}, column {name}: {texts[row - 2]!r}; allowed: a finite number"
-            )
+def _finite(
+    table: Table,
+    name: str,
+    allowed: str = "a finite number",
+    fits: Callable[[float], bool] = math.isfinite,
+) -> list[float]:
+    """Return the numbers of a column, each of which has to fit."""
+    numbers = table.numbers(name)
+    for row, value in enumerate(numbers):
+        if not (abs(value) < 1e10 and fits(value)):  # it may count from 1970
+            raise table.refused(row, name, allowed)
     return numbers

@@ -5,13 +5,16 @@
 Signals that were recorded elsewhere: a table with named columns.
 
 A column is named by side and signal, in SI units: ``left_force_z``, ``right_foot_gyro_y``. One in
-degrees, or degrees per second, says so: ``right_foot_gyro_y_deg``.
+another unit says so: ``right_foot_gyro_y_deg``, ``time [ms]``, ``Left_Force_Z (kN)``.
 """
 
 import csv
 import math
+import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from gait_entrainment.conventions import Side
@@ -19,7 +22,12 @@ from gait_entrainment.errors import UsageError
 from gait_entrainment_sensors.detection import ChosenDetector
 from gait_entrainment_sensors.sources import source_of
 
-IN_DEGREES = "_deg"
+# What the numbers of a column are multiplied by, by the unit that its name says: in brackets, at
+# its end, or in a row of their own.
+_UNITS = dict.fromkeys(("", "1", "s", "n", "n m", "nm", "rad", "rad/s"), 1.0)
+_UNITS |= {"ms": 1e-3, "us": 1e-6, "\u03bcs": 1e-6, "ns": 1e-9, "kn": 1e3}
+_UNITS |= dict.fromkeys(("deg", "deg/s", "\u00b0", "\u00b0/s", "dps"), math.pi / 180)
+_MISSING = ("", "n/a", "na", "nan", "null", "none")
 
 
 class RecordingError(UsageError):
@@ -35,45 +43,123 @@ class Stream:
     values: list[tuple[float, ...]]  # in the order of the detector's signals
 
 
-def read_table(path: Path) -> dict[str, list[str]]:
-    """
-    Return the columns of a table, texts by their names; tab, semicolon or comma separates.
+@dataclass(frozen=True)
+class Table:
+    """The columns of a file."""
 
+    path: Path
+    # By name, in small letters and without the unit: what makes it SI, and the texts.
+    columns: dict[str, tuple[float, list[str]]]
+    first: int  # row of the file that holds the first texts
+
+    def require(self, *names: str) -> None:
+        """Raise RecordingError if a column is missing."""
+        if missing := [name for name in names if name not in self.columns]:
+            there = ", ".join(self.columns)
+            raise RecordingError(
+                f"{self.path}: lacks column {', '.join(missing)}; it has: {there}"
+            )
+
+    def refused(self, row: int, name: str, allowed: str) -> RecordingError:
+        """Return what to raise because of a text, counted from the first one."""
+        text = self.columns[name][1][row]
+        return RecordingError(
+            f"{self.path}: row {self.first + row}, column {name}: {text!r}; allowed: {allowed}"
+        )
+
+    def numbers(self, name: str) -> list[float]:
+        """Return a column in SI units; NaN where a field is empty, ``n/a`` or says so."""
+        self.require(name)
+        factor, texts = self.columns[name]
+        numbers = []
+        for row, text in enumerate(texts):
+            if (number := _number(text)) is None:
+                raise self.refused(row, name, "a number, or nothing where a sample is missing")
+            numbers.append(factor * number)
+        return numbers
+
+
+def _number(text: str) -> float | None:
+    """Return the number in a field, with a point or a comma; NaN if missing, None if no number."""
+    if text.strip().lower() in _MISSING:
+        return math.nan
+    try:
+        return float(text if "." in text else text.replace(",", ".", 1))
+    except ValueError:
+        return None
+
+
+def _plain(name: str, unit: str = "") -> tuple[str, float]:
+    """Return the name of a column as in `Table`, and the factor of its unit."""
+    name = name.strip("# \t").casefold()
+    for pattern in (r"(.*?)\s*[\[(]\s*(.*?)\s*[\])]", r"(.*)_([a-z]+)"):
+        found = re.fullmatch(pattern, name)
+        if found and found[2] in _UNITS:
+            name, unit = found[1], unit or found[2]
+    return name, _UNITS[unit]
+
+
+def _names(head: list[list[str]]) -> list[tuple[str, float]]:
+    """Return names and factors from the rows above the numbers: names, perhaps units below."""
+    *above, names = head
+    units = [field.strip("[() ]").casefold() for field in names]
+    if above and _UNITS.keys() >= {*units}:
+        *above, names = above
+    else:
+        units = [""] * len(names)
+    while above and len({*names}) < len(names):  # as of axes, below the names of sensors
+        names = [f"{a} {b}".strip() for a, b in zip(above.pop(), names, strict=True)]
+    return [*map(_plain, names, units)]
+
+
+def read_table(path: Path, separators: str = "\t;,") -> Table:
+    """
+    Return the columns of a table; tab, semicolon or comma separates.
+
+    The names may have several rows, the units one below; what comes before is passed over.
     Raises RecordingError if it cannot be read, is empty, or a row has too many or too few fields.
     """
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        data = path.read_bytes()
+        wide = data[:2] in (b"\xff\xfe", b"\xfe\xff")
+        text = data.decode("utf-16" if wide else "utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "is no text"
+        reason = error.strerror if isinstance(error, OSError) else "is no text in UTF-8"
         raise RecordingError(f"{path}: cannot be read: {reason}") from None
-    head = text.partition("\n")[0]
-    separator = max("\t;,", key=head.count)
-    rows = [row for row in csv.reader(text.splitlines(), delimiter=separator) if row]
+    lines = text.rstrip("\r\n ").splitlines()
+    # The comma comes last: it may be that of the numbers.
+    separator = max(separators, key=lambda sign: sum(sign in line for line in lines))
+    rows = [*enumerate(csv.reader(lines, delimiter=separator), 1)]
+    width = Counter(len(row) or 1 for _, row in rows).most_common(1)[0][0] if rows else 0
+    # In a single column nothing at all is a field that is empty.
+    rows = [(number, row or [""]) for number, row in rows if row or width == 1]
     if len(rows) < 2:
         raise RecordingError(f"{path}: holds no row; expected: names of columns, then rows")
-    names = [name.strip() for name in rows[0]]
+    begin = next((i for i, (_, row) in enumerate(rows) if _is_data(row, width)), 1)
+    head = begin
+    while head > 0 and len(rows[head - 1][1]) == width:
+        head -= 1
+    if head == begin and separator == ",":  # it is that of the numbers
+        return read_table(path, "\t;")
+    if head == begin:
+        raise RecordingError(f"{path}: row {rows[begin][0]} has no names above it")
+    plain = _names([row for _, row in rows[head:begin]])
+    names = [name for name, _ in plain]
     if twice := [name for name in names if names.count(name) > 1]:
         raise RecordingError(f"{path}: column {twice[0]} appears twice; keep one")
-    for number, row in enumerate(rows[1:], 2):
+    for number, row in rows[begin:]:
         if len(row) != len(names):
             raise RecordingError(
                 f"{path}: row {number} has {len(row)} fields; expected: {len(names)}"
             )
-    return dict(zip(names, map(list, zip(*rows[1:], strict=True)), strict=True))
+    texts = zip(*(row for _, row in rows[begin:]), strict=True)
+    columns = {n: (factor, [*column]) for (n, factor), column in zip(plain, texts, strict=True)}
+    return Table(path, columns, rows[begin][0])
 
 
-def column_numbers(path: Path, name: str, texts: Sequence[str]) -> list[float]:
-    """Return a column's numbers; NaN where a field is empty, ``n/a`` or says so."""
-    numbers = []
-    for row, text in enumerate(texts, 2):
-        try:
-            numbers.append(float(text) if text.strip() not in ("", "n/a") else math.nan)
-        except ValueError:
-            raise RecordingError(
-                f"{path}: row {row}, column {name}: {text!r}; allowed: a number, or nothing where "
-                "a sample is missing"
-            ) from None
-    return numbers
+def _is_data(row: Sequence[str], width: int) -> bool:
+    """Whether a row holds numbers, and as many fields as the others."""
+    return len(row) == width and any(f.strip() and _number(f) is not None for f in row)
 
 
 def read_streams(
@@ -90,14 +176,15 @@ def read_streams(
     Raises RecordingError if the file cannot be read or columns are missing.
     """
     table = read_table(path)
+    there = ", ".join(table.columns)
     for name, column in (columns or {}).items():
-        if column not in table:
+        if (found := table.columns.get(_plain(column)[0])) is None:
             raise RecordingError(
-                f"{path}: has no column {column}, which is to be {name}; it has: "
-                f"{', '.join(table)}"
+                f"{path}: has no column {column}, which is to be {name}; it has: {there}"
             )
-        table[name] = table[column]
-    times = _times(path, table, rate)
+        meant, factor = _plain(name)
+        table.columns[meant] = (factor * found[0], found[1])
+    times = _times(table, rate)
     needed = []
     for chosen in detectors:
         signals = chosen.detector.signals
@@ -105,44 +192,46 @@ def read_streams(
         streams = [
             Stream(side, times, values)
             for side in Side
-            if (values := _values(path, table, side, names)) is not None
+            if (values := _values(table, side, names)) is not None
         ]
         if streams:
+            _check_steps(path, times, chosen.settings.longest_gap)
             return chosen, streams
         needed.append(" and ".join(f"SIDE_{name}" for name in names))
     raise RecordingError(
-        f"{path}: lacks columns {' or '.join(needed)}, or --column; it has: {', '.join(table)}"
+        f"{path}: lacks columns {' or '.join(needed)}, or --column; it has: {there}"
     )
 
 
-def _times(path: Path, table: Mapping[str, list[str]], rate: float | None) -> list[float]:
+def _times(table: Table, rate: float | None) -> list[float]:
     if rate is not None:
-        count = len(next(iter(table.values())))
+        count = len(next(iter(table.columns.values()))[1])
         return [number / rate for number in range(count)]
-    if "time" not in table:
+    if "time" not in table.columns:
         raise RecordingError(
-            f"{path}: lacks the column time [s]: name it with --column time=NAME, or say --rate; "
-            f"it has: {', '.join(table)}"
+            f"{table.path}: lacks the column time [s]: name it with --column time=NAME, or say "
+            f"--rate; it has: {', '.join(table.columns)}"
         )
-    return column_numbers(path, "time", table["time"])
+    return table.numbers("time")
 
 
-def _values(
-    path: Path, table: Mapping[str, list[str]], side: Side, signals: Sequence[str]
-) -> list[tuple[float, ...]] | None:
+def _check_steps(path: Path, times: Sequence[float], longest: float) -> None:
+    """Raise RecordingError if times are further apart [s] than the samples of a walk can be."""
+    steps = sorted(b - a for a, b in pairwise(times) if b > a)
+    if steps and (usual := steps[len(steps) // 2]) > 0.99 * longest:
+        raise RecordingError(
+            f"{path}: column time, or --rate: samples are {usual:g} s apart; allowed: less than "
+            f"longest_gap, {longest:g} s; a time in another unit says so: time_ms"
+        )
+
+
+def _values(table: Table, side: Side, signals: Sequence[str]) -> list[tuple[float, ...]] | None:
     """Return the samples of one foot; None if nothing of it is there."""
-    leg = side.name.lower()
-    found, missing = [], []
-    for signal in signals:
-        name = f"{leg}_{signal}"
-        if name in table:
-            found.append(column_numbers(path, name, table[name]))
-        elif (name := name + IN_DEGREES) in table:
-            found.append([math.radians(v) for v in column_numbers(path, name, table[name])])
-        elif signal == "ankle_torque" and found:  # nobody wore a robot
-            found.append([0.0] * len(found[0]))
-        else:
-            missing.append(f"{leg}_{signal}")
-    if missing and found:
-        raise RecordingError(f"{path}: lacks column {', '.join(missing)}")
-    return None if missing else list(zip(*found, strict=True))
+    names = [f"{side.name.lower()}_{signal}" for signal in signals]
+    found = [name for name in names if name in table.columns]
+    if not found:
+        return None
+    # Without a robot there is no torque.
+    table.require(*(name for name in names if not name.endswith("ankle_torque")))
+    columns = [table.numbers(name) for name in found]
+    return list(zip(*columns, *[[0.0] * len(columns[0])] * (len(names) - len(found)), strict=True))

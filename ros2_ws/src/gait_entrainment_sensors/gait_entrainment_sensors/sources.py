@@ -29,7 +29,11 @@ class Source:
         """
         fields = [self.fields[signal] for signal in signals]
         if self.joint:
-            return lambda message: tuple(getattr(message, field)[0] for field in fields)
+            # Without a robot there is no effort.
+            return lambda message: tuple(
+                getattr(message, field)[0] if field != "effort" or len(message.effort) else 0.0
+                for field in fields
+            )
         read: Any = attrgetter(*fields)
         return read if len(fields) > 1 else lambda message: (read(message),)
 

@@ -16,6 +16,8 @@ from gait_entrainment_sensors.detection import Detection, Detector, DetectorSett
 
 # Steps from which on the person's own stances and swings are known.
 _KNOWN_STEPS = 3
+# What a sensor that is not zeroed may show of a foot in the air, upwards and downwards [N].
+_UNLOADED, _PULLED = 150.0, -100.0
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,7 @@ class VerticalForceSettings(DetectorSettings):
     sign: float = setting(1.0, "-1: the foot's force on the ground is measured", "1", (-1, 1))
     strike_force: float = setting(40.0, "force that a foot on the ground exceeds", "N", (1, 500))
     toe_off_force: float = setting(20.0, "force at both events", "N", (0.5, 500.0))
+    debounce: float = setting(8e-3, "a change must last for", "s", (0.0, 0.05))
     refractory: float = setting(0.1, "after toe-off no strike for", "s", (0.0, 1.0))
     zeroing_time: float = setting(0.5, "time constant of zeroing in swing", "s", (0.01, 100.0))
     shortest_stance: float = setting(0.15, "shortest stance", "s", (0.01, 1.0))
@@ -47,19 +50,21 @@ class VerticalForceDetector(Detector):
     Events from the vertical force on one foot, upwards positive.
 
     A foot is on the ground once the force exceeds ``strike_force``, and off it once it is below
-    ``toe_off_force``; both events are put where the force crossed the latter, interpolated between
-    samples. 20 N is the usual threshold (Tirosh and Sparrow, J. Appl. Biomech. 19, 2003), far
-    above the noise of a plate; a belt shakes more, hence the hysteresis. The zero follows the
-    force in swing, and is taken anew if a foot seems never to leave the ground.
+    ``toe_off_force``, and that lasts: a single sample is no foot. Both events are put where the
+    force crossed the lower one, interpolated between samples. 20 N is the usual threshold (Tirosh
+    and Sparrow, J. Appl. Biomech. 19, 2003), far above the noise of a plate; a belt shakes more,
+    hence the hysteresis. The zero follows the force in swing, and is taken anew where a foot that
+    seems to stay on the ground is loaded again.
 
     Steps on the wrong belt: a strike after less than half of the own median swing, and a toe-off
     after a stance that is too short or too long, are the other foot's, and rejected.
 
-    Latency: none but the sampling for toe-off; for heel strike the time from one threshold to the
-    other, up to 30 ms for a foot that is put down softly.
+    Latency: ``debounce``; for heel strike also the time from one threshold to the other, up to
+    30 ms for a foot that is put down softly.
     Uncertainty: 3 ms: the slope of the force, 10 N/ms, and 20 N of doubt about the threshold.
-    Fails: belts that are not zeroed within 150 N; both feet on one belt throughout; a foot that
-    scuffs in swing with more than ``strike_force``; insoles that load while in the air.
+    Fails: belts that are not zeroed within 150 N upwards and 100 N downwards, and both feet on one
+    belt throughout, which is told; a foot that scuffs in swing with more than ``strike_force``;
+    insoles that load while in the air.
     """
 
     name = "vertical_force"
@@ -80,6 +85,7 @@ class VerticalForceDetector(Detector):
         self._sign = math.copysign(1.0, self.settings.sign)
         self._zero = 0.0  # [N]
         self._downwards = 0  # samples that press the foot down
+        self._unloaded = False  # the foot has been seen in the air
         self._restart()
 
     @classmethod
@@ -99,8 +105,8 @@ class VerticalForceDetector(Detector):
 
     @property
     def latency(self) -> float:
-        """The time in which a strike must go from one threshold to the other."""
-        return 0.03
+        """The time in which a strike must go from one threshold to the other, and last."""
+        return float(0.03 + self.settings.debounce)
 
     def _restart(self) -> None:
         self._on: bool | None = None  # on the ground; None before it is known
@@ -108,33 +114,48 @@ class VerticalForceDetector(Detector):
         self._force = math.nan
         self._rise = math.nan  # when the force rose through the lower threshold [s]
         self._strike = self._toe_off = math.nan  # of the contact or swing in progress [s]
-        self._lowest, self._on_since = math.inf, math.nan
+        self._changed = self._fall = math.nan  # when it seemed to end; fell below the lower [s]
+        self._highest = self._lowest = math.nan  # of the contact; since then [N]
+        self._on_since = math.nan
 
     def troubles(self, now: float | None = None) -> tuple[str, ...]:
-        """Add a force of the wrong sign."""
+        """Add a force of the wrong sign, and one that is never off."""
         told = super().troubles(now)
-        if not self._downwards:
-            return told
         where = f"{self.side.name.lower()} {self.name}"
-        return (*told, f"{where}: {self._downwards} samples below -100 N: {self.suspicion}")
+        if self._downwards:
+            told += (f"{where}: {self._downwards} samples below {_PULLED:g} N: {self.suspicion}",)
+        if self._walked_long and self._largest > self.reached and not self._unloaded:
+            told += (f"{where}: never unloaded: zero it; or both feet are on it, or nobody walks",)
+        return told
 
     def _take(self, time: float, values: Sequence[float]) -> list[Detection]:
         self._watch(time, values[0])
         settings, before = self.settings, self._force
         force = self._force = self._sign * values[0] - self._zero
-        lower = settings.toe_off_force
+        upper, lower = settings.strike_force, settings.toe_off_force
         if self._on:
-            if force >= lower:
-                return self._zero_anew(time, force)
-            return self._leave(time, before, force)
+            if force >= upper:
+                self._changed = math.nan
+                self._zero_anew(time, force)
+            elif force < lower:
+                if self._changed != self._changed:
+                    self._changed = time
+                    self._fall = time - (time - self._before) * (lower - force) / (before - force)
+                if time - self._changed >= settings.debounce:
+                    return self._leave(time)
+            return []
         if force < lower:
-            self._on, self._rise = False, math.nan
-            self._downwards += force < -100.0
+            self._on, self._rise, self._changed = False, math.nan, math.nan
+            self._unloaded = True
+            self._downwards += force < _PULLED
         elif before < lower:
             self._rise = time - (time - self._before) * (force - lower) / (force - before)
-        if force >= settings.strike_force:
-            return self._meet(time)
-        if force > -settings.strike_force:  # in the air, however the sensor was zeroed
+        if force >= upper:
+            if self._changed != self._changed:
+                self._changed = time
+            if time - self._changed >= settings.debounce:
+                return self._meet(time)
+        if _PULLED < force < upper:  # in the air, however the sensor was zeroed
             interval = time - self._before
             self._zero += force * interval / (settings.zeroing_time + interval)
         return []
@@ -143,8 +164,8 @@ class VerticalForceDetector(Detector):
         """Begin a contact; a strike if it is this foot's own."""
         rise, swing = self._rise, self._rise - self._toe_off
         seen_off = self._on is False
-        self._on, self._on_since, self._lowest = True, time, math.inf
-        self._strike = rise
+        self._on, self._on_since, self._changed = True, time, math.nan
+        self._highest, self._strike = -math.inf, rise
         if not seen_off:
             self._strike = math.nan
             return []
@@ -157,18 +178,17 @@ class VerticalForceDetector(Detector):
             return []
         return self._found(EventKind.HEEL_STRIKE, rise, time)
 
-    def _leave(self, time: float, before: float, force: float) -> list[Detection]:
+    def _leave(self, time: float) -> list[Detection]:
         """End a contact; a toe-off if it was this foot's own, and a stance."""
-        settings = self.settings
-        lower = settings.toe_off_force
-        toe_off = time - (time - self._before) * (lower - force) / (before - force)
+        settings, toe_off = self.settings, self._fall
         stance = toe_off - self._strike
         least = max(settings.shortest_stance, settings.least_share * self._stances.value)
         most = settings.most_share * self._stances.value or math.inf
         walks = stance < settings.longest_stance  # else somebody stood
         # Of a contact that was there at the start the strike is not known.
         believed = self._own and not stance < least and not (walks and stance > most)
-        self._on, self._rise = False, math.nan
+        self._on, self._unloaded = False, True
+        self._rise = self._changed = math.nan
         if self._own:  # else the swing in progress goes on
             self._toe_off = toe_off if believed else math.nan
         if self._own and walks and stance >= settings.shortest_stance:
@@ -178,13 +198,13 @@ class VerticalForceDetector(Detector):
             return []
         return self._found(EventKind.TOE_OFF, toe_off, time)
 
-    def _zero_anew(self, time: float, force: float) -> list[Detection]:
-        """Find a foot that seems never to leave the ground because the zero is wrong."""
-        if force < self._lowest:
+    def _zero_anew(self, time: float, force: float) -> None:
+        """Find a foot that was in the air unseen: from its peak the force fell low, and rose."""
+        if force > self._highest:
+            self._highest = self._lowest = force
+        elif force < self._lowest:
             self._lowest = force
-        if time - self._on_since > self.settings.longest_stance:
-            if self._lowest < 150.0:
-                self._zero += self._lowest
-                self._on = None
-            self._on_since, self._lowest = time, math.inf
-        return []
+        longest = self.settings.longest_stance
+        if self._lowest < _UNLOADED <= force and time - self._on_since > longest:
+            self._zero += self._lowest
+            self._on = None

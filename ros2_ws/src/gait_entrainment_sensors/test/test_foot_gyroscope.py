@@ -102,6 +102,42 @@ def test_a_sensor_that_was_put_on_the_other_way_round_is_told():
     assert any("about another axis" in line for line in detector.troubles())
 
 
+@pytest.mark.parametrize("stood", [3.5, 3.9, 4.3, 4.7])
+def test_one_step_from_standing_does_not_tell_the_mounting(stood):
+    """Within the first five seconds there are half a step to a step and a half."""
+    start = OFFSET[Side.RIGHT] + STANCE - 0.15 - stood
+
+    def signal(time):
+        return (0.0, foot_rate(max(time + start, 0.0)), 0.0)
+
+    detector = FootGyroscopeDetector(Side.RIGHT)
+    found = fed(detector, sampled(signal, UNTIL))
+    assert detector._axis == (0.0, 1.0, 0.0)
+    assert len(times(found, STRIKE)) >= 4
+
+
+def test_a_sensor_that_turns_over_in_mid_trial_is_told():
+    detector = FootGyroscopeDetector(Side.RIGHT)
+    fed(detector, sampled(lambda t: (0.0, foot_rate(t) * (-1 if t > 10 else 1), 0.0), 25.0))
+    assert any("the other way round: set" in line for line in detector.troubles())
+
+
+def test_the_slap_of_a_slow_first_step_is_no_push_off():
+    found = fed(
+        FootGyroscopeDetector(Side.RIGHT, UPRIGHT),
+        sampled(lambda t: (0.0, foot_rate(t / 4), 0.0), UNTIL),
+    )
+    ends = [4 * (OFFSET[Side.RIGHT] + n * STRIDE + STANCE) for n in range(3)]
+    assert times(found, TOE_OFF) == pytest.approx([e for e in ends if e < UNTIL], abs=0.04)
+
+
+def test_gaps_do_not_turn_the_mounting_over():
+    for stream in foot_rates():
+        kept = [(t, v) for t, v in zip(stream.times, stream.values, strict=True) if t % 9 < 6]
+        settings = FootGyroscopeDetector.calibrated(UPRIGHT.__class__(), *zip(*kept, strict=True))
+        assert settings.axis == (0.0, 1.0, 0.0)
+
+
 def test_sensors_on_the_wrong_feet_are_told():
     for stream in foot_rates():
         for side in Side:

@@ -89,6 +89,12 @@ def test_contacts_are_the_feet_s_that_stand_there(tmp_path, sign):
         assert times(own, TOE_OFF) == [pytest.approx(toe_off, abs=0.012)]
 
 
+def test_a_plate_without_a_contact_is_told(tmp_path):
+    found, told = events_on_plates(read_c3d(write(tmp_path / "a.c3d", sign=-1e-3)), FORCE)
+    assert found == []
+    assert told[0] == "plate 1: no contact, by forces of -1 to 0 N"
+
+
 def test_a_contact_of_both_feet_is_nobody_s_and_told(tmp_path):
     found, told = events_on_plates(read_c3d(write(tmp_path / "a.c3d", wrong=True)), FORCE)
     assert found == []

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from public_data import children, foot_rates
-from walks import STRIDE, detections
+from walks import STANCE, STRIDE, detections
 
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.gait import analyze
@@ -144,6 +144,31 @@ def test_a_pause_is_a_gap():
     assert steps[0] >= 2 * (10 + 3)
     assert steps == list(range(steps[0], steps[0] + len(steps)))
     assert any("were missed" in line for line in numbering.troubles())
+
+
+@pytest.mark.parametrize("begin", [0, 4])
+def test_who_runs_keeps_the_numbers_of_strikes_and_is_told(begin):
+    """Stance is a third of a stride, so there is no double stance; perhaps after two strides."""
+    found = [d for d in detections(2) if d.time < begin]
+    for n in range(40):
+        side, strike = Side(1 - n % 2), begin + 0.35 * n
+        found += [Detection(STRIKE, side, strike, strike + 0.02, 0.0)]
+        found += [Detection(TOE_OFF, side, strike + 0.24, strike + 0.26, 0.0)]
+    numbering, events = numbered(found)
+    strides = analyze(events, (), Side.RIGHT).strides
+    assert len([s for s in strides if s.period == pytest.approx(0.7)]) >= 17
+    assert any("running?" in line for line in numbering.troubles())
+
+
+def test_force_plates_with_a_step_between_them_are_numbered():
+    right, left = ((STRIKE, TOE_OFF, Side.RIGHT), 1.0), ((STRIKE, TOE_OFF, Side.LEFT), 2.65)
+    found = [
+        Detection(kind, side, at + late, at + late, 0.0)
+        for (*kinds, side), at in (right, left)
+        for kind, late in zip(kinds, (0.0, STANCE), strict=True)
+    ]
+    _, events = numbered(found)
+    assert [e.step for e in events] == [0, 2, 3, 5]
 
 
 def test_a_wrong_first_event_does_not_silence_the_walk():

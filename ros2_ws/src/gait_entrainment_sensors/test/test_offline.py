@@ -4,6 +4,7 @@
 """Recordings made elsewhere: tables in, events.tsv out, and every refused input in one line."""
 
 import json
+import math
 
 import pytest
 from walks import force, sampled
@@ -18,7 +19,7 @@ from gait_entrainment_sensors.offline import (
     read_onsets,
     write_events,
 )
-from gait_entrainment_sensors.recording import RecordingError, read_streams, read_table
+from gait_entrainment_sensors.recording import RecordingError, Stream, read_streams, read_table
 
 STRIKE, TOE_OFF = EventKind
 
@@ -50,7 +51,7 @@ def test_a_table_goes_through_and_comes_back(walk, tmp_path):
     assert troubles == ("1 events were missed",)  # the left toe-off before the first strike
     out = tmp_path / "walk_events.tsv"
     write_events(out, events)
-    assert [*read_table(out)] == [*COLUMNS]
+    assert [*read_table(out).columns] == [*COLUMNS]
     sidecar = json.loads((tmp_path / "walk_events.json").read_text())
     assert {name: told.get("Units") for name, told in sidecar.items()}["onset"] == "s"
     again = read_events(out)
@@ -83,6 +84,71 @@ def test_columns_of_other_names_and_units_are_read(walk, tmp_path):
     assert stream.values[0] == pytest.approx((3.14159265, 0.0))
 
 
+def with_comma(text):
+    return text.replace(",", ";").replace(".", ",")
+
+
+def in_milliseconds(text):
+    head, *rows = (line.split(",") for line in text.splitlines())
+    rows = ["\t".join([f"{1e3 * float(row[0]):g}", *row[1:]]) for row in rows]
+    return "\n".join(["\t".join(["Time (ms)", *head[1:]]), *rows])
+
+
+def heads(*lines):
+    return lambda text: "\n".join([*lines, *text.splitlines()[1:]])
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        with_comma,
+        in_milliseconds,
+        heads("# lab A", "subject;3", "TIME [s],Left_Force_Z [N],right_force_z (N)"),
+        heads("time,left_force_z,right_force_z", "s,N,N"),
+        heads("time,left,right", ",force_z,force_z", "s,,"),
+        lambda text: text.replace("\n", "\r\n") + "\r\n \r\n",
+    ],
+)
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_a_table_is_read_as_others_write_it(walk, written, encoding):
+    plain = events_of(walk)
+    walk.write_text(written(walk.read_text()), encoding=encoding)
+    columns = {"left_force_z": "left force_z", "right_force_z": "right force_z"}
+    told = "left force_z" in read_table(walk).columns
+    again = events_of(walk, columns=columns if told else {})
+    assert [(e.event.step, e.detection.kind) for e in again[0]] == [
+        (e.event.step, e.detection.kind) for e in plain[0]
+    ]
+    assert [e.detection.time for e in again[0]] == pytest.approx(
+        [e.detection.time for e in plain[0]], abs=1e-6
+    )
+
+
+def test_an_empty_line_of_a_single_column_is_a_missing_sample(tmp_path):
+    path = tmp_path / "one.csv"
+    path.write_text("left_force_z\n1.5\n\n3\n")
+    _, (stream,) = streams_of(path, rate=100.0)
+    assert stream.times == pytest.approx([0.0, 0.01, 0.02])
+    assert [v for (v,) in stream.values] == pytest.approx([1.5, math.nan, 3.0], nan_ok=True)
+
+
+def test_toe_offs_before_the_first_strike_are_kept_and_in_no_stride(walk, tmp_path):
+    lines = walk.read_text().splitlines()
+    walk.write_text("\n".join([lines[0], *lines[230:]]))  # both feet stand
+    events, _ = events_of(walk)
+    first, second, *_ = sorted(events, key=lambda e: e.detection.time)
+    assert (first.event.kind, first.event.side, first.event.step) == (TOE_OFF, Side.RIGHT, 0)
+    assert (second.event.kind, second.event.side, second.event.step) == (STRIKE, Side.RIGHT, 0)
+    write_events(tmp_path / "e.tsv", events)
+    assert read_events(tmp_path / "e.tsv")[0] == second.event
+
+
+def test_a_sensor_that_dies_before_the_record_ends_is_told(walk):
+    chosen, (left, right) = streams_of(walk)
+    dead = Stream(right.side, right.times[:1000], right.values[:1000])
+    assert "right vertical_force: no sample for 7.00 s" in detect(chosen, [left, dead])[1]
+
+
 def test_a_missing_sample_is_told(walk):
     lines = walk.read_text().splitlines()
     lines[400] = lines[400].rpartition(",")[0] + ","
@@ -99,6 +165,8 @@ def test_a_missing_sample_is_told(walk):
         ("time,time\n0,1", "column time appears twice"),
         ("left_force_z\n1", "lacks the column time"),
         ("time,left_force_z\n0,x", "row 2, column left_force_z: 'x'"),
+        ("0,1\n1,2", "row 1 has no names above it"),
+        ("time,left_force_z\n0,1\n10,1\n20,1", "column time, or --rate: samples are 10 s apart"),
         ("time,left_force\n0,1", "lacks columns SIDE_force_z or"),
         ("time,left_foot_gyro_x\n0,1", "lacks column left_foot_gyro_y, left_foot_gyro_z"),
     ],
@@ -121,6 +189,8 @@ def test_a_refused_table_is_named_with_its_column(tmp_path, text, words):
         ("onset,trial_type,side\n1,toe_off,both", "row 2, column side: 'both'; allowed: left"),
         ("onset,trial_type,side\nn/a,toe_off,left", "row 2, column onset: 'n/a'"),
         ("onset,trial_type,side,step\n1,toe_off,left,", "row 2, column step: ''"),
+        ("onset,trial_type,side,step\n1,toe_off,left,0.5", "'0.5'; allowed: a whole number"),
+        ("onset,trial_type,side,uncertainty\n1,toe_off,left,-1", "'-1'; allowed: 0 to 1 s"),
     ],
 )
 def test_refused_events_are_named_with_row_and_column(tmp_path, text, words):

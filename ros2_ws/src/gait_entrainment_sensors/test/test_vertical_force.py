@@ -3,6 +3,8 @@
 
 """Vertical force: a real belt, closed forms, steps on the wrong belt, and what cannot be."""
 
+import math
+import random
 from itertools import pairwise
 
 import pytest
@@ -55,6 +57,10 @@ def test_the_zero_follows_a_drift_in_swing():
 def test_a_belt_that_was_never_zeroed_is_zeroed():
     _, found = detected(lambda t: (force(t) + 90.0,))
     assert len(times(found, STRIKE)) >= 8
+    _, found = detected(lambda t: (force(t) - 60.0,))
+    late = STANCE / 3.14159 * 20.0 / 800.0
+    for n, time in list(enumerate(times(found, STRIKE)))[3:]:
+        assert time == pytest.approx(OFFSET[Side.RIGHT] + n * STRIDE + late, abs=2e-3)
 
 
 def test_a_step_of_the_other_foot_on_this_belt_is_no_event():
@@ -84,9 +90,45 @@ def test_a_stance_that_both_feet_share_ends_without_a_toe_off():
     assert times(found, STRIKE) == pytest.approx(times(plain, STRIKE), abs=1e-3)
 
 
+def test_single_samples_are_no_foot():
+    """Every 50th sample is lost as a zero, and every 50th is a spike; plates shake by 25 N."""
+    generator = random.Random(1)
+
+    def signal(time):
+        odd = {7: 0.0, 32: 500.0}.get(round(1000 * time) % 50)
+        return (force(time) + generator.gauss(0.0, 25.0) if odd is None else odd,)
+
+    detector, found = detected(signal)
+    plain = detected(lambda t: (force(t),))[1]
+    assert times(found, STRIKE) == pytest.approx(times(plain, STRIKE), abs=0.02)
+    assert times(found, TOE_OFF) == pytest.approx(times(plain, TOE_OFF), abs=0.03)
+    assert detector.counts.rejected == 0
+
+
+@pytest.mark.parametrize("factor", [1.0, 4.0])
+def test_who_stops_or_walks_slowly_leaves_the_ground_when_he_does(factor):
+    """Strides of 4.4 s; or the foot stands for five strides in mid-walk, on and off its load."""
+    stands = OFFSET[Side.RIGHT] + 3 * STRIDE, OFFSET[Side.RIGHT] + 8 * STRIDE + STANCE
+
+    def signal(time):
+        time /= factor
+        if factor == 1.0 and stands[0] + 0.2 < time < stands[1] - 0.2:
+            return (400.0 + 150.0 * math.sin(time),)
+        return (force(time),)
+
+    detector, found = detected(signal)
+    ends = [OFFSET[Side.RIGHT] + n * STRIDE + STANCE for n in range(11)]
+    if factor == 1.0:
+        ends = [end for end in ends if not stands[0] < end < stands[1] - 0.1]
+    ends = [end * factor for end in ends if end * factor < UNTIL]
+    assert times(found, TOE_OFF) == pytest.approx(ends, abs=0.03)
+    assert detector._zero == pytest.approx(0.0, abs=5.0)
+
+
 @pytest.mark.parametrize(
     ("signal", "words"),
     [
+        (lambda t: (force(t) + 300.0,), "never unloaded: zero it"),
         (lambda t: (-force(t),), "upwards positive"),
         (lambda t: (force(t) / 1e3,), "not in kN"),
         (lambda t: (30.0 * force(t),), "cannot be"),

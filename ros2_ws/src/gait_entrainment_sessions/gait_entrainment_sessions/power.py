@@ -90,8 +90,15 @@ def power(plan: PowerPlan, offset: float, counts: Sequence[int] = COUNTS) -> lis
             chance(False, n, Verdict.DRIFTING),
             chance(False, n, Verdict.ENTRAINED),
         )
-        for n in sorted(counts)
+        for n in sorted(set(counts))
     ]
+
+
+def enough_of(found: Sequence[Power], chance: float) -> int | None:
+    """Return the pulses from which on both walkers are judged right so often; None if never."""
+    right = [min(one.entrained.value, one.drifting.value) >= chance for one in found]
+    first = max((n for n, enough in enumerate(right, start=1) if not enough), default=0)
+    return found[first].pulses if first < len(found) else None
 
 
 def _verdicts(events: Sequence[GaitEvent], onsets: Sequence[int]) -> dict[int, Verdict]:

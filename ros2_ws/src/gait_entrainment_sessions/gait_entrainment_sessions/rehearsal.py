@@ -5,7 +5,8 @@
 A study rehearsed: the blocks of a session file on simulated persons, judged as real ones.
 
 Each person is a walker of the model with a body, a peak torque and a variation of its own, and
-walks each block from a fresh start: no order of blocks matters to them, and none gets tired.
+walks each block from a fresh start: no order of blocks matters to them, and none gets tired. An
+ideal robot stands for a real one.
 """
 
 from collections.abc import Iterator
@@ -15,7 +16,7 @@ from functools import partial
 import numpy as np
 
 from gait_entrainment.parameters import Variation
-from gait_entrainment.robot import LimitError
+from gait_entrainment.robot import LimitError, find_driver
 from gait_entrainment.simulation import simulate
 from gait_entrainment_sessions.runs import Place, PlacedRun
 from gait_entrainment_sessions.session_file import Session
@@ -49,6 +50,8 @@ def _conduct(
         variation=Variation(float(subjects.variation[subject]), hurst),
         seed=int(drawn[0]),
     )
+    if not find_driver(protocol.driver).simulated:
+        protocol = replace(protocol, driver="ideal")
     try:
         run = simulate(protocol)
     except LimitError as error:

@@ -10,7 +10,7 @@ from gait_entrainment.conventions import Side
 from gait_entrainment.errors import UsageError
 from gait_entrainment.gait import Verdict, analyze
 from gait_entrainment_sessions import statistics
-from gait_entrainment_sessions.power import PowerPlan, power, walk
+from gait_entrainment_sessions.power import Power, PowerPlan, enough_of, power, walk
 from gait_entrainment_studies.cohort.population import step_noise
 
 
@@ -43,6 +43,16 @@ def test_the_slope_lets_more_walkers_pass_that_ignore_the_pulses_than_the_verdic
         slopes_pass += slope.low < 0 < slope.high
         verdicts_pass += found.entrainments[-1].verdict is Verdict.ENTRAINED
     assert (slopes_pass, verdicts_pass) == (9, 2)
+
+
+@pytest.mark.parametrize(
+    ("chances", "enough"),
+    [((0.5, 0.8, 0.9), 20), ((0.8, 0.7, 0.9), 30), ((0.9, 0.9, 0.7), None), ((1, 1, 1), 10)],
+)
+def test_enough_is_what_more_pulses_are_not_too_few_for(chances, enough):
+    told = [statistics.Estimate(chance, 0, 1) for chance in chances]
+    found = [Power(10 * n, one, one, one) for n, one in enumerate(told, start=1)]
+    assert enough_of(found, 0.8) == enough
 
 
 def test_an_offset_at_which_nobody_locks_is_refused():

@@ -25,7 +25,7 @@ ANY = (
 
 
 def test_each_subject_walks_what_the_simulation_does(write):
-    session = read_session(write(ANY))
+    session = read_session(write(ANY, ("side: left", "side: left\n  driver: odrive_can")))
     walker = session.blocks[0].protocol.walker
     subjects = Subjects((walker, walker), np.array([0.02, 0.01]), 0)
     runs = list(rehearse(session, subjects, seed=0, hurst=0.5, jobs=2))
@@ -33,6 +33,7 @@ def test_each_subject_walks_what_the_simulation_does(write):
     assert walked.keys() == {(s, b) for s in ("S01", "S02") for b in ("faster", "slower")}
     for run in walked.values():
         assert run.protocol.side is Side.LEFT
+        assert run.protocol.driver == "ideal"
         assert simulate(run.protocol).events == run.events
     by_phase = walked["S02", "slower"]
     assert by_phase.protocol.variation.coefficient == 0.01

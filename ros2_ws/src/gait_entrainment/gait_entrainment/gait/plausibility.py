@@ -78,11 +78,7 @@ class GaitWatch:
             self._own.append(period)
 
     def stopped(self, now: int, expected: float = math.inf) -> str:
-        """
-        Return why nobody seems to walk at an instant [ns], or an empty text.
-
-        As long as no stride of the person is known, one of the ``expected`` period [s] counts.
-        """
+        """Return why nobody walks at an instant [ns], or ""; a first stride is as ``expected``."""
         if self._latest is None:
             return ""
         stride = statistics.median(self._own or [min(self.limits.stride_most, expected)])

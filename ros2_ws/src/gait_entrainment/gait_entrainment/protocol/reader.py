@@ -150,9 +150,6 @@ def entries_in(
         if key in seen:
             raise ProtocolError(f"{where}: {key}: appears twice; keep one")
         seen.add(key)
-        text = key in allowed and allowed[key].kind is str
-        listed = text and isinstance(value_node, yaml.SequenceNode)
-        items = value_node.value if listed else [value_node]
         if key == "blocks" and allowed is FIELDS:
             if not isinstance(value_node, yaml.SequenceNode) or not value_node.value:
                 raise ProtocolError(f"{where}: blocks: must be a list of at least one block")
@@ -162,16 +159,16 @@ def entries_in(
             yield key, Entry(value_node, where)
         elif any(field.startswith(f"{key}.") for field in allowed):
             yield from entries_in(value_node, name, allowed, f"{key}.")
-        elif key not in allowed or "." in key.removeprefix(
-            prefix
-        ):  # a section's field has one place
+        elif key not in allowed or "." in str(key_node.value):  # a section's field has one place
             inside = [field.removeprefix(prefix) for field in allowed if field.startswith(prefix)]
             known = ", ".join(sorted({field.partition(".")[0] for field in inside}))
             raise ProtocolError(f"{where}: {key}: unknown field; allowed: {known}")
-        elif not all(isinstance(item, yaml.ScalarNode) for item in items):
+        elif isinstance(value_node, yaml.SequenceNode) and allowed[key].kind is str:
+            yield key, Entry(", ".join(str(item.value) for item in value_node.value), where)
+        elif not isinstance(value_node, yaml.ScalarNode):
             raise ProtocolError(f"{where}: {key}: must be a single value")
-        elif text:  # as written, also if YAML would make a number of it
-            yield key, Entry(", ".join(item.value for item in items), where)
+        elif allowed[key].kind is str:  # as written, also if YAML would make a number of it
+            yield key, Entry(value_node.value, where)
         else:
             value = _meant(f"{where}: {key}", allowed[key].kind, value_node)
             yield _spelled_out(key, Entry(value, where))
@@ -184,18 +181,15 @@ def _spelled_out(key: str, entry: Entry) -> tuple[str, Entry]:
 
 
 def _meant(where: str, kind: type, node: yaml.ScalarNode) -> object:
-    """
-    Return a number, a switch or nothing; else what is written, so that it is told like this.
-
-    Raises ProtocolError for what YAML 1.1 takes for another number than people do, or a text.
-    """
+    """Return a value as people mean it, else as written; ProtocolError where YAML 1.1 differs."""
     if kind in (int, float) and node.style in ("'", '"'):
         raise ProtocolError(f"{where}: {node.value!r} is a text: leave out the quotes")
     try:
         value = yaml.SafeLoader("").construct_object(node)
     except Exception:  # an unknown tag, a month 13: PyYAML passes on what it runs into
         raise ProtocolError(f"{where}: {node.value[:40]!r} cannot be read as a value") from None
-    other_base = isinstance(value, int) and re.match(r"[-+]?0[0-9_box]", node.value)
+    same = node.value.isdigit() and int(node.value) == value
+    other_base = isinstance(value, int) and re.match(r"[-+]?0[0-9_box]", node.value) and not same
     if other_base or (isinstance(value, int | float) and ":" in node.value):
         raise ProtocolError(
             f"{where}: {node.value} is {value} in YAML; write it as a decimal number"

@@ -149,7 +149,7 @@ class AnkleRobot(ABC):
 
     @abstractmethod
     def read(self) -> Sequence[RobotState]:
-        """Return the states since the last call, oldest first, stamps ascending."""
+        """Return the states since the last call: finite, stamps ascending, none in the future."""
 
     @abstractmethod
     def stop(self) -> None:

@@ -113,10 +113,8 @@ def find_driver(text: str, side: Side = Side.RIGHT) -> Driver:
         ) from None
     if not (isinstance(robot, type) and issubclass(robot, AnkleRobot)):
         raise LimitError(f"driver: {name} ({target}) is no AnkleRobot: derive it from that class")
-    options = {
-        leg: read_options(f"driver: {name}", robot.Options, driver_on(text, leg).partition(":")[2])
-        for leg in Side
-    }
+    texts = (driver_on(text, leg).partition(":")[2] for leg in Side)
+    options = [read_options(f"driver: {name}", robot.Options, words) for words in texts]
     return Driver(name, robot, options[side])
 
 

@@ -37,7 +37,7 @@ from gait_entrainment.robot.faults import (
 )
 from gait_entrainment.robot.limits import DeviceLimits, Dose
 from gait_entrainment.robot.profile import ProfileError, TorqueProfile
-from gait_entrainment.robot.pulse_train import PulseTrain
+from gait_entrainment.robot.pulse_train import Pulse, PulseTrain
 
 # How often the watchdog looks whether the experiment has fallen silent [s].
 _WATCH_PERIOD = 0.01
@@ -70,6 +70,7 @@ class GuardedRobot:
         self.partner: GuardedRobot | None = None  # on the other ankle: one stops with the other
         self._configured = self._active = self._in_run = False
         self._begun = 0  # pulses scheduled since the latest pause
+        self._past: tuple[Pulse, ...] = ()  # of trains that were cancelled, what had begun
         self._read_until = 0  # stamp of the latest state [ns]
         self._offset = time.time_ns() - time.monotonic_ns()  # from steady time to a real run's
         self._armed_until = -math.inf  # steady time [s]
@@ -153,7 +154,8 @@ class GuardedRobot:
         self._refuse_inactive()
         self._call(lambda: self._robot.begin(start))
         self.train, self.delivered, self.promised_until = None, 0, start
-        self._read_until, self._offset = 0, time.time_ns() - time.monotonic_ns()
+        self._past, self._read_until = (), 0
+        self._offset = time.time_ns() - time.monotonic_ns()
         self._delivered_torque = _DeliveredTorque(self.limits)
         self._in_run = True
         self.heard()
@@ -207,7 +209,7 @@ class GuardedRobot:
             why = f"was armed more than {self.limits.arming:g} s ago" if lapsed else "is not armed"
             raise DeviceError(f"the device {why}; see that all is well, then arm it")
         before = self.train
-        self.limits.check(train, before.pulses if before else ())
+        self.limits.check(train, (*self._past, *(before.pulses if before else ())))
         both = [(r.train.pulses, r.promised_until) for r in (self, self.partner) if r and r.train]
         coming = [pulse for pulses, until in both for pulse in pulses if pulse.onset >= until]
         self.limits.check_dose(self.dose, [*coming, *train.pulses])
@@ -238,6 +240,7 @@ class GuardedRobot:
     def cancel(self) -> None:
         """Forget the train: torque is zero from now on."""
         if self.train is not None:
+            self._past += self.train.until(self.promised_until)
             self.train = None
             self._call(self._robot.cancel)
 
@@ -286,11 +289,7 @@ class GuardedRobot:
         return profile
 
     def read(self) -> Sequence[RobotState]:
-        """
-        Return the states since the last call; a fault in one of them latches.
-
-        Raises DeviceError if the driver fails, or if a state is one that no device can have.
-        """
+        """Return the states since the last call; a fault latches; DeviceError if one cannot be."""
         states = self._call(lambda: tuple(self._robot.read()))
         able, until = self.capabilities, self.promised_until
         if not able.simulated:

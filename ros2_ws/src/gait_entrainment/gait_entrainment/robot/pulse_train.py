@@ -145,6 +145,12 @@ class PulseTrain:
         number = self.latest(instant)
         return self.pulses[number].torque_at(instant) if number >= 0 else 0.0
 
+    def until(self, instant: int) -> tuple[Pulse, ...]:
+        """Return the pulses that began before an instant [ns], as squares that are over by it."""
+        begun = self.pulses[: self.latest(instant - 1) + 1]
+        lasted = (min(p.duration, (instant - p.onset) / NANOSECONDS_PER_SECOND) for p in begun)
+        return tuple(Pulse(p.onset, p.torque, time) for p, time in zip(begun, lasted, strict=True))
+
     def shifted(self, by: int) -> "PulseTrain":
         """Return the train later by a time [ns], or on another clock."""
         moved = (replace(pulse, onset=pulse.onset + by) for pulse in self.pulses)

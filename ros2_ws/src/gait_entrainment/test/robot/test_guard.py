@@ -126,6 +126,25 @@ def test_a_train_comes_after_the_one_before_until_it_is_cancelled_or_the_run_beg
     assert driver.calls.count("schedule") == 2
 
 
+def test_limits_hold_although_a_train_is_cancelled():
+    limits = {"pulses_per_minute": 60.0, "impulse": 1.5}
+    guard, _ = ready(DeviceLimits(**limits))
+    guard.schedule(train(first_onset=SECOND, count=2))
+    guard.promise(SECOND + 60_000_000)  # 60 of 100 ms of the first pulse
+    guard.cancel()
+    with pytest.raises(LimitError, match=r"period: 0\.5 s; allowed: at least 1 s"):
+        guard.schedule(train(first_onset=SECOND * 3 // 2, count=1))
+    guard, _ = ready(DeviceLimits(**limits | {"pulses_per_minute": 600.0}))
+    guard.schedule(train(first_onset=SECOND, count=2))
+    guard.promise(SECOND + 60_000_000)
+    guard.cancel()
+    with pytest.raises(LimitError, match=r"impulse: 2\.08 N m s within 1 s"):
+        guard.schedule(train(first_onset=SECOND * 3 // 2, count=1))
+    guard.schedule(train(first_onset=2 * SECOND + 60_000_000, count=1))
+    guard.begin(0)  # another run
+    guard.schedule(train(first_onset=SECOND, count=1))
+
+
 def test_limits_hold_over_the_border_of_two_trains():
     guard, _ = ready(DeviceLimits(impulse=1.5, duty=1.0))
     guard.schedule(train(count=1))

@@ -108,6 +108,17 @@ def _of_tables(options: argparse.Namespace) -> int:
     bias = float(TOE_OFF_BIAS.parse("--toe-off-bias", options.toe_off_bias or "0"))
     events, onsets = read_events(options.events), read_onsets(options.pulses)
     analysis = analyze(without_bias(events, bias), onsets, told["side"])
+    if not analysis.strides:
+        raise UsageError(
+            f"{options.events}: holds no stride of the {options.side} leg that can be, from heel "
+            "strike to heel strike; onset is in seconds, and step counts both legs"
+        )
+    start, end = analysis.strides[0].start, analysis.strides[-1].end
+    if not any(start <= onset <= end for onset in onsets):
+        raise UsageError(
+            f"{options.pulses}: column onset: {onsets[0] / 1e9:g} to {onsets[-1] / 1e9:g} s; "
+            f"allowed: some in the strides, {start / 1e9:g} to {end / 1e9:g} s by the same clock"
+        )
     periods = periods_of(conducted(told["protocol"], events), analysis)
     delivered = tuple((told["side"], PulseTiming(onset)) for onset in onsets)
     run = Run(told["protocol"], tuple(events), delivered, *periods, analysis, ())

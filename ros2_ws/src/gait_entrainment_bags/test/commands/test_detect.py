@@ -63,6 +63,21 @@ def test_a_bag_or_tables_and_the_leg(capsys, words, message):
     assert message in err
 
 
+def test_tables_that_do_not_fit_together_are_refused(capsys, tables):
+    """Milliseconds, another leg's events alone, another clock."""
+    _, events, _, pulses = tables
+    rows = events.read_text()
+    events.write_text("\n".join(line for line in rows.splitlines() if "right" not in line))
+    code, _, err = entrain(capsys, "analyze", *tables, "--side=right")
+    assert (code, err.count("\n")) == (2, 1)
+    assert f"{events}: holds no stride of the right leg" in err
+    events.write_text(rows)
+    pulses.write_text("onset [ms]\n100\n1700\n")
+    code, _, err = entrain(capsys, "analyze", *tables, "--side=right")
+    assert (code, err.count("\n")) == (2, 1)
+    assert "column onset: 0.1 to 1.7 s; allowed: some in the strides, 100 to" in err
+
+
 def test_detect_writes_beside_the_file_and_prints(capsys, tmp_path):
     def load(n):
         return 800 if n % 110 < 68 else 0

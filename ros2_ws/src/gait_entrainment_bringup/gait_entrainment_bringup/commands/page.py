@@ -26,7 +26,7 @@ from gait_entrainment_bringup.run_options import (
 )
 from gait_entrainment_nodes.messaging.domain import claimed_domain, wanted_domain
 from gait_entrainment_nodes.messaging.environment import set_environment
-from gait_entrainment_page.access import Access
+from gait_entrainment_page.access import Access, Seat, listen
 from gait_entrainment_sessions.runs import is_sealed
 
 DESCRIPTION = (
@@ -81,8 +81,6 @@ def run(options: argparse.Namespace) -> int:
 
 def show_bag(options: argparse.Namespace) -> int:
     """Serve the page of a bag, without ROS, until it is stopped."""
-    # Not at the top: they load the web server.
-    from gait_entrainment_page.access import Seat, listen
     from gait_entrainment_page.bag_source import BagSource
 
     if not options.bag.exists():
@@ -91,7 +89,7 @@ def show_bag(options: argparse.Namespace) -> int:
         raise UsageError("--foxglove: offers a live run; Foxglove opens a bag by itself")
     bag = BagSource(options.bag, blinded=options.blinded or is_sealed(options.bag))
     given = checked_page(options, None)
-    from gait_entrainment_page.layout import Page
+    from gait_entrainment_page.layout import Page  # not at the top: it loads the web server
 
     access = Access.of_environment(options.host)
     listener = listen(options.host, given["port"])

@@ -10,6 +10,7 @@ import os
 import shutil
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from functools import partial
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from gait_entrainment_bringup.node_list import (
     PERSON_SILENCE,
     RUN_CLIENT,
     STOP_ORDER,
+    WALKERS,
     nodes_for,
     parameter_arguments,
 )
@@ -33,6 +35,7 @@ from gait_entrainment_bringup.run_options import (
     claimed_folder,
 )
 from gait_entrainment_bringup.supervisor import Supervisor, supervised
+from gait_entrainment_drivers.stop_channel import StopListener
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 from gait_entrainment_page.access import Access
 
@@ -49,6 +52,8 @@ EXAMPLES = """examples:
 # Nodes that may run on another host. Not those that hold the torque and the record: Ctrl-C must
 # reach them without a network.
 DETACHABLE = ("walker_sim", "sensor_sim", "gait_detector", "gait_analyzer")
+# Whoever plays the walker: a program that is no node of this project (docs/person.md).
+ROLE = "walker"
 # What the end of a run needs, loaded while the walker walks.
 REPORT = "gait_entrainment_bringup.run_report"
 DRAWING = ("matplotlib.figure", "matplotlib.backends.backend_agg")
@@ -67,9 +72,10 @@ def add_node_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--elsewhere",
         action="append",
-        choices=DETACHABLE,
+        choices=(*DETACHABLE, ROLE),
         default=[],
-        help="do not start this node: it runs on another host (entrain node); repeatable",
+        help="do not start this node: it runs on another host (entrain node); walker: a source of "
+        "events of your own; repeatable",
     )
     parser.add_argument("--page", action="store_true", help="show the run in a browser")
     add_page_options(parser)
@@ -117,18 +123,27 @@ def run_experiment(
 
     The bag keeps ``about`` beside what it says of every run.
     """
-    with supervised(
-        domain, STOP_ORDER, partial(kept, bag), real_time=options.real_time
-    ) as supervisor:
+    with (
+        closing(StopListener(RUN_CLIENT)) as early,
+        supervised(
+            domain, STOP_ORDER, partial(kept, bag), real_time=options.real_time
+        ) as supervisor,
+    ):
         given = chosen_parameters(protocol, bag, options)
+        nodes, elsewhere = nodes_for(options.walker), {*options.elsewhere}
+        if ROLE in elsewhere:  # nothing is asked of it but the role
+            player = given["experiment"]["walker"]
+            given["experiment"]["participants"].remove(player)
+            given["bag_recorder"]["publishers"].remove(player)
+            given["experiment"]["walker"] = ROLE
+            elsewhere.update(WALKERS[options.walker])
         given[PAGE] |= options.page_parameters
         given["perturbator"]["operators"] = [RUN_CLIENT, *([PAGE] if options.heartbeat else [])]
         custom_data = json.loads(given["bag_recorder"]["custom_data"])
         given["bag_recorder"]["custom_data"] = json.dumps(custom_data | dict(about or {}))
         arguments = parameter_arguments(given, supervisor.folder)
-        nodes = nodes_for(options.walker)
         for node in nodes:
-            if node not in options.elsewhere:
+            if node not in elsewhere:
                 supervisor.start(node, arguments)
         if options.page:
             start_page(supervisor, arguments, options)
@@ -144,6 +159,7 @@ def run_experiment(
             quiet=quiet,
             real_time=options.real_time,
             silence=silence,
+            early=early,
         )
         supervisor.wait_for_record()
         # No torque is left and the record is closed: in which order the rest ends does not matter.

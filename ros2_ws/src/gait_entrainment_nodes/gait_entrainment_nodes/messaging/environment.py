@@ -89,7 +89,8 @@ def dds_variables(*, real_time: bool) -> dict[str, str]:
     """
     reach, file = "ROS_AUTOMATIC_DISCOVERY_RANGE", "FASTRTPS_DEFAULT_PROFILES_FILE"
     common, paced = (
-        str(shared_file(PACKAGE, f"config/{name}.xml")) for name in ("fastdds", "fastdds_real_time")
+        str(shared_file(PACKAGE, f"config/{name}.xml"))
+        for name in ("fastdds", "fastdds_real_time")
     )
     chosen = {reach: os.environ.get(reach) or "LOCALHOST", file: os.environ.get(file) or common}
     if chosen[file] == paced:  # not by the user, but by what has started this process

@@ -81,7 +81,7 @@ class Run:
         self._held_up, self._clock = held_up, clock
         self._events = 0
         self._progress: msg.Progress | None = None  # received, not answered yet
-        self._grant = self._recorded_grant = -1
+        self._reported = self._recorded_until = 0  # of progress [ns since 1970]
         self._covered: dict[int, int] = {}  # by profiles of each ankle [ns since 1970]
         self._closed: set[int] = set()  # ankles whose robots have answered the closing horizon
         self._planning = False  # pulses were requested, and there is no answer yet
@@ -176,22 +176,27 @@ class Run:
         """Take the walker's progress; it is answered once all that it covers is here."""
         if self.conductor is None:
             return
-        ahead = nanoseconds_of(progress.header.stamp) - self._latest_stamp()
-        if ahead > 0:
+        stamp = nanoseconds_of(progress.header.stamp)
+        if (ahead := stamp - self._latest_stamp()) > 0:
             lead = f"{ahead / NANOSECONDS_PER_SECOND:.3g} s ahead of what can be over by now"
             self.fail(ExperimentError(f"{self.walker} reports what is {lead}", self.walker))
             return
         if self._progress is None:  # else this one only repeats that an answer is owed
-            self._progress_at = min(self._clock(), self._owed_from(progress))
+            self._progress_at = self._clock()
+            if self._began is not None:  # one that lags would hide that the gait has stopped
+                about = (stamp - self._began[1]) / NANOSECONDS_PER_SECOND
+                owed_from = about + self.conductor.longest_lookahead
+                self._progress_at = min(self._progress_at, owed_from)
         self._progress = progress
-        if self._recorded_grant >= self._grant:
+        if self._recorded_until >= self._reported:
             self._recorded_at = self._clock()
-        self._grant = progress.grant
+        self._reported = stamp
         self._answer()
 
     def take_recorder_progress(self, progress: msg.Progress) -> None:
         """Note how far the recorder is, to name it if it is what the walker waits for."""
-        self._recorded_at, self._recorded_grant = self._clock(), progress.grant
+        self._recorded_at = self._clock()
+        self._recorded_until = nanoseconds_of(progress.header.stamp)
 
     def take_profile(self, profile: msg.TorqueProfile) -> None:
         """Note that the perturbator has answered a horizon, or has ended the torque."""
@@ -227,13 +232,6 @@ class Run:
         if self._began is None:  # lock-step
             return self.promised_until
         return self._began[0] + round(self._clock() * NANOSECONDS_PER_SECOND) + STAMP_TOLERANCE
-
-    def _owed_from(self, progress: msg.Progress) -> float:
-        """Return since when [s, steady] more is owed: one that lags would hide a gait's stop."""
-        if self._began is None or self.conductor is None:
-            return math.inf
-        about = (nanoseconds_of(progress.header.stamp) - self._began[1]) / NANOSECONDS_PER_SECOND
-        return about + self.conductor.longest_lookahead
 
     def _note_stop(self) -> None:
         if self.stopped_at is None:
@@ -329,7 +327,7 @@ class Run:
             yield self._planning_at, PERTURBATOR
         if self._covered_until < self.promised_until:
             yield self._profile_at, PERTURBATOR
-        if self._recorded and self._recorded_grant < self._grant:
+        if self._recorded and self._recorded_until < self._reported:
             yield self._recorded_at, RECORDER
         since = self._progress_at
         yield since if self._real_time else max(since, self._profile_at), self.walker

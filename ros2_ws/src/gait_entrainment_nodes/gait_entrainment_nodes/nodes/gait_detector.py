@@ -10,6 +10,7 @@ over, by the wall clock. In lock-step simulated sensors tell how far they are, a
 on when a message arrives.
 """
 
+import math
 import time
 from dataclasses import dataclass
 from functools import partial
@@ -79,6 +80,8 @@ class GaitDetector(Participant):
         self._epoch = time.time_ns() if self.real_time else LOCK_STEP_START
         self._detectors = [find_detector(self._text_of(side)).make(side) for side in Side]
         self._topics = [self._listen(side) for side in Side]
+        if len({*map(self.resolve_topic_name, (topic.name for topic in self._topics))}) < 2:
+            raise ValueError(f"left_topic, right_topic: both are {self._topics[0].name}")
         self._heard = [0, 0]  # samples of each foot
         self._left_out = [0, 0]  # of them, those whose stamps cannot be
         self._age = [0.0, 0.0]  # of the latest such sample [s]
@@ -131,8 +134,7 @@ class GaitDetector(Participant):
         try:
             values = read(message)
         except IndexError:  # a joint state without positions
-            self._left_out[side] += 1
-            return
+            values = (math.nan,)
         seconds = (stamp - self._epoch) / NANOSECONDS_PER_SECOND
         detector = self._detectors[side]
         jumps = detector.counts.clock_jumps

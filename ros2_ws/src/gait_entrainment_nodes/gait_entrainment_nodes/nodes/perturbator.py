@@ -300,14 +300,14 @@ class Perturbator(Participant, TolerantLifecycleNode):
         return response
 
     def _on_emergency_stop(self, message: Any) -> None:
-        self._signs.hear_stop()
+        self._signs.hear()
         self._pressed = message.data
         if message.data:
             self._stop_at_once()
             self._report_faults("the emergency stop was pressed")
 
     def _on_heartbeat(self, message: Any) -> None:
-        self._signs.hear_operator(message.data)
+        self._signs.hear(message.data)
 
     def _require_signs_of_life(self) -> None:
         """End the torque if an operator, or who holds the emergency stop, is not there."""

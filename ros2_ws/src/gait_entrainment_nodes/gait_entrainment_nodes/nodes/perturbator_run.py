@@ -50,28 +50,23 @@ class SignsOfLife:
     """When those who have to be heard while torque may come were, on steady time [s]."""
 
     def __init__(self) -> None:
-        self._operators: dict[str, float] = {}
-        self._stop = -math.inf
+        self._at: dict[str | None, float] = {}  # of operators, and as None the emergency stop
 
-    def hear_operator(self, name: str) -> None:
-        """Note a heartbeat."""
-        self._operators[name] = self._operators[_ANY] = time.monotonic()
-
-    def hear_stop(self) -> None:
-        """Note that the emergency stop said something."""
-        self._stop = time.monotonic()
+    def hear(self, operator: str | None = None) -> None:
+        """Note a heartbeat of an operator, or, without one, a word of the emergency stop."""
+        self._at[operator] = self._at[operator and _ANY] = time.monotonic()
 
     def missing(self, settings: Any) -> Iterator[tuple[Fault, str]]:
         """Tell of whom no sign came in time, by the perturbator's settings: a fault, in words."""
         now, wanted = time.monotonic(), list(filter(None, settings.operators)) or [_ANY]
-        operators = {name: self._operators.get(name, -math.inf) for name in wanted}
-        for heard, timeout, fault in (
-            (operators, settings.operator_timeout, _OPERATOR_SILENT),
-            ({"the emergency stop": self._stop}, settings.deadman_timeout, _DEADMAN_SILENT),
+        for watched, timeout, fault in (
+            (wanted, settings.operator_timeout, _OPERATOR_SILENT),
+            ([None], settings.deadman_timeout, _DEADMAN_SILENT),
         ):
-            silent = [name for name, at in heard.items() if now - at > timeout > 0]
+            silent = [who for who in watched if now - self._at.get(who, -math.inf) > timeout > 0]
             if silent:
-                yield fault, f"{' and '.join(silent)} silent for {timeout:g} s: {fault.meaning}"
+                names = " and ".join(who or "the emergency stop" for who in silent)
+                yield fault, f"{names} silent for {timeout:g} s: {fault.meaning}"
 
 
 def do_with_all(

@@ -139,7 +139,7 @@ def _rehearse(options: argparse.Namespace, distributions: SubjectDistributions) 
         blocks[name] = {"verdicts": dict(verdicts), "locked": locked, "ended_early": fell}
         told = ", ".join(f"{number} {verdict}" for verdict, number in sorted(verdicts.items()))
         told += f"; {fell} fell or flew off" if fell else ""
-        lines.append(f"| {name} | {told} | {'-' if locked is None else f'{locked:.0%}'} |")
+        lines.append(f"| {name} | {told} | {'-' if locked is None else f'{100 * locked:.0f} %'} |")
     outcome = {"subjects": count, "blocks": blocks, "study": dict(study.rows)}
     lines += [
         "",

@@ -9,7 +9,7 @@ from dataclasses import asdict
 from typing import Any
 
 from gait_entrainment.settings import Setting
-from gait_entrainment_sessions.power import COUNTS, Power, PowerPlan, power
+from gait_entrainment_sessions.power import COUNTS, PowerPlan, enough_of, power
 from gait_entrainment_sessions.statistics import Estimate
 from gait_entrainment_studies.commands import question
 
@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
     offset = _OFFSET.parse("period_offset", options.period_offset)
     counts = [_PULSES.parse("pulses", text) for text in options.pulses or map(str, COUNTS)]
     found = power(plan, offset, counts)
-    enough = next((p.pulses for p in found if _least(p) >= _ENOUGH), None)
+    enough = enough_of(found, _ENOUGH)
     if options.json:
         rows: list[Any] = [asdict(one) for one in found]
         plain = {"plan": asdict(plan), "period_offset": offset, "chances": rows, "enough": enough}
@@ -62,10 +62,6 @@ def run(options: argparse.Namespace) -> int:
         f" {100 * plan.gain:g} % of its distance in a stride, at most {100 * plan.limit:g} % of it"
     )
     return 0
-
-
-def _least(one: Power) -> float:
-    return min(one.entrained.value, one.drifting.value)
 
 
 def _shown(one: Estimate) -> str:
