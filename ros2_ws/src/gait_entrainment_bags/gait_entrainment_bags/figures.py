@@ -103,24 +103,26 @@ def _add_percent(run: RecordedRun, add_axis: Any, place: str) -> None:
 
 def _stride_period(run: RecordedRun) -> Any:
     figure, axes = _new_figure(run, "Stride period")
-    for _, part in _parts(run):
-        if given := [pulse.stride for pulse in part.pulses]:
-            span = min(given) - 0.5, max(given) + 0.5
-            axes.axvspan(*span, color=ORANGE, alpha=0.10, lw=0, label="pulses")
     # Each block has periods of its own; those of a run without blocks hold throughout.
     for one in run.blocks or [run]:
-        for period, text, colour, style in (
-            (one.measured_period, "unperturbed", GREY, "--"),
-            (one.pulse_period, "pulse period", ORANGE, "-."),
-        ):
-            line = {"color": colour, "ls": style, "lw": 1.2}
-            if not np.isfinite(period):
-                continue  # by phase
-            if isinstance(one, JudgedBlock):
-                strides = one.first_stride, one.last_stride or one.first_stride
-                axes.plot(strides, [period] * 2, label=text, **line)
-            else:
-                axes.axhline(period, label=f"{text} {period:.4f} s", **line)
+        line = {"color": GREY, "ls": "--", "lw": 1.2}
+        if isinstance(one, JudgedBlock):
+            strides = one.first_stride, one.last_stride or one.first_stride
+            axes.plot(strides, [one.measured_period] * 2, label="unperturbed", **line)
+        elif np.isfinite(period := one.measured_period):
+            axes.axhline(period, label=f"unperturbed {period:.4f} s", **line)
+        if not (pulses := one.analysis.pulses):
+            continue
+        span = pulses[0].stride - 0.5, pulses[-1].stride + 0.5
+        axes.axvspan(*span, color=ORANGE, alpha=0.10, lw=0, label="pulses")
+        found = np.array([(p.number, p.stride, p.onset) for p in pulses], np.int64)
+        count, strides, elapsed = np.diff(found, axis=0).T
+        # None across a pause, nor of pulses by phase, which follow the strides.
+        follows = (strides <= 4 * count) & np.isfinite(one.pulse_period)
+        intervals = np.where(follows, elapsed / count / NANOSECONDS_PER_SECOND, np.nan)
+        line = {"color": ORANGE, "ls": "-.", "lw": 1.2}
+        if follows.any():
+            axes.plot(found[1:, 1], intervals, label="pulse period", **line)
     periods = {s.number: s.period for s in run.strides}
     numbers = range(1, max(periods, default=0) + 1)
     axes.plot(numbers, [periods.get(number, np.nan) for number in numbers], **_DOTTED_LINE)
