@@ -107,6 +107,7 @@ class Recorder:
         )
         listener.until(made.get_subscription_count, "the recorder")
         topics = [f"/{topic}" for topic in counts]
+        made.publish(PublishedCounts(node="/walker_sim", topics=topics))  # of which some lack
         made.publish(
             PublishedCounts(node="/walker_sim", topics=topics, counts=list(counts.values()))
         )
@@ -282,13 +283,16 @@ def test_what_comes_before_ros_time_begins_is_logged_at_its_beginning(tmp_path: 
         left.publish(joints(1, 77 * SECOND))
         clock.publish(CLOCK.type(clock=to_time(78 * SECOND)))
         empty.publish(Empty())
-        assert process.finish(listener, left=2, clock=1, empty=2, event=1) == 0
+        size = size_of(process.bag)
+        listener.until(lambda: size_of(process.bag) > size, "data in the file")
+        left.publish(joints(2, 78 * SECOND + 3600 * SECOND))  # an hour ahead of ROS time
+        assert process.finish(listener, left=3, clock=1, empty=2, event=1) == 0
     assert check(process.bag) == []
     with BagReader(process.bag) as bag:
         assert bag.start == 77 * SECOND
         assert bag.end <= 78 * SECOND
         assert bag.counts["/empty"] == 2
-    assert numbers(process.bag, "/left") == [0, 1]
+    assert numbers(process.bag, "/left") == [0, 1, 2]
 
 
 def test_a_folder_that_is_there_is_not_touched(tmp_path: Path) -> None:

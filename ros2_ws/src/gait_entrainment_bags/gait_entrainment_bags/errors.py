@@ -57,6 +57,8 @@ def noting(note: Callable[[str], object]) -> Iterator[None]:
 
 def make_folder(folder: Path) -> None:
     """Make a folder, or take an empty one; raises BagExistsError or BagWriteError."""
+    if not is_utf8(folder):
+        raise BagWriteError(f"{str(folder)!a}: cannot be made; allowed: a name in UTF-8")
     try:
         folder.mkdir(parents=True)
     except FileExistsError:
@@ -67,3 +69,8 @@ def make_folder(folder: Path) -> None:
         ) from None
     except OSError as error:
         raise BagWriteError(f"{folder}: cannot be made: {error.strerror}") from None
+
+
+def is_utf8(path: Path) -> bool:
+    """Whether a path can be written into a bag, and be the value of a ROS parameter."""
+    return not any("\ud800" <= character <= "\udfff" for character in str(path.absolute()))

@@ -3,6 +3,7 @@
 
 """Figures of one run: stride period, phase lag, timing of the pulses, ankle torque by stride."""
 
+import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,7 @@ from gait_entrainment_commands.outcome import (
 from gait_entrainment_commands.timing import lateness_ms
 
 _WIDTH, _HEIGHT = 7.2, 3.6  # [inch]
+_LETTERS = 100  # in a line below the title
 _DOTTED_LINE = {"color": BLUE, "marker": ".", "lw": 0.8}
 
 
@@ -71,6 +73,7 @@ def _new_figure(
                 verdicts[-1] += f" since stride {last[0].entrained_since_stride}"
     if verdicts:
         about += f": {', '.join(verdicts)}"
+    about = "\n".join(textwrap.wrap(about, _LETTERS, max_lines=2, placeholder=" ..."))
     place = {"x": 0.8 / _WIDTH, "ha": "left", "va": "top"}
     figure.text(s=title, y=1 - 0.08 / height, fontsize=11, **place)
     figure.text(s=about, y=1 - 0.3 / height, fontsize=8, color=GREY, **place)
@@ -100,29 +103,32 @@ def _add_percent(run: RecordedRun, add_axis: Any, place: str) -> None:
 
 def _stride_period(run: RecordedRun) -> Any:
     figure, axes = _new_figure(run, "Stride period")
-    for _, part in _parts(run):
-        if given := [pulse.stride for pulse in part.pulses]:
-            span = min(given) - 0.5, max(given) + 0.5
-            axes.axvspan(*span, color=ORANGE, alpha=0.10, lw=0, label="pulses")
     # Each block has periods of its own; those of a run without blocks hold throughout.
     for one in run.blocks or [run]:
-        for period, text, colour, style in (
-            (one.measured_period, "unperturbed", GREY, "--"),
-            (one.pulse_period, "pulse period", ORANGE, "-."),
-        ):
-            line = {"color": colour, "ls": style, "lw": 1.2}
-            if isinstance(one, JudgedBlock):
-                strides = one.first_stride, one.last_stride or one.first_stride
-                axes.plot(strides, [period] * 2, label=text, **line)
-            elif np.isfinite(period):
-                axes.axhline(period, label=f"{text} {period:.4f} s", **line)
+        line = {"color": GREY, "ls": "--", "lw": 1.2}
+        if isinstance(one, JudgedBlock):
+            strides = one.first_stride, one.last_stride or one.first_stride
+            axes.plot(strides, [one.measured_period] * 2, label="unperturbed", **line)
+        elif np.isfinite(period := one.measured_period):
+            axes.axhline(period, label=f"unperturbed {period:.4f} s", **line)
+        if not (pulses := one.analysis.pulses):
+            continue
+        span = pulses[0].stride - 0.5, pulses[-1].stride + 0.5
+        axes.axvspan(*span, color=ORANGE, alpha=0.10, lw=0, label="pulses")
+        found = np.array([(p.number, p.stride, p.onset) for p in pulses], np.int64)
+        count, strides, elapsed = np.diff(found, axis=0).T
+        # None across a pause, nor of pulses by phase, which follow the strides.
+        follows = (strides <= 4 * count) & np.isfinite(one.pulse_period)
+        intervals = np.where(follows, elapsed / count / NANOSECONDS_PER_SECOND, np.nan)
+        line = {"color": ORANGE, "ls": "-.", "lw": 1.2}
+        if follows.any():
+            axes.plot(found[1:, 1], intervals, label="pulse period", **line)
     periods = {s.number: s.period for s in run.strides}
     numbers = range(1, max(periods, default=0) + 1)
     axes.plot(numbers, [periods.get(number, np.nan) for number in numbers], **_DOTTED_LINE)
-    _shade_holes(axes, run)
-    axes.set(xlabel="stride", ylabel="stride period [s]")
+    axes.set(ylabel="stride period [s]")
     axes.ticklabel_format(useOffset=False)
-    _add_legend_below(figure, axes)
+    _over_strides(figure, axes, run, 0.01)
     return figure
 
 
@@ -150,24 +156,30 @@ def _phase_lag(run: RecordedRun) -> Any:
     zero = "heel strike" if from_strikes(run.analysis) else "toe-off"
     axes.axhline(0, color=GREY, ls="--", lw=1.2, label=zero)
     axes.plot(places, lags, label="pulse onset", **_DOTTED_LINE)
-    _shade_holes(axes, run)
     for last in (entrainment for _, part in _parts(run) for entrainment in part.entrainments[-1:]):
         if since := last.entrained_since_stride:
             axes.axvline(since, color=GREEN, lw=1.2, label="from here near its final lag")
-    axes.set(xlabel="stride", ylabel=f"onset minus {zero} [ms]")
+    axes.set(ylabel=f"onset minus {zero} [ms]")
     _add_percent(run, axes.secondary_yaxis, "right")
-    _add_legend_below(figure, axes)
+    _over_strides(figure, axes, run, 20.0)
     return figure
 
 
-def _shade_holes(axes: Any, run: RecordedRun) -> None:
-    """Shade the strides whose record has holes."""
-    strides = run.analysis.strides
-    for place, hole in enumerate(holes_of(run)):
+def _over_strides(figure: Any, axes: Any, run: RecordedRun, least: float) -> None:
+    """Shade the strides whose record has holes, show a range of at least so much, add a legend."""
+    strides, shaded = run.analysis.strides, set[int]()
+    for hole in holes_of(run):
         before = max((s.number for s in strides if s.end <= hole.start), default=0)
         after = min((s.number for s in strides if s.start >= hole.end), default=before + 2)
-        label = None if place else "not in the record"
-        axes.axvspan(before + 0.5, after - 0.5, color=GREY, alpha=0.25, lw=0, label=label)
+        shaded |= set(range(before + 1, after))
+    for number in shaded:
+        span = number - 0.5, number + 0.5
+        axes.axvspan(*span, color=GREY, alpha=0.25, lw=0, label="not in the record")
+    low, high = axes.get_ylim()
+    spare = max(least - (high - low), 0) / 2
+    axes.set(xlabel="stride", ylim=(low - spare, high + spare))
+    axes.xaxis.get_major_locator().set_params(integer=True)
+    _add_legend_below(figure, axes)
 
 
 def _pulse_timing(run: RecordedRun) -> Any:
@@ -198,7 +210,7 @@ def _ankle_torque(run: RecordedRun) -> Any:
         run, "Ankle torque stride by stride", 2.2 + 0.24 * len(rows), right=0.7
     )
     torques = run.torques
-    peak = float(torques.intrinsic.max(initial=1.0))
+    peak = float(np.max(torques.intrinsic, initial=1.0, where=np.isfinite(torques.intrinsic)))
     scale = 0.9 / peak
     longest = max((stride.period for stride in rows), default=1.0)
     for row, stride in enumerate(rows):

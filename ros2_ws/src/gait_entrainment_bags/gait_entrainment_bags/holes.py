@@ -6,7 +6,6 @@
 from collections import Counter
 from typing import Any
 
-from gait_entrainment.conventions import nanoseconds_of
 from gait_entrainment_bags.decoding import decoder_for
 from gait_entrainment_bags.errors import BagError
 from gait_entrainment_bags.metadata import TopicInfo
@@ -41,7 +40,7 @@ class RunRecord:
         try:
             message: Any = decoder_for(topic)(data)
             if topic.type == _COUNTS:
-                self._published |= dict(zip(message.topics, message.counts, strict=True))
+                self._published |= dict(zip(message.topics, message.counts, strict=False))
                 return
             place = topic, message.run, message.side if topic.type == _PROFILE else 0
             numbers = self._numbers.setdefault(place, set())
@@ -68,15 +67,3 @@ class RunRecord:
             if topic.type == _PROFILE and place not in self._ended:
                 holes.append(f"{topic.name}: the end of run {run}")
         return holes
-
-
-def hole_before(message: Any, promised: float | None) -> tuple[int, int] | None:
-    """
-    Return the span [ns since 1970] before a TorqueProfile message of which no profile is here.
-
-    ``promised`` is where the one before ends: None before the first, infinity after a stop.
-    """
-    begin = nanoseconds_of(message.times[0])
-    if promised is None:
-        return (0, begin) if message.revision else None
-    return (int(promised), begin) if begin > promised else None

@@ -10,6 +10,7 @@ count from 1970, the core's instants from wherever the caller wants: each functi
 ``start`` [ns].
 """
 
+import math
 from dataclasses import fields
 from enum import IntEnum
 from typing import Any, TypeVar
@@ -53,21 +54,70 @@ def profile_of(message: Any, start: int = 0) -> TorqueProfile:
     """
     Return the torque profile of a TorqueProfile message that reports no stop.
 
-    It is as the message says: ``TorqueProfile.check`` holds it against the profile before. Raises
-    MessageError for an unknown side.
+    Raises MessageError for an unknown side, and for what is no profile by itself.
     """
-    return TorqueProfile(
+    profile = TorqueProfile(
         side=side_of(message),
         times=tuple(nanoseconds_of(stamp) - start for stamp in message.times),
         torques=tuple(message.torques),
         onsets=tuple(nanoseconds_of(stamp) - start for stamp in message.onsets),
         valid_until=nanoseconds_of(message.valid_until) - start,
     )
+    try:
+        profile.check(profile.times[0] if profile.times else 0)
+    except ValueError as error:
+        raise MessageError(str(error)) from None
+    return profile
 
 
 def pulse_of(message: Any, start: int = 0) -> tuple[int, float, float]:
-    """Return onset [ns], height [N m] and width [s] of a TorquePulse message."""
-    return nanoseconds_of(message.header.stamp) - start, message.torque, message.duration
+    """Return onset [ns], height [N m] and width [s] of a TorquePulse message; or MessageError."""
+    height, width = message.torque, message.duration
+    if not (math.isfinite(height) and 0 <= width < 1000):  # no protocol allows a hundredth of it
+        raise MessageError(f"torque, duration: {height:g} N m for {width:g} s cannot be")
+    return nanoseconds_of(message.header.stamp) - start, height, width
+
+
+class ProfileOrder:
+    """
+    Holds each torque profile of an ankle against the one before, which by contract it adjoins.
+
+    Instants are [ns since 1970]. After a stop, and once the run is over, nothing is owed.
+    """
+
+    def __init__(self) -> None:
+        self._owed_from: float | None = None  # where the next one begins; None before the first
+        self._revision = -1
+
+    def take(
+        self, message: Any
+    ) -> tuple[int | None, tuple[int, int] | None, TorqueProfile | None]:
+        """
+        Take a TorqueProfile message, or raise MessageError for what cannot be.
+
+        Returns since when all that was promised is void, the span of which no profile is here,
+        and the profile; None for what there is not.
+        """
+        stop = stop_of(message)
+        if stop is not None:
+            self._owed_from = math.inf
+            return stop, None, None
+        profile, owed = profile_of(message), self._owed_from
+        begin, step = profile.times[0], message.revision - self._revision
+        if owed is None:
+            owed = 0 if message.revision else begin
+        hole = (int(owed), begin) if begin > owed else None
+        void = begin if begin < owed < math.inf else None
+        if (hole and step == 1) or (void is not None and step < 1):
+            raise MessageError(f"revision {message.revision}: does not adjoin {self._revision}")
+        self._revision = message.revision
+        self._owed_from = math.inf if message.last else profile.valid_until
+        return void, hole, profile
+
+    def hole_up_to(self, instant: int) -> tuple[int, int] | None:
+        """Return the span up to an instant, the latest of the record, that no profile covers."""
+        owed = self._owed_from or 0
+        return (int(owed), instant) if instant > owed else None
 
 
 def train_of(message: Any, start: int = 0) -> PulseTrain:

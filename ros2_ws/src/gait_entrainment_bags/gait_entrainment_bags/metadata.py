@@ -168,7 +168,11 @@ class BagDescription:
                 }
                 for file in self.files
             ],
-            "custom_data": dict(self.custom_data),
+            # A name that is not UTF-8 may be in them, which YAML cannot hold.
+            "custom_data": {
+                key: text.encode(errors="backslashreplace").decode()
+                for key, text in self.custom_data.items()
+            },
             "ros_distro": self.ros_distro,
         }
 

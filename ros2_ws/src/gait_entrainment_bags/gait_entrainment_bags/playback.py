@@ -23,6 +23,8 @@ from gait_entrainment_bags.reader import BagReader
 FASTEST = float("inf")
 """Rate at which every message is due at once: whoever takes them sets the pace."""
 
+# Nobody waits for the ticks of a longer silence [ns], as before a log time that is years ahead.
+_LONGEST_TICKING = 3600 * NANOSECONDS_PER_SECOND
 # Messages are read ahead in this many batches of this many messages.
 _BATCHES, _BATCH = 8, 500
 
@@ -41,7 +43,8 @@ class Playback:
     Played are the topics of these names, from ``start_offset`` seconds into the bag, to which a
     loop returns, for ``duration`` seconds. The rate is in seconds of the bag per second, above 0;
     `FASTEST` is no pace at all. The clock ticks every ``clock_period`` seconds of the bag from
-    the start on, 0: never; so a listener sees the same ticks at every rate.
+    the start on, 0: never; so a listener sees the same ticks at every rate, but for an hour's
+    silence, which `FASTEST` skips.
 
     Raises BagError if a number is out of range or a topic is not in the bag, NothingToPlayError if
     none has a message; UnreadableBagError, from every method that moves on, if the bag is damaged.
@@ -173,6 +176,9 @@ class Playback:
         tick, period = start, self._tick_period
         with closing(_read_ahead(self._bag.messages(self._topics, start, self.end))) as messages:
             for message in messages:
+                silent = message.log_time - tick
+                if period and self.rate == FASTEST and silent > _LONGEST_TICKING:
+                    tick += silent // period * period
                 while period and tick <= message.log_time:
                     yield Moment(tick, None)
                     tick += period

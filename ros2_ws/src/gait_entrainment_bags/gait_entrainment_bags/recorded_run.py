@@ -12,6 +12,7 @@ figure shows it.
 import json
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -49,7 +50,7 @@ class RecordedRun(Run):
     messages: int  # in the bag, on all topics
     lost: int | None  # published but not recorded; None if no publisher gave a count
     real_time_factor: float  # walked time over wall time, first to last /clock; NaN without
-    left_out: int = 0  # messages of another run, and events of an unknown kind or side
+    left_out: int = 0  # messages of another run, and those that cannot be
     onset: str = "commanded"  # what the live analysis took pulses to begin with, or "measured"
     toe_off_bias: float = 0.0  # [s] by which the toe-offs of the events are late
     detector_errors: dict[str, Any] | None = None  # None if nobody knows the exact events
@@ -164,7 +165,10 @@ def protocol_and_side(
 def _side_in(bag: BagReader, relative: str) -> Side | None:
     """Return the side that the first message of a topic names; None if there is none."""
     with fields_expected(relative):
-        return next(map(messages.side_of, bag.messages_of(relative)), None)
+        for message in bag.messages_of(relative):
+            with suppress(messages.MessageError):
+                return messages.side_of(message)
+    return None
 
 
 def conducted(protocol: Protocol | None, events: Sequence[GaitEvent]) -> Sequence[BlockRun]:
@@ -202,14 +206,14 @@ def _lost(bag: BagReader) -> int | None:
     published: dict[str, int] = {}
     names = [n for n, topic in bag.topics.items() if topic.type.endswith("/PublishedCounts")]
     for _, message in bag.decoded(names):
-        published |= dict(zip(message.topics, message.counts, strict=True))
+        published |= dict(zip(message.topics, message.counts, strict=False))
     lost = sum(max(n - bag.counts.get(name, n), 0) for name, n in published.items())
     told = bag.custom_data.get("messages_lost")
     if told is None or (RECOVERY_KEY in bag.custom_data and not published):
         return lost or None
     try:
         return max(lost, sum(map(int, json.loads(told).values())))
-    except (ValueError, TypeError, AttributeError):
+    except (ValueError, OverflowError, TypeError, AttributeError):
         raise BagError(
             f"{bag.path}: its messages_lost is {told!r}; allowed: a JSON object of counts by topic"
         ) from None
@@ -253,5 +257,5 @@ def messages_line(run: RecordedRun) -> str:
     if run.ended_early:
         missing = f"; the recording ended early: {run.ended_early}"
     if run.left_out:
-        missing += f"; {run.left_out} left out: of another run, or of an unknown kind or side"
+        missing += f"; {run.left_out} left out: of another run, or none that can be"
     return f"messages         {run.messages} recorded{missing}"

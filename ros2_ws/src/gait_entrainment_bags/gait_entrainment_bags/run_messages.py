@@ -15,15 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.gait import Analysis, GaitEvent, Stride
+from gait_entrainment.gait import Analysis, Stride
 from gait_entrainment.gait.analyzer import Result
-from gait_entrainment.robot import TorqueProfile
 from gait_entrainment_bags import messages, topic_names
 from gait_entrainment_bags.decoding import decoder_for
 from gait_entrainment_bags.errors import BagError
-from gait_entrainment_bags.holes import hole_before
 from gait_entrainment_bags.mcap_records import BagMessage
-from gait_entrainment_bags.messages import pulse_of, side_of, state_of
+from gait_entrainment_bags.messages import ProfileOrder, pulse_of, side_of, state_of
 from gait_entrainment_bags.reader import BagReader
 from gait_entrainment_commands.timing import MeasuredOnsets
 
@@ -80,29 +78,32 @@ class RunMessages:
         self._torque = self._names.pop(topic_names.ANKLE_TORQUE, "")
         self._messages: dict[str, list[BagMessage]] = {name: [] for name in self._names.values()}
         self.real_time_factor = self._read()
-        self.left_out = 0  # of another run, or of an unknown kind or side
+        self.left_out = 0  # of another run, or what cannot be
         self._run: int | None = None  # its number
         self._begun: set[int] = set()  # ankles with the first of its profiles
         # Ankle and span of which no torque profile is here [ns].
         self.unknown: list[tuple[Side, int, int]] = []
         measured = defaultdict[Side, MeasuredOnsets](MeasuredOnsets)
-        adjoins: dict[Side, float] = {}
-        promises = self._values(topic_names.TORQUE_PROFILE, lambda m: (m, _promise_of(m)))
-        for message, promise in promises:
-            side = side_of(message)
-            if isinstance(promise, TorqueProfile):
-                if hole := hole_before(message, adjoins.get(side)):
-                    self.unknown.append((side, *hole))
-                adjoins[side] = promise.valid_until
-                measured[side].add_promise(promise.onsets, promise.valid_until)
-            else:
-                adjoins[side] = math.inf
-                measured[side].stop(promise)
+        orders = defaultdict[Side, ProfileOrder](ProfileOrder)
+        promises = self._values(
+            topic_names.TORQUE_PROFILE, lambda m: (side_of(m), orders[side_of(m)].take(m))
+        )
+        for side, (void, hole, profile) in promises:
+            if void is not None:
+                measured[side].stop(void)
+            if hole:
+                self.unknown.append((side, *hole))
+            if profile:
+                measured[side].add_promise(profile.onsets, profile.valid_until)
         events = self._messages[self._names[topic_names.GAIT_EVENTS]]
         self.events, self.true_events = (
-            list(filter(None, self._values(name, self._event_of)))
+            list(self._values(name, messages.event_of))
             for name in (topic_names.GAIT_EVENTS, topic_names.TRUE_EVENTS)
         )
+        latest = max((event.stamp for event in self.events), default=0)
+        for side in set(orders) or Side:
+            if hole := orders[side].hole_up_to(latest):
+                self.unknown.append((side, *hole))
         # Whether the log times are the stamps, so that instants can be looked up.
         self._stamped = [m.log_time for m in events] == [event.stamp for event in self.events]
         for side, pulse in self._values(topic_names.PULSES, lambda m: (side_of(m), pulse_of(m))):
@@ -133,14 +134,19 @@ class RunMessages:
         return (end - begin) / (clocks[1].publish_time - clocks[0].publish_time)
 
     def _values(self, relative: str, value_of: Callable[[Any], _Value]) -> Iterator[_Value]:
-        """Give the values of the messages of a topic, which are not kept."""
+        """Give the values of the messages of a topic, which are not kept; of those that can be."""
         if relative in self._names:
             name = self._names[relative]
             decode = decoder_for(self._bag.topics[name])
             with fields_expected(name):
                 for stored in self._messages.pop(name):
                     if self._is_of_run(message := decode(stored.data)):
-                        yield value_of(message)
+                        try:
+                            value = value_of(message)
+                        except messages.MessageError:
+                            self.left_out += 1
+                            continue
+                        yield value
 
     def _is_of_run(self, message: Any) -> bool:
         """Whether a message is of the run of the first: of a torque profile, if there is one."""
@@ -157,14 +163,6 @@ class RunMessages:
             self._begun.add(message.side)
         self.left_out += message.run != self._run
         return bool(message.run == self._run)
-
-    def _event_of(self, message: Any) -> GaitEvent | None:
-        """Return the event of a message; None for one without meaning, as in the analyzer."""
-        try:
-            return messages.event_of(message)
-        except messages.MessageError:
-            self.left_out += 1
-            return None
 
     def differences_from(self, live: Mapping[Side, Analysis]) -> tuple[str, ...] | None:
         """Return how the results published differ from an analysis; None if there are none."""
@@ -197,23 +195,15 @@ class RunMessages:
         return AnkleTorques(np.array(stamps, np.int64), *np.array(rows).reshape(-1, 3).T)
 
 
-def _promise_of(message: Any) -> TorqueProfile | int:
-    """Return what a TorqueProfile message promises, or the instant of the stop it reports."""
-    stop = messages.stop_of(message)
-    return messages.profile_of(message) if stop is None else stop
-
-
 @contextmanager
 def fields_expected(topic: str) -> Iterator[None]:
-    """Raise BagError for a message without a field or a meaning that this version knows."""
+    """Raise BagError for a message without a field that this version knows."""
     try:
         yield
     except AttributeError as error:
         raise BagError(
             f"{topic}: its messages have no field {error.name}: recorded by another version"
         ) from None
-    except messages.MessageError as error:
-        raise BagError(f"{topic}: {error}") from None
 
 
 def _difference(topic: str, published: Sequence[Any], current: Sequence[dict[str, Any]]) -> str:

@@ -82,6 +82,8 @@ def export(
     with BagReader(path) as reader:
         if topics is None:
             topics = [name for name, count in reader.counts.items() if count]
+            if not topics:
+                raise BagError(f"{path}: holds no message to make a table of")
         reader.require_topics(topics)
         if silent := [name for name in topics if not reader.counts[name]]:
             raise BagError(f"{path}: no messages on {', '.join(silent)}: leave it out of --topics")

@@ -13,6 +13,7 @@ from gait_entrainment.gait import GaitEvent, PulsePhase, Stride
 from gait_entrainment.robot import RobotState, TorqueProfile
 from gait_entrainment_bags.messages import (
     MessageError,
+    ProfileOrder,
     event_of,
     nanoseconds_of,
     profile_of,
@@ -43,7 +44,7 @@ def profile_message(**changes):
         "valid_until": stamp(10),
         "stop": False,
     }
-    return message(0, **{**values, **changes})
+    return message(0, **values | changes)
 
 
 def test_a_stamp_keeps_every_nanosecond():
@@ -76,6 +77,41 @@ def test_profiles():
     assert stop_of(profile_message(), START) is None
     with pytest.raises(MessageError, match=r"^side: 2"):
         profile_of(profile_message(side=2))
+    for wrong in (
+        {"times": [], "torques": []},
+        {"times": [stamp(5), stamp(0)]},
+        {"torques": [0.0, math.nan]},
+        {"onsets": [stamp(10)]},
+        {"valid_until": stamp(5)},
+    ):
+        with pytest.raises(MessageError, match="profile"):
+            profile_of(profile_message(**wrong))
+
+
+def test_each_profile_is_held_against_the_one_before():
+    def take(order, revision, begin, until, **values):
+        told = profile_message(
+            revision=revision, last=False, times=[stamp(begin)], torques=[0.0], onsets=[],
+            valid_until=stamp(until), **values,
+        )  # fmt: skip
+        void, hole, profile = order.take(told)
+        told = (void, *(hole or ()), profile and profile.valid_until)
+        return tuple(value and value - START for value in told)
+
+    order = ProfileOrder()
+    assert take(order, 0, 0, 10) == (None, 10)
+    assert take(order, 3, 30, 40) == (None, 10, 30, 40)  # two of them are missing
+    with pytest.raises(MessageError, match="adjoin"):
+        take(order, 4, 10**12, 2 * 10**12)  # nothing lies between the two
+    assert take(order, 5, 50, 10**12) == (None, 40, 50, 10**12)  # so far ahead is nothing promised
+    with pytest.raises(MessageError, match="revision 5: does not adjoin 5"):
+        take(order, 5, 50, 60)
+    assert take(order, 6, 60, 70) == (60, 70)  # what was promised from there on was not so
+    assert order.hole_up_to(START + 70) is None
+    assert order.hole_up_to(START + 71) == (START + 70, START + 71)
+    assert take(order, 7, 70, 80, stop=True) == (0, None)
+    assert order.hole_up_to(START + 71) is None
+    assert ProfileOrder().hole_up_to(START) == (0, START)
 
 
 def test_a_stop_has_an_instant():
@@ -85,6 +121,9 @@ def test_a_stop_has_an_instant():
 
 def test_pulses_and_states():
     assert pulse_of(message(4, torque=-3.0, duration=0.1), START) == (4, -3.0, 0.1)
+    for torque, duration in (math.nan, 0.1), (3.0, math.inf), (3.0, 1e308), (3.0, -0.1):
+        with pytest.raises(MessageError, match="torque, duration"):
+            pulse_of(message(4, torque=torque, duration=duration))
     told = message(9, commanded_torque=1.0, measured_torque=0.9, angle=0.2, faults=["stopped"])
     assert state_of(told, START) == RobotState(9, 1.0, 0.9, 0.2)
 

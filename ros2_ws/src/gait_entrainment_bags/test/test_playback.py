@@ -168,6 +168,15 @@ def test_ticks_of_the_clock_lie_at_fixed_instants(bag):
     assert ticks[0.5] == ticks[3.0] == ticks[FASTEST] == [n * 400_000_000 for n in range(23)]
 
 
+def test_nobody_waits_for_the_ticks_of_years(tmp_path):
+    years = 10**9 * SECOND
+    with BagReader(write(tmp_path / "bag", [0, SECOND, years + SECOND // 2])) as bag:
+        playing = playback(bag, rate=FASTEST, clock_period=1.0)
+        playing.begin(0)
+        given_out = [instant for _, instant in played(playing, 0)]
+    assert given_out == [0, 0, SECOND, SECOND, years, years + SECOND // 2]
+
+
 @settings(derandomize=True, deadline=None, max_examples=25)
 @given(
     instants=st.lists(st.integers(0, 3 * SECOND), min_size=1, max_size=1200),

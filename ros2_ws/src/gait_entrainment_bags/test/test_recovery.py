@@ -192,6 +192,11 @@ def test_rescue_overwrites_nothing_and_names_what_is_no_bag(
 ) -> None:
     with pytest.raises(BagExistsError):
         recover(small_bag, small_bag)
+    named = tmp_path / "\udcff"  # a name that is not UTF-8
+    named.symlink_to(small_bag)
+    recover(named, tmp_path / "renamed")
+    with BagReader(tmp_path / "renamed") as bag:
+        assert bag.custom_data["recovery"] == r"made of \udcff; nothing is missing"
     (tmp_path / "text.mcap").write_text("no bag")
     with pytest.raises(UnreadableBagError, match="not an MCAP file"):
         recover(tmp_path / "text.mcap", tmp_path / "out")

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.gait import analyze
+from gait_entrainment.gait import Hole, analyze
 from gait_entrainment.protocol import Protocol, PulsePlan
 from gait_entrainment.robot import PulseTiming
 from gait_entrainment.simulation import Simulation, simulate
-from gait_entrainment_bags.figures import draw_figures
+from gait_entrainment_bags.figures import draw_figures, run_figures
 from gait_entrainment_bags.recorded_run import (
     STRIDES_DRAWN,
     AnkleTorques,
@@ -57,10 +57,13 @@ def test_what_is_not_known_is_null_in_json():
     text = json.dumps(told, allow_nan=False)
     assert json.loads(text)["unperturbed_stride_period"] is None
     assert json.loads(text)["verdict"] == "undecided"
-    assert "undecided: neither locked nor drifting" in summary(told)
+    text = summary(told)
+    assert "undecided: neither locked nor drifting" in text
+    assert "the last 3 strides at 0.0 s: not in the record" in text
 
 
-def test_the_figures_are_drawn(simulation, tmp_path):
+def recorded(simulation, **changes):
+    """Return a run as if it had been recorded."""
     stamps = np.arange(0, simulation.events[-1].stamp, 5_000_000)
     zeros = np.zeros(len(stamps))
     run = RecordedRun(
@@ -78,6 +81,11 @@ def test_the_figures_are_drawn(simulation, tmp_path):
         lost=None,
         real_time_factor=math.nan,
     )
+    return dataclasses.replace(run, **changes)
+
+
+def test_the_figures_are_drawn(simulation, tmp_path):
+    run = recorded(simulation)
     paths = [p for p in draw_figures(run, tmp_path) if p.suffix == ".png"]
     assert [p.stem for p in paths] == ["stride_period", "phase_lag", "ankle_torque"]
     late = PulseTiming(run.onsets[0], run.onsets[0] + 10**7, run.onsets[0] + 2 * 10**7)
@@ -90,6 +98,25 @@ def test_the_figures_are_drawn(simulation, tmp_path):
         width, height = struct.unpack(">II", content[16:24])
         assert width > 600
         assert height > 300
+
+
+def test_what_is_long_short_or_not_finite_stays_in_the_figure():
+    walk = simulate(Protocol(baseline=3, washout=2, pulses=PulsePlan(count=0)))
+    hole = Hole(walk.analysis.strides[0].end, walk.analysis.strides[3].start, "2 strides")
+    run = recorded(
+        walk,
+        name="of a long name " * 30,
+        analysis=dataclasses.replace(walk.analysis, holes=(hole,) * 2),
+    )
+    run.torques.intrinsic[100] = math.nan
+    for name, figure in run_figures(run).items():
+        box, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
+        assert (min(box.x0, box.y0) >= 0, box.x1 <= width, box.y1 <= height) == (True,) * 3, name
+        if name == "stride_period":  # each stride is shaded once
+            shades = [s for s in figure.axes[0].patches if s.get_label() == "not in the record"]
+            assert len(shades) == 2
+            low, high = figure.axes[0].get_ylim()
+            assert high - low > 0.0099
 
 
 def test_each_stride_is_drawn_while_a_lock_forms(simulation):

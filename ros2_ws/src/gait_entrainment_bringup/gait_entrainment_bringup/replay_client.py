@@ -81,4 +81,4 @@ class ReplayClient(Client):
 
     def _on_counts(self, message: PublishedCounts) -> None:
         if message.node.rpartition("/")[2] == "gait_analyzer":
-            self._counts = dict(zip(message.topics, message.counts, strict=True))
+            self._counts = dict(zip(message.topics, message.counts, strict=False))

@@ -16,6 +16,7 @@ from gait_entrainment.errors import UsageError
 from gait_entrainment.protocol import Protocol
 from gait_entrainment.robot import LimitError, driver_on, find_driver, make_robots
 from gait_entrainment.settings import Setting
+from gait_entrainment_bags.errors import is_utf8
 from gait_entrainment_bags.truth import TOE_OFF_BIAS
 from gait_entrainment_bringup.node_list import (
     DETECTOR,
@@ -214,11 +215,6 @@ def claimed_folder(bag: Path, *, exactly: bool) -> Iterator[Path]:
         with suppress(OSError):  # one is not empty
             for made in (folder, *parents):
                 made.rmdir()
-
-
-def is_utf8(path: Path) -> bool:
-    """Whether a path can be the value of a ROS parameter."""
-    return not any("\ud800" <= character <= "\udfff" for character in str(path.absolute()))
 
 
 def chosen_parameters(protocol: Protocol, bag: Path, options: argparse.Namespace) -> Parameters:

@@ -18,6 +18,7 @@ Whatever a command raises as an EntrainmentError is printed here, in one line.
 
 import argparse
 import importlib
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -40,6 +41,8 @@ _DESCRIPTION = "Rehearse, run and analyze entrainment experiments."
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return 0 if it is done, 1 if it failed, 2 for wrong usage."""
+    if isinstance(sys.stdout, io.TextIOWrapper):  # None if it is closed
+        sys.stdout.reconfigure(errors="backslashreplace")  # what a terminal has no character for
     words = sys.argv[1:] if arguments is None else list(arguments)
     name = words[0] if words else ""
     prog = f"entrain {name}"
@@ -52,7 +55,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(end="", flush=True)  # what was printed and cannot be written is an error, too
         return code
     except EntrainmentError as error:
-        print(f"{prog}: {error}", file=sys.stderr)
+        # One line, whatever the names and texts in it hold.
+        told = (c if c.isprintable() else repr(c)[1:-1] for c in str(error))
+        print(f"{prog}: {''.join(told)}", file=sys.stderr)
         return error.exit_code
     except ModuleNotFoundError as error:
         package = (error.name or "").partition(".")[0]

@@ -132,8 +132,9 @@ def _parameters(protocol: Protocol) -> dict[str, Any]:
 def holes_of(run: Run) -> list[Hole]:
     """Return what the record of a run lacks; its last strides too, whether walked or not."""
     holes, strides = list(run.analysis.holes), run.analysis.strides
-    if strides and run.protocol is not None:
-        end, missing = strides[-1].end, run.protocol.strides - strides[-1].number
+    if run.protocol is not None:
+        end, number = (strides[-1].end, strides[-1].number) if strides else (0, 0)
+        missing = run.protocol.strides - number
         if run.blocks:  # how many strides there would be is not known before
             ended = [block.last_stride for block in run.blocks]
             complete = len(ended) == len(run.protocol.sequence) and ended[-1] is not None
@@ -257,12 +258,12 @@ def _double_stance(events: Sequence[GaitEvent], toe_off: int | None) -> float:
 
 
 def _without_nan(value: Any) -> Any:
-    """Replace NaN, which JSON does not have, by None."""
+    """Replace NaN and infinities, which JSON does not have, by None."""
     if isinstance(value, dict):
         return {key: _without_nan(item) for key, item in value.items()}
     if isinstance(value, list):
         return [_without_nan(item) for item in value]
-    return None if isinstance(value, float) and math.isnan(value) else value
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def timing_outcome(timings: Sequence[PulseTiming], stride: float) -> dict[str, Any]:

@@ -6,6 +6,7 @@
 import argparse
 from enum import Enum
 from operator import attrgetter
+from pathlib import Path
 
 from gait_entrainment.protocol import DEFAULT_PROTOCOL, FIELDS, Protocol, read_protocol
 
@@ -21,9 +22,8 @@ def _option(field: str) -> str:
 
 def add_protocol_options(parser: argparse.ArgumentParser) -> None:
     """Add the protocol file and the options that override its fields."""
-    parser.add_argument(
-        "protocol", nargs="?", metavar="PROTOCOL.yaml", help="default: the paper's example"
-    )
+    told = "default: the paper's example"
+    parser.add_argument("protocol", nargs="?", type=Path, metavar="PROTOCOL.yaml", help=told)
     fields = parser.add_argument_group("fields of the protocol")
     limits = parser.add_argument_group("limits of what the person may get")
     for field, setting in FIELDS.items():

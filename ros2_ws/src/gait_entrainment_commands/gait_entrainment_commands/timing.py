@@ -44,7 +44,7 @@ def measured_onset(
     before: tuple[int, float] | None = None
     for index, (stamp, torque) in enumerate(zip(stamps, torques, strict=True)):
         level = torque / height
-        if math.isnan(level):
+        if not math.isfinite(level):
             continue
         if level >= fraction and before is not None and before[1] < fraction:
             earlier, lower = before

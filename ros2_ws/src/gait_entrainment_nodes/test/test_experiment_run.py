@@ -16,6 +16,7 @@ from gait_entrainment_nodes.messaging.topics import EXPERIMENT_STATE, HORIZON
 from gait_entrainment_nodes.nodes.experiment_run import ExperimentError, Run
 
 SECOND = 10**9
+HALF = SECOND // 2
 TIMEOUT = 3.0
 PROTOCOL = Protocol(baseline=2, pulses=PulsePlan(count=1), washout=1)
 
@@ -82,7 +83,7 @@ class Bench:
             self.promise()
             self.strike(instant)
             self.report(instant)
-            instant += SECOND
+            instant += HALF
         return instant
 
 
@@ -102,15 +103,15 @@ def test_each_progress_is_answered_once_all_that_it_covers_is_here(bench):
     assert (first.run, first.last) == (7, False)
     assert first.seal == seal_of(bench.run.key)
     assert nanoseconds_of(first.header.stamp) == 10 * SECOND
-    assert nanoseconds_of(first.until) == 10 * SECOND + SECOND // 2
+    assert nanoseconds_of(first.until) == 10 * SECOND + HALF
     bench.promise()
-    bench.report(11 * SECOND, events=1)
+    bench.report(10 * SECOND + HALF, events=1)
     assert len(bench.horizons) == 1  # an event is still on its way
     bench.strike(10 * SECOND)
-    assert nanoseconds_of(bench.horizons[-1].until) == 11 * SECOND + SECOND // 2
-    assert bench.run.known_until == 11 * SECOND
+    assert nanoseconds_of(bench.horizons[-1].until) == 11 * SECOND
+    assert bench.run.known_until == 10 * SECOND + HALF
     # In real time progress goes on while nothing new can be promised.
-    bench.report(11 * SECOND)
+    bench.report(10 * SECOND + HALF)
     assert len(bench.horizons) == 2
     shown = [message for topic, message in bench.published if topic is EXPERIMENT_STATE]
     assert [state.phase for state in shown] == [Part.BASELINE]
@@ -122,7 +123,7 @@ def test_nothing_is_promised_while_pulses_are_requested(bench):
     assert len(train.pulses) == 1
     count = len(bench.horizons)
     bench.promise()
-    bench.report(instant)
+    bench.report(instant - HALF)
     assert len(bench.horizons) == count
     bench.run.take_answer(True)
     assert len(bench.horizons) == count + 1
@@ -154,7 +155,7 @@ def test_walker_that_counts_events_which_nobody_receives_is_named(bench):
     bench.promise()
     bench.strike(10 * SECOND)
     for _ in range(4):  # further reports do not pay the debt
-        bench.report(11 * SECOND, events=3)
+        bench.report(10 * SECOND + HALF, events=3)
         bench.after(1.0)
     expected = "walker_sim: 2 of 3 gait events missing for 3 s"
     assert blamed(bench.after(0.1)) == (expected, "walker_sim")
@@ -165,11 +166,11 @@ def test_recorder_is_named_if_it_is_what_the_walker_waits_for():
     bench.begin()
     bench.promise()
     bench.strike(10 * SECOND)
-    bench.report(11 * SECOND)
+    bench.report(10 * SECOND + HALF)
     bench.promise()
     bench.after(2.0)
-    bench.run.take_recorder_progress(Progress(run=7, header=header(11 * SECOND)))
-    bench.report(12 * SECOND)
+    bench.run.take_recorder_progress(Progress(run=7, header=header(10 * SECOND + HALF)))
+    bench.report(11 * SECOND)
     bench.promise()
     assert bench.after(TIMEOUT) is None
     assert blamed(bench.after(0.1)) == ("bag_recorder has been silent for 3 s", "bag_recorder")
@@ -211,6 +212,23 @@ def test_in_real_time_what_is_stamped_ahead_has_not_happened(monkeypatch, ahead,
             f"walker_sim reports what is {ahead - 0.1:.3g} s ahead of what can be over by now"
         )
         assert blamed(bench.run.failure) == (expected, "walker_sim")
+
+
+def test_in_lock_step_nobody_walks_further_than_was_promised(bench):
+    bench.promise()
+    bench.strike(10 * SECOND)
+    bench.report(3600 * SECOND)
+    words, node = blamed(bench.run.failure)
+    assert words.startswith("walker_sim reports what is 3.59e+03 s ahead of what can be over")
+    assert node == "walker_sim"
+
+
+def test_a_walker_that_ends_before_the_protocol_does_has_failed(bench):
+    bench.promise()
+    bench.strike(10 * SECOND)
+    bench.report(10 * SECOND + HALF, state=Progress.FINISHED)
+    expected = "walker_sim ended the run after 0 strides of 4"
+    assert blamed(bench.run.failure) == (expected, "walker_sim")
 
 
 @pytest.mark.parametrize("pace", [1.0, 0.9, 0.0, -1.0])
@@ -298,8 +316,8 @@ def test_trouble_before_the_walker_has_started_is_kept():
 def test_closing_horizon_ends_where_the_promises_end(bench):
     bench.promise()
     bench.strike(10 * SECOND)
-    final = 10 * SECOND + SECOND // 2
-    bench.report(final, state=Progress.FINISHED, reproducible=True)
+    final = 10 * SECOND + HALF
+    bench.report(final, state=Progress.FELL, reproducible=True)
     assert bench.run.over
     assert bench.run.final.reproducible
     bench.run.close()
@@ -315,7 +333,7 @@ def test_closing_horizon_ends_where_the_promises_end(bench):
 def test_stop_after_the_walkers_last_word_fails_the_run(bench):
     bench.promise()
     bench.strike(10 * SECOND)
-    bench.report(11 * SECOND, state=Progress.FINISHED)
+    bench.report(10 * SECOND + HALF, state=Progress.FELL)
     bench.run.close()
     bench.promise(stop=True)
     assert not bench.run.closed
@@ -328,14 +346,14 @@ def test_stop_after_the_walkers_last_word_fails_the_run(bench):
 
 def test_impossible_pulses_fail_the_run():
     bench = Bench()
-    pulses = PulsePlan(count=5, width=0.9, period_offset=-1.2)
+    pulses = PulsePlan(count=5, width=0.9, period_offset=-0.2)
     bench.run.begin(Conductor(Protocol(baseline=2, pulses=pulses), 0.5), 10 * SECOND)
     instant = 10 * SECOND
     while not bench.run.over:
         bench.promise()
         bench.strike(instant)
         bench.report(instant)
-        instant += SECOND
+        instant += HALF
     assert bench.run.failure.blamed == ""
     assert "overlap" in str(bench.run.failure)
 

@@ -124,6 +124,27 @@ def test_profiles_that_do_not_adjoin_are_a_hole_and_are_told():
     assert analyzed.new_doubts() == {}
 
 
+def test_a_promise_that_was_not_so_silences_nothing_that_follows():
+    analyzed = run()
+    told = promise(0, 2 * SECOND), promise(2 * SECOND, 10**15), promise(4 * SECOND, 9 * SECOND)
+    told[2].onsets = [to_time(5 * SECOND)]
+    for revision, profile in enumerate(told):
+        profile.revision = revision
+        analyzed.add_profile(profile)
+    results = [result for event in gait(4) for result in analyzed.add_event(event)]
+    results += analyzed.finish(9 * SECOND)
+    assert [r.onset for r in results if isinstance(r, PulsePhase)] == [5 * SECOND]
+
+
+def test_strides_beyond_the_last_profile_are_a_hole():
+    analyzed = run()
+    analyzed.add_profile(promise(0, 3 * SECOND, SECOND))
+    for event in gait(4):
+        analyzed.add_event(event)
+    analyzed.finish(9 * SECOND)
+    assert analyzed.new_doubts()["holes"] == 1
+
+
 def test_joining_late_is_a_hole():
     analyzed = run()
     late = promise(6 * SECOND, 8 * SECOND)

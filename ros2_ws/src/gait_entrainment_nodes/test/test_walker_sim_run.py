@@ -106,6 +106,14 @@ def test_missing_promise_is_refused():
         run.promise(profile(2 * SECOND, 3 * SECOND), False)
 
 
+def test_a_promise_of_hours_is_refused():
+    for message in profile(SECOND, 3600 * SECOND), closing(3600 * SECOND):
+        run = lock_step()
+        run.promise(profile(0, SECOND), False)
+        with pytest.raises(ValueError, match=r"a profile of 3.6e\+03 s; allowed: 1e\+03 s"):
+            run.promise(message, True)
+
+
 def test_stop_ends_the_torque_and_is_remembered():
     run = lock_step()
     run.promise(profile(0, 2 * SECOND, torque=5.0), False)

@@ -17,6 +17,7 @@ from gait_entrainment_page.view import View
 BLUE, VERMILLION, GREEN = "#0072B2", "#D55E00", "#009E73"
 BLACK, GREY = "#1A1A1A", "#5F6B76"
 _FONT = 17  # [px], to be read from two metres
+_LARGEST = 1e9  # nothing that is shown is so large: what is lies outside
 _DARK_GREEN = "#00704F"  # of letters on the shade
 
 Options = dict[str, Any]
@@ -53,7 +54,7 @@ def lag_chart(view: View) -> Options:
         series[0]["markArea"] = _shade({"yAxis": -stance}, {"yAxis": 0}, "insideBottomLeft")
     low, high = _range(values, least=100.0)
     chart = _chart("stride", "ms", series, (low, high))
-    if not math.isnan(view.period):
+    if 1 / _LARGEST < view.period < math.inf:
         per_cent = 0.1 / view.period
         right = _axis("%", low * per_cent, high * per_cent)
         chart["grid"]["right"] = 62
@@ -99,7 +100,7 @@ def _shade(begin: Options, end: Options, position: str) -> Options:
 
 def _range(values: list[float], least: float) -> tuple[float, float]:
     """Return a range that holds values and is not shorter than ``least``."""
-    values = [value for value in values if math.isfinite(value)]
+    values = [value for value in values if abs(value) < _LARGEST]
     if not values:
         return 0.0, 1.0
     low, high = min(values), max(values)

@@ -240,7 +240,7 @@ class View:
     @property
     def period(self) -> float:
         """Median period of the last strides [s]; NaN if unknown."""
-        last = [period for _, period in [*self.strides][-10:] if not math.isnan(period)]
+        last = [period for _, period in [*self.strides][-10:] if period > 0]
         return statistics.median(last) if last else _NAN
 
     def part_words(self) -> str:
@@ -272,9 +272,7 @@ class View:
         if math.isnan(lag):
             return f"unknown: no {self.lag_refers_to} near"
         period = dict(self.strides).get(stride) or (self.strides[-1][1] if self.strides else _NAN)
-        percent = (
-            "" if math.isnan(period) else f" = {_signed(100 * lag / period, 1)} % of the stride"
-        )
+        percent = f" = {_signed(100 * lag / period, 1)} % of the stride" if period > 0 else ""
         return f"{_signed(1e3 * lag, 0)} ms{percent}"
 
     def verdict_words(self) -> tuple[str, str]:
@@ -290,7 +288,7 @@ class View:
                 f" a stride; strides last {found.mean_period:.4f} s, pulses come every"
                 f" {found.pulse_period:.4f} s."
             )
-        meaning = MEANINGS[word if reason is Reason.NONE else reason.name.lower()]
+        meaning = MEANINGS.get(reason.name.lower()) or MEANINGS.get(word, word)
         figures = ""
         if not math.isnan(found.drift):
             figures = (

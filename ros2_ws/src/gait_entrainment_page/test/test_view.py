@@ -262,7 +262,7 @@ def test_a_node_that_falls_silent_is_called_so():
     assert [level for _, level, _ in view.node_words()] == ["error", "ok", "stale"]
 
 
-VALUES = st.just(math.nan) | st.floats(-1e6, 1e6)
+VALUES = st.floats()
 KINDS = st.sampled_from(["event", "robot", "stride", "state", "verdict"])
 
 
@@ -278,14 +278,14 @@ def test_whatever_comes_can_be_shown(messages):
         elif kind == "state":
             view.take("experiment/state", state(number % 7, 7, phase=number % 8))
         elif kind == "verdict":
-            told = Message(header=header(at), run=1, verdict=1 + number % 6, reason=number % 10)
+            told = Message(header=header(at), run=1, verdict=number % 6, reason=number % 10)
             told.drift = one
             told.drift_interval = told.pulse_period = told.mean_period = other
             told.entrained_since_stride = told.window = number
             view.take("gait/entrainment", told)
         else:
             message = Message(header=header(at), run=1, side=number % 3, number=number)
-            message.start, message.period = stamp(at - PERIOD), abs(one) + 1e-3
+            message.start, message.period = stamp(at - PERIOD), one
             view.take("gait/strides", message)
     assert view.part
     assert view.lag()

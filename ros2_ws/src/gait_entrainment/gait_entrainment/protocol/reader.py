@@ -146,7 +146,7 @@ def entries_in(
     seen: set[str] = set()
     for key_node, value_node in node.value:
         where = f"{name}:{key_node.start_mark.line + 1}"
-        key = prefix + str(key_node.value)
+        key = prefix + (key_node.value if isinstance(key_node, yaml.ScalarNode) else "?")
         if key in seen:
             raise ProtocolError(f"{where}: {key}: appears twice; keep one")
         seen.add(key)
@@ -170,14 +170,7 @@ def entries_in(
         elif allowed[key].kind is str:  # as written, also if YAML would make a number of it
             yield key, Entry(value_node.value, where)
         else:
-            try:
-                value = yaml.SafeLoader("").construct_object(value_node)
-            except Exception:  # an unknown tag, a month 13: PyYAML passes on what it runs into
-                raise ProtocolError(
-                    f"{where}: {key}: {value_node.value[:40]!r} cannot be read as a value"
-                ) from None
-            if allowed[key].kind in (int, float):
-                _require_plain_number(where, key, value_node, value)
+            value = _meant(f"{where}: {key}", allowed[key].kind, value_node)
             yield _spelled_out(key, Entry(value, where))
 
 
@@ -187,16 +180,22 @@ def _spelled_out(key: str, entry: Entry) -> tuple[str, Entry]:
     return ("both_legs", entry._replace(value=True)) if both else (key, entry)
 
 
-def _require_plain_number(where: str, key: str, node: yaml.ScalarNode, value: object) -> None:
-    """Raise ProtocolError for what YAML 1.1 takes for another number than people do, or a text."""
-    if node.style in ("'", '"'):
-        raise ProtocolError(f"{where}: {key}: {node.value!r} is a text: leave out the quotes")
-    other_base = ":" in node.value or re.match(r"[-+]?0[0-9_box]", node.value)
+def _meant(where: str, kind: type, node: yaml.ScalarNode) -> object:
+    """Return a value as people mean it, else as written; ProtocolError where YAML 1.1 differs."""
+    if kind in (int, float) and node.style in ("'", '"'):
+        raise ProtocolError(f"{where}: {node.value!r} is a text: leave out the quotes")
+    try:
+        value = yaml.SafeLoader("").construct_object(node)
+    except Exception:  # an unknown tag, a month 13: PyYAML passes on what it runs into
+        raise ProtocolError(f"{where}: {node.value[:40]!r} cannot be read as a value") from None
     same = node.value.isdigit() and int(node.value) == value
-    if isinstance(value, int) and other_base and not same:
+    other_base = isinstance(value, int) and re.match(r"[-+]?0[0-9_box]", node.value) and not same
+    if other_base or (isinstance(value, int | float) and ":" in node.value):
         raise ProtocolError(
-            f"{where}: {key}: {node.value} is {value} in YAML; write it as a decimal number"
+            f"{where}: {node.value} is {value} in YAML; write it as a decimal number"
         )
+    fits = isinstance(value, int | float) and isinstance(value, bool) is (kind is bool)
+    return value if fits or value is None else node.value
 
 
 def _merged(entries: Mapping[str, Entry], replacing: Mapping[str, Entry]) -> dict[str, Entry]:

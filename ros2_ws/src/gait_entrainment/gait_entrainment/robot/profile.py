@@ -72,8 +72,8 @@ class TorqueProfile:
         Hold the profile against the contract.
 
         Raises ProfileError if it does not adjoin the one before, which ends at ``begin`` [ns],
-        goes beyond ``until`` [ns], if that is known, or its pieces are not ascending, finite and
-        one for each time.
+        goes beyond ``until`` [ns], if that is known, its pieces are not ascending, finite and one
+        for each time, or its onsets not ascending within.
         """
         if not self.times or len(self.times) != len(self.torques):
             raise ProfileError("a profile needs one torque for each time, and at least one")
@@ -88,5 +88,8 @@ class TorqueProfile:
         borders = [*self.times, self.valid_until]
         if self.has_length and any(a >= b for a, b in itertools.pairwise(borders)):
             raise ProfileError("the times of a profile are not ascending")
+        begun = [begin - 1, *self.onsets, self.valid_until]
+        if self.onsets and any(a >= b for a, b in itertools.pairwise(begun)):
+            raise ProfileError("the onsets of a profile are not ascending, or not in it")
         if not all(math.isfinite(torque) for torque in self.torques):
             raise ProfileError(f"the torques of a profile are not all finite: {self.torques}")

@@ -92,6 +92,16 @@ def test_deleted_events_are_analyzed_as_they_are(capsys, tmp_path):
     assert told["as_published_live"] is False
 
 
+def test_what_no_profile_covers_is_a_hole_up_to_the_end(capsys, tmp_path):
+    def half(topic, number, data):
+        return data if topic in NEEDED and (topic == NEEDED[0] or number < 42) else None
+
+    code, out, _ = entrain(capsys, "analyze", copy(tmp_path / "half", half))
+    assert code == 0
+    assert "which pulses began at" in out
+    assert "longer than the run" not in out
+
+
 def test_a_rescued_bag_is_analyzed_up_to_where_it_ends(capsys, tmp_path):
     shutil.copytree(BAG, tmp_path / "cut")
     file = tmp_path / "cut" / "paper_example_0.mcap"
@@ -142,6 +152,7 @@ def test_the_bag_follows_every_rule_and_opens_without_ros_and_message_packages()
         ("onset=sideways", 1, "'sideways'; allowed: commanded, measured"),
         ("messages_lost=oops", 1, "'oops'; allowed: a JSON object"),
         ("messages_lost=[1]", 1, "'[1]'; allowed: a JSON object"),
+        ('messages_lost={"/a": 1e400}', 1, "allowed: a JSON object"),
     ],
 )
 def test_what_cannot_be_analyzed_is_one_line(capsys, tmp_path, name, expected, words):
@@ -182,14 +193,17 @@ def test_what_the_analyzer_does_not_take_is_left_out_and_counted(capsys, tmp_pat
             return with_numbers(data, 0, 7)  # of another run
         if (topic, number) == ("/gait_events", 101):
             return data[:24] + b"\7" + data[25:]  # of an unknown kind
+        if (topic, number) == (NEEDED[1], 30):
+            return data[:28] + b"\7" + data[29:]  # on an unknown side
         return data if topic in NEEDED else None
 
     # A protocol of no text is none.
     bag = copy(tmp_path / "strange", strange, {"protocol": " "})
     told = json.loads(entrain(capsys, "analyze", bag, "--json")[1])
-    assert (told["left_out"], told["gait_events"]["accepted"]) == (2, 322)
+    assert (told["left_out"], told["gait_events"]["accepted"]) == (3, 322)
+    assert "which pulses began" in [hole["missing"] for hole in told["holes"]]
     assert told["parameters"] is None
-    assert "2 left out" in entrain(capsys, "analyze", bag)[1]
+    assert "3 left out" in entrain(capsys, "analyze", bag)[1]
 
 
 @pytest.mark.parametrize(

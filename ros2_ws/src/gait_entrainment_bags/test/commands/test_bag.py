@@ -97,6 +97,8 @@ def test_export_makes_tables(capsys, bag, tmp_path):
         (["export", "BAG", "BAG"], 2, "already there"),
         (["export", "BAG", "OUT", "--topics", "/b"], 1, "no topic /b"),
         (["info", "EMPTY"], 1, "is empty"),
+        (["info", "no\n\x1b[31m"], 2, r"no\n\x1b[31m: no such file"),
+        (["recover", "BAG", "\udcff"], 1, r"'\udcff': cannot be made; allowed: a name in UTF-8"),
         (["recover", "EMPTY", "OUT"], 1, "is empty"),
     ],
 )
@@ -146,3 +148,6 @@ def test_nothing_rescued_is_no_success(capsys, tmp_path, form):
     code, out, _ = entrain(capsys, "recover", tmp_path / "empty", tmp_path / "rescued", *form)
     assert code == 1
     assert "0 messages" in out or json.loads(out)["messages"] == 0
+    code, out, err = entrain(capsys, "export", tmp_path / "empty", tmp_path / "tables", *form)
+    assert (code, out) == (1, "")
+    assert "holds no message to make a table of" in err

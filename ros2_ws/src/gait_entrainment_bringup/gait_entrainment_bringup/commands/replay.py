@@ -11,9 +11,10 @@ from gait_entrainment.errors import UsageError
 from gait_entrainment.settings import Setting
 from gait_entrainment_bags import BagReader, find_definition
 from gait_entrainment_bags.commands.record_options import add_record_options, told_of_record
+from gait_entrainment_bags.errors import is_utf8
 from gait_entrainment_bags.recorded_run import RecordedRun, read_run
 from gait_entrainment_bringup.node_list import MOVED, parameter_arguments, replay_parameters
-from gait_entrainment_bringup.run_options import check_output, is_utf8
+from gait_entrainment_bringup.run_options import check_output
 from gait_entrainment_bringup.supervisor import supervised
 from gait_entrainment_commands.outcome import outcome_of, summary
 from gait_entrainment_nodes.messaging.domain import claimed_domain

@@ -53,7 +53,8 @@ MOST_AT_ONCE = 1000
 # How long to wait, after the end of a run, for messages and counts still on their way [s].
 CLOSING_TIMEOUT = 5.0
 # A message that comes behind one with a later stamp is logged with it, so that a player keeps the
-# order; one that is earlier by more [ns] has a clock of its own, and is believed.
+# order; one that is earlier by more [ns] has a clock of its own, and is believed. One ahead of ROS
+# time by more is not: a bag would span the years up to it.
 LONGEST_OVERTAKING = 60 * NANOSECONDS_PER_SECOND
 # A message whose first field is a header or a stamp has it behind four bytes of CDR header.
 _STAMP = struct.Struct("<iI")
@@ -103,6 +104,7 @@ class BagRecorder(Participant):
         self._clock_topic = name(topics.CLOCK.name)
         self._simulated = bool(self.get_parameter("use_sim_time").value)
         self._heard_clock = 0  # the latest time on that topic [ns]
+        self._believed_until = 0  # no stamp up to here is too far ahead [ns]
         sampled = (topics.JOINT_STATES, topics.ANKLE_TORQUE, *topics.GROUND_REACTION)
         # What a progress message covers, and its field that says how much.
         self._covered = {name(topics.GAIT_EVENTS.name): "events"}
@@ -243,8 +245,11 @@ class BagRecorder(Participant):
                 logged = sec * NANOSECONDS_PER_SECOND + nanosec
             if name == self._clock_topic:
                 self._heard_clock = logged
-            if logged <= 0:
-                logged = self._ros_time(received)
+            elif logged <= 0 or logged > self._believed_until:
+                now = self._ros_time(received)
+                self._believed_until = now + LONGEST_OVERTAKING
+                if logged <= 0 or 0 < now < logged - LONGEST_OVERTAKING:
+                    logged = now
             if logged <= 0 or self._early:
                 self._record_early(logged, name, data, received)
             if logged > 0 and not self._broken_off:
@@ -318,7 +323,7 @@ class BagRecorder(Participant):
         """Take a publisher's final counts."""
         message = deserialize_message(data, PublishedCounts)
         node = message.node.rpartition("/")[2]
-        self._published[node] = dict(zip(message.topics, message.counts, strict=True))
+        self._published[node] = dict(zip(message.topics, message.counts, strict=False))
         if self._final_at is None and self._expected <= self._published.keys():
             self._final_at = time.monotonic()
 

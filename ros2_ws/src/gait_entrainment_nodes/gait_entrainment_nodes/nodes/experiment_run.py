@@ -228,9 +228,9 @@ class Run:
         self._answer()
 
     def _latest_stamp(self) -> float:
-        """Return the latest stamp [ns since 1970] that can be over, counted from the start."""
-        if self._began is None:
-            return math.inf
+        """Return the latest stamp [ns since 1970] that can be over: no walker goes unasked."""
+        if self._began is None:  # lock-step
+            return self.promised_until
         return self._began[0] + round(self._clock() * NANOSECONDS_PER_SECOND) + STAMP_TOLERANCE
 
     def _note_stop(self) -> None:
@@ -260,6 +260,10 @@ class Run:
             return
         self._progress = None
         if progress.state != msg.Progress.WALKING:
+            ended = conductor.part(self.known_until) is Part.FINISHED
+            if progress.state == progress.FINISHED and not ended:
+                walked = f"after {conductor.strides} strides of {conductor.protocol.strides}"
+                self.fail(ExperimentError(f"{self.walker} ended the run {walked}", self.walker))
             self.final = progress
             return
         self._promise(conductor, self.known_until)

@@ -3,22 +3,19 @@
 
 """One run of the analyzer: events and onsets in, results out, without a node."""
 
-import math
 from dataclasses import asdict
 from typing import Any
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.gait import Entrainment, GaitAnalyzer, PulsePhase, Stride, VerdictSettings
 from gait_entrainment.gait.analyzer import Result
-from gait_entrainment_bags.holes import hole_before
 from gait_entrainment_bags.messages import (
+    ProfileOrder,
     event_of,
     nanoseconds_of,
-    profile_of,
     pulse_of,
     result_values,
     state_of,
-    stop_of,
 )
 from gait_entrainment_bags.truth import without_bias
 from gait_entrainment_commands.timing import MeasuredOnsets
@@ -62,7 +59,8 @@ class Run:
         self._closed = False  # nothing will be promised any more
         self._expected = 0  # events, once the end is known
         self._doubts: dict[str, int] = {}  # counts of suspicious events, as reported last
-        self._adjoins: float | None = None  # where the next profile must begin, see hole_before
+        self._order = ProfileOrder()
+        self._latest = 0  # stamp of the latest event
 
     @property
     def complete(self) -> bool:
@@ -80,22 +78,21 @@ class Run:
         """Take one gait event."""
         taken = event_of(event)
         self._events += 1
+        self._latest = max(self._latest, taken.stamp)
         (mended,) = without_bias([taken], self._bias)
         return self._analyzer.add_event(mended)
 
     def add_profile(self, message: msg.TorqueProfile) -> list[Result]:
         """Take the onsets that are promised, or a stop: the instant from which torque is zero."""
-        stop = stop_of(message)
-        if stop is not None:
-            self._analyzer.stop(stop)
-            self._adjoins = math.inf
+        void, hole, profile = self._order.take(message)
+        if void is not None:
+            self._analyzer.stop(void)
             if self._measured is not None:
-                self._measured.stop(stop)
-            return []
-        if hole := hole_before(message, self._adjoins):
+                self._measured.stop(void)
+        if hole:
             self._analyzer.add_hole(*hole)
-        profile = profile_of(message)
-        self._adjoins = profile.valid_until
+        if profile is None:
+            return []
         known = list(profile.onsets), profile.valid_until
         self.promised_until, self._closed = profile.valid_until, not profile.has_length
         if self._measured is not None:
@@ -121,6 +118,8 @@ class Run:
     def finish(self, end: int) -> list[Result]:
         """Return what was waiting for more: the run is over at an instant."""
         results = []
+        if hole := self._order.hole_up_to(self._latest):
+            self._analyzer.add_hole(*hole)
         if self._measured is not None:
             results += self._analyzer.add_promise(self._measured.finish(), end)
         return results + self._analyzer.finish()

@@ -113,6 +113,8 @@ class WalkerDisplay(Participant):
             hips, ankles = ([angles[p + joint] for p in PREFIXES] for joint in ("hip", "ankle"))
         except KeyError:
             return  # of other joints: the topic is everybody's
+        if not all(map(math.isfinite, (*hips, *ankles))):
+            return  # the place of the next picture would follow from it
         x, z = self._footing.place(hips, ankles)
         places = [
             (WORLD, "base_footprint", (x, 0.0, 0.0), 0.0),
@@ -178,14 +180,15 @@ class WalkerDisplay(Participant):
 
 def draw_arc(marker: Marker, radius: float, begin: float, end: float) -> None:
     """
-    Make a marker an arc with an arrowhead, or nothing where it has no length.
+    Make a marker an arc with an arrowhead, or nothing where it has no length, or none that is one.
 
     Angles [rad] go about y from z, the direction of the leg, to x, forward.
     """
     marker.type, marker.scale.x = Marker.LINE_STRIP, 0.02
-    if begin == end:
+    if begin == end or not math.isfinite(end - begin):
         marker.action = Marker.DELETE
         return
+    end = min(max(end, begin - math.tau), begin + math.tau)  # a whole turn is more than enough
 
     def point(angle: float, distance: float) -> Point:
         return Point(x=distance * math.sin(angle), z=distance * math.cos(angle))

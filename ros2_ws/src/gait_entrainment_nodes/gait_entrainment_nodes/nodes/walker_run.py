@@ -9,8 +9,11 @@ import numpy as np
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side, nanoseconds
 from gait_entrainment.parameters import Variation, WalkerParameters
-from gait_entrainment.robot import TorqueProfile
+from gait_entrainment.robot import ProfileError, TorqueProfile
 from gait_entrainment.walker import Ending, Samples, Transition, Walker
+
+# A walker of human size is promised at most so much at once [s], where a stride is asked for.
+_LONGEST_PROMISE = 1000.0
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,7 @@ class WalkerRun:
         both_ankles: bool = False,
     ) -> None:
         self._walker = Walker(parameters, first_heel_strike, variation=variation, seed=seed)
+        self._longest = _LONGEST_PROMISE * parameters.time_scale
         self._sampled = sample_rate is not None
         self._period = NANOSECONDS_PER_SECOND / sample_rate if sample_rate else None
         self.ankles = 1 + both_ankles  # whose torque is promised
@@ -75,11 +79,16 @@ class WalkerRun:
         """
         Take a promise; return how much of it [ns] came too late to be walked.
 
-        Raises ProfileError if it does not adjoin the one before, or is not as a profile must be.
+        Raises ProfileError if it does not adjoin the one before, is not as a profile must be, or
+        longer than any experiment asks for.
         """
+        begin = self._promised.get(profile.side, 0)
+        length = (profile.valid_until - max(begin, self.reached)) / NANOSECONDS_PER_SECOND
+        if length > self._longest:
+            raise ProfileError(f"a profile of {length:.3g} s; allowed: {self._longest:.3g} s")
         if not profile.has_length:
             return 0
-        profile.check(self._promised.get(profile.side, 0))
+        profile.check(begin)
         self._promised[profile.side] = profile.valid_until
         late = max(min(self.reached, profile.valid_until) - profile.times[0], 0)
         self.late += late

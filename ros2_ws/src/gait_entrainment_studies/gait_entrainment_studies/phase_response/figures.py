@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from gait_entrainment_commands import drawing
-from gait_entrainment_commands.drawing import BLACK, BLUE, GREY, ORANGE
+from gait_entrainment_commands.drawing import BELOW, BLACK, BLUE, GREY, ORANGE
 from gait_entrainment_studies.phase_response.response import PhaseResponse, Prediction
 
 
@@ -28,7 +28,7 @@ def draw_response(
     stride = response.stride_period
     for one in predictions:
         wanted = -one.period_offset * 1e3
-        axes.axhline(wanted, color=GREY, ls=":", lw=0.8)
+        axes.axhline(wanted, color=GREY, ls=":", lw=0.8, label="what a lock asks for")
         phases = [0.5 + lock.onset / stride for lock in (one.predicted, one.exact)]
         style = {"mfc": "white", "mec": BLACK, "label": "lock predicted"}
         axes.plot(phases[:1], [wanted], "o", **style)
@@ -44,5 +44,5 @@ def draw_response(
         xlim=(0, 1),
     )
     axes.set_title("Phase response to a single pulse", fontsize=11)
-    drawing.add_legend(axes, loc="upper left")
+    drawing.add_legend(axes, **BELOW, ncols=3)
     return drawing.save_figure(figure, folder, "phase_response")
