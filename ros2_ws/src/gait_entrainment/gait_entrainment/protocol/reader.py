@@ -56,9 +56,8 @@ def read_protocol(
 
     A text has a line break in it. ``overrides`` replace values of the source: dotted field name
     -> (value, who says so), as ``{"pulses.width": (0.2, "--width")}``; a text is read as what it
-    stands for.
-    ``to_run`` holds the pulses against the limits, and sees that there is such a driver, too.
-    Raises ProtocolError: one line with place, field, and what is allowed.
+    stands for. ``to_run`` holds the pulses against the limits, and sees that there is such a
+    driver. Raises ProtocolError: one line with place, field, and what is allowed.
     """
     if isinstance(source, str | Path):
         name, _, root = composed(source)
@@ -191,9 +190,7 @@ def _meant(where: str, kind: type, node: yaml.ScalarNode) -> object:
     same = node.value.isdigit() and int(node.value) == value
     other_base = isinstance(value, int) and re.match(r"[-+]?0[0-9_box]", node.value) and not same
     if other_base or (isinstance(value, int | float) and ":" in node.value):
-        raise ProtocolError(
-            f"{where}: {node.value} is {value} in YAML; write it as a decimal number"
-        )
+        raise ProtocolError(f"{where}: {node.value} is {value} in YAML; write a decimal number")
     fits = isinstance(value, int | float) and isinstance(value, bool) is (kind is bool)
     return value if fits or value is None else node.value
 

@@ -88,7 +88,7 @@ def test_what_is_written_reads_back_the_same(
         ("pulses: {width: !unknown 3}", ("pulses.width", "cannot be read")),
         (f"pulses: {{width: {'9' * 5000}}}", ("pulses.width", "cannot be read")),
         (f"pulses: {{torque: 1{'0' * 400}}}", ("pulses.torque", "inf", "finite")),
-        ("baseline: 012", ("baseline: 012 is 10 in YAML; write it as a decimal number",)),
+        ("baseline: 012", ("baseline: 012 is 10 in YAML; write a decimal number",)),
         ("baseline: 0x10", ("baseline: 0x10 is 16 in YAML",)),
         ("baseline: 1:30", ("baseline: 1:30 is 90 in YAML",)),
         ("rest: 1:30.0", ("rest: 1:30.0 is 90.0 in YAML",)),
