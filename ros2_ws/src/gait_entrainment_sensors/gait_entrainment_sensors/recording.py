@@ -123,13 +123,15 @@ def read_table(path: Path, separators: str = "\t;,") -> Table:
         data = path.read_bytes()
         wide = data[:2] in (b"\xff\xfe", b"\xfe\xff")
         text = data.decode("utf-16" if wide else "utf-8-sig")
+        lines = text.rstrip("\r\n ").splitlines()
+        # The comma comes last: it may be that of the numbers.
+        separator = max(separators, key=lambda sign: sum(sign in line for line in lines))
+        rows = [*enumerate(csv.reader(lines, delimiter=separator), 1)]
+    except csv.Error as error:  # such as a cell of many pages
+        raise RecordingError(f"{path}: cannot be read: {error}") from None
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "is no text in UTF-8"
         raise RecordingError(f"{path}: cannot be read: {reason}") from None
-    lines = text.rstrip("\r\n ").splitlines()
-    # The comma comes last: it may be that of the numbers.
-    separator = max(separators, key=lambda sign: sum(sign in line for line in lines))
-    rows = [*enumerate(csv.reader(lines, delimiter=separator), 1)]
     width = Counter(len(row) or 1 for _, row in rows).most_common(1)[0][0] if rows else 0
     # In a single column nothing at all is a field that is empty.
     rows = [(number, row or [""]) for number, row in rows if row or width == 1]

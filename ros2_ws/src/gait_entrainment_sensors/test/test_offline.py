@@ -159,6 +159,7 @@ def test_a_missing_sample_is_told(walk):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
+        pytest.param(f"time\n{9:0200000}\n", "cannot be read: field larger", id="endless field"),
         ("", "holds no row"),
         ("time,left_force_z", "holds no row"),
         ("time,left_force_z\n0,1,2", "row 2 has 3 fields"),
