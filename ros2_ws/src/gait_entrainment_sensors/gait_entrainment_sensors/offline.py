@@ -111,7 +111,7 @@ def write_events(path: Path, events: Iterable[DetectedEvent]) -> None:
         )
         for e in sorted(events, key=lambda e: e.event.stamp)
     ]
-    with path.open("w", encoding="utf-8", newline="") as table:
+    with path.open("x", encoding="utf-8", newline="") as table:
         writer = csv.writer(table, delimiter="\t", lineterminator="\n")
         writer.writerow(COLUMNS)
         writer.writerows(rows)

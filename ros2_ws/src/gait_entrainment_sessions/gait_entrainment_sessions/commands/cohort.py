@@ -49,8 +49,8 @@ EXAMPLES = """examples:
   entrain cohort session.yaml --subjects 12 --out rehearsal
 """
 
-_SUBJECTS = Setting("number of subjects", int, least=2)
-_JOBS = Setting("processes", int, least=1)
+_SUBJECTS = Setting("number of subjects", int, least=2, most=10_000)
+_JOBS = Setting("processes", int, least=1, most=1000)
 _PERIOD_OFFSET = Setting("pulse period minus measured stride period", unit="s")
 _OFFSETS = ("-0.12", "-0.1", "-0.08", "-0.06", "-0.05", "-0.04", "-0.02", "0.02", "0.05")
 _HEADLINE = -0.05

@@ -15,7 +15,7 @@ from gait_entrainment_studies.existence.stiffness_range import existence_map, st
 DESCRIPTION = "Range of stiffness between falling and flying off, along the leg angle."
 EXAMPLES = "examples:\n  entrain existence --out figures\n  entrain existence --json"
 
-_POINTS = Setting("leg angles", int, least=2)
+_POINTS = Setting("leg angles", int, least=2, most=100_000)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

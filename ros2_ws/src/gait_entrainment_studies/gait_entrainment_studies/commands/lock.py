@@ -25,7 +25,7 @@ EXAMPLES = """examples:
   entrain lock --torque-fraction -0.1 --period-offset 0.02 --out figures
 """
 
-_PHASES = Setting("initial phases walked from", int, least=1)
+_PHASES = Setting("initial phases walked from", int, least=1, most=10_000)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -31,7 +31,7 @@ EXAMPLES = """examples:
 
 _COLUMNS = ("phase", "onset", "lag", "shift", "first_stride_shift")
 _HEADER = "phase [1],onset [s],lag [s],shift [s],first_stride_shift [s]"
-_POINTS = Setting("points on each branch", int, least=2)
+_POINTS = Setting("points on each branch", int, least=2, most=100_000)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

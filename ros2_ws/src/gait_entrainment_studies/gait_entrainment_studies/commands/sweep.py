@@ -38,10 +38,10 @@ EXAMPLES = """examples:
   entrain sweep --out tongue --scheduler tcp://host:8786
 """
 
-_JOBS = Setting("processes; default: all cores", int, least=1)
+_JOBS = Setting("processes; default: all cores", int, least=1, most=1000)
 _OFFSET = Setting("pulse period minus stride period", unit="s")
 _FRACTION = Setting("torque over the peak ankle torque", unit="1")
-_COUNT = Setting("number of values", int, least=1)
+_COUNT = Setting("number of values", int, least=1, most=10_000)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

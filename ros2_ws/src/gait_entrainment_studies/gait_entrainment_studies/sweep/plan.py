@@ -52,8 +52,8 @@ class SweepPlan(Checked):
     """Pulse period minus the unperturbed stride period [s]."""
     torque_fractions: Axis
     """Height of the pulse as a fraction of the peak ankle torque."""
-    phases: int = setting(16, "initial phases walked from", within=(1, math.inf))
-    strides: int = setting(100, "strides of each walk", within=(10, math.inf))
+    phases: int = setting(16, "initial phases walked from", within=(1, 10_000))
+    strides: int = setting(100, "strides of each walk", within=(10, 1_000_000))
     width: float = setting(0.1, "duration of the pulse", "s")
 
     def __post_init__(self) -> None:

@@ -113,7 +113,7 @@ def test_command_counts_every_subject_in_its_denominators(tmp_path, capsys):
         (["--period-offset", "-1.5"], "period_offset: -1.5 s; allowed: within"),
         (["--period-offset", "-0.5", "--width", "0.7"], "period_offset: -0.5 s; allowed: within"),
         (["--initial-phase", "inf"], "initial_phase: 'inf'; allowed: at least 0 and below 1"),
-        (["--subjects", "1"], "subjects: '1'; allowed: a whole number at least 2"),
+        (["--subjects", "1"], "subjects: '1'; allowed: a whole number from 2 to 10000"),
         (["--seed", "-1"], "seed: '-1'; allowed: a whole number at least 0"),
         (["--peak-torque", "0.9", "0.001"], "hardly a subject drawn has a gait"),
     ],

@@ -232,8 +232,8 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path, capsys):
         (["--period-offsets", "-0.1", "0", "2.5"], "period_offsets: '2.5'; allowed: a whole"),
         (["--torque-fractions", "0", "0.1", "nan"], "torque_fractions: 'nan'; allowed: a whole"),
         (["--width", "1.2"], "width: 1.2 s; allowed: above 0 and below a step"),
-        (["--jobs", "-1"], "jobs: '-1'; allowed: a whole number at least 1"),
-        (["--phases", "0"], "phases: '0'; allowed: a whole number at least 1"),
+        (["--jobs", "-1"], "jobs: '-1'; allowed: a whole number from 1 to 1000"),
+        (["--phases", "0"], "phases: '0'; allowed: a whole number"),
         (["--ankle-stiffness", "200"], "the walker flies off"),
     ],
 )
