@@ -109,9 +109,10 @@ def _sign_of_foot(times: Floats, rates: Floats, about: Floats) -> float:
             areas.append(float(angle @ steps[start:end]))
     if not areas:
         return 0.0
-    # A stride is one vote, and what is much smaller than a stride is less.
+    # A stride is one vote; half a step from standing, which turns the other way, is much less.
     sizes = np.abs(areas)
     votes = np.clip(areas / max(np.median(sizes), 0.25 * sizes.max(), 1e-9), -1.0, 1.0)
+    votes *= np.abs(votes)
     total = float(votes.sum())
     certain = abs(total) > max(1.5, 0.75 * float(np.abs(votes).sum()))
     return math.copysign(1.0, total) if certain else 0.0
