@@ -4,7 +4,6 @@
 """What a sweep goes through, and what identifies it when it is resumed."""
 
 import json
-import math
 import platform
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, version
