@@ -157,8 +157,7 @@ class WalkerSim(Participant):
         try:
             late = run.promise(profile_of(message, run.start), message.last)
         except MessageError as error:  # of somebody else; the robot's own is missed by the next
-            what = f"a message cannot be and is dropped: {error}"
-            self.diagnose(run.stamp, DiagnosticStatus.WARN, what)
+            self.diagnose(run.stamp, DiagnosticStatus.WARN, f"a message is dropped: {error}")
             return
         except ValueError as error:
             self.failure = f"torque profile {message.revision} cannot be walked: {error}"
