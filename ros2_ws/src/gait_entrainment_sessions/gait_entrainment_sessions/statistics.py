@@ -48,7 +48,7 @@ class Direction:
     count: int
     phase: float  # mean direction, in strides since heel strike, 0 to below 1
     resultant: float  # mean resultant length, 0 to 1
-    kappa: float  # concentration of a von Mises distribution; infinite if all are equal
+    kappa: float  # concentration (von Mises); infinite if all are equal, NaN of one
 
 
 @dataclass(frozen=True)
@@ -103,8 +103,8 @@ def direction(phases: Sequence[float]) -> Direction:
     resultant = min(float(vector.mean_resultant_length), 1.0)
     phase = math.atan2(*vector.mean_direction[::-1]) / (2 * math.pi) % 1.0 % 1.0
     # Of equal angles the likelihood grows without end.
-    alike = 1.0 - resultant < 1e-12
-    kappa = math.inf if alike else float(stats.vonmises.fit(angles, fscale=1)[0])
+    alike = math.inf if len(phases) > 1 else math.nan
+    kappa = alike if 1.0 - resultant < 1e-12 else float(stats.vonmises.fit(angles, fscale=1)[0])
     return Direction(len(phases), phase, resultant, kappa)
 
 

@@ -75,6 +75,7 @@ def test_direction_of_equal_phases_and_of_none():
     found = statistics.direction([0.25] * 7)
     assert (found.phase, found.resultant, found.kappa) == (pytest.approx(0.25), 1.0, math.inf)
     assert math.isnan(statistics.direction([]).phase)
+    assert math.isnan(statistics.direction([0.25]).kappa)
 
 
 def test_an_exponential_approach_is_found_exactly_and_nothing_else_is():
