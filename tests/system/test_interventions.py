@@ -15,11 +15,13 @@ from gait_entrainment.conventions import Side
 from gait_entrainment.robot import Pulse, PulseTrain
 from gait_entrainment_bags import BagReader
 from gait_entrainment_msgs.action import DeliverPulseTrain, RunProtocol
-from gait_entrainment_msgs.msg import Progress
+from gait_entrainment_msgs.msg import GaitEvent, Progress, PublishedCounts, TorqueProfile
 from gait_entrainment_msgs.srv import Ready, StartRun
 from gait_entrainment_nodes.messaging.goals import goal_of
 from gait_entrainment_nodes.messaging.topics import (
     ANKLE_TORQUE,
+    GAIT_EVENTS,
+    PUBLISHED_COUNTS,
     PULSES,
     TORQUE_PROFILE,
     WALKER_PROGRESS,
@@ -117,6 +119,14 @@ def test_second_protocol_second_train_and_reset_are_refused_in_mid_run(conducted
     answer = conducted.reset()
     assert not answer.success
     assert "run 1 is in progress" in answer.message
+    for topic, stray in (  # messages that cannot be: none of them ends the run either
+        (TORQUE_PROFILE, TorqueProfile(run=1, side=Side.RIGHT)),
+        (GAIT_EVENTS, GaitEvent(run=1, kind=7)),
+        (PUBLISHED_COUNTS, PublishedCounts(run=1, topics=["/a"])),
+    ):
+        publisher = conducted.probe.node.create_publisher(topic.type, topic.name, topic.qos)
+        conducted.probe.until(publisher.get_subscription_count, "the nodes")
+        publisher.publish(stray)
     # Cancelling the protocol brings the torque to zero.
     future = handle.cancel_goal_async()
     conducted.probe.until(future.done, "an answer to the cancellation")

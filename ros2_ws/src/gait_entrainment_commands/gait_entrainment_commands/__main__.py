@@ -4,6 +4,7 @@
 """The command ``entrain``, also ``python -m gait_entrainment_commands``."""
 
 import gc
+import os
 import sys
 from collections.abc import Sequence
 
@@ -15,6 +16,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # What a command loads lives as long as it does. To search all of it for garbage, over and over
     # while it is loaded and once more at the end, takes a sixth of a short command.
     gc.set_threshold(100_000)
+    while (place := os.open(os.devnull, os.O_RDWR)) <= 2:  # what is closed, a file would take
+        os.set_inheritable(place, True)
+    os.close(place)
+    sys.stdout, sys.stderr = sys.stdout or os.fdopen(1, "w"), sys.stderr or os.fdopen(2, "w")
     try:
         return gait_entrainment_commands.main(arguments)
     finally:

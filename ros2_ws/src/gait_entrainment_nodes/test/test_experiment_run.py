@@ -217,6 +217,10 @@ def test_in_real_time_what_is_stamped_ahead_has_not_happened(monkeypatch, ahead,
 def test_in_lock_step_nobody_walks_further_than_was_promised(bench):
     bench.promise()
     bench.strike(10 * SECOND)
+    bench.report(10 * SECOND + HALF)
+    promised = bench.run.promised_until
+    bench.report(9 * SECOND)  # nor back
+    assert (bench.run.known_until, bench.run.promised_until) == (10 * SECOND + HALF, promised)
     bench.report(3600 * SECOND)
     words, node = blamed(bench.run.failure)
     assert words.startswith("walker_sim reports what is 3.59e+03 s ahead of what can be over")

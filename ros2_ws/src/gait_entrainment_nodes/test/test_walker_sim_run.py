@@ -106,6 +106,15 @@ def test_missing_promise_is_refused():
         run.promise(profile(2 * SECOND, 3 * SECOND), False)
 
 
+def test_a_promise_that_ends_before_where_the_walk_is_moves_nobody():
+    run = lock_step()
+    run.promise(profile(0, SECOND), False)
+    list(run.walk())
+    run.promise(closing(-(10**18)), False)
+    *_, report = run.walk()
+    assert nanoseconds_of(report.header.stamp) == START + SECOND
+
+
 def test_a_promise_of_hours_is_refused():
     for message in profile(SECOND, 3600 * SECOND), closing(3600 * SECOND):
         run = lock_step()

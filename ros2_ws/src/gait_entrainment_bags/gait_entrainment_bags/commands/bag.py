@@ -179,8 +179,5 @@ def _export(options: argparse.Namespace) -> int:
 def _date(nanoseconds: int) -> str:
     """Return an instant as a date of nine digits, UTC."""
     seconds, rest = divmod(nanoseconds, NANOSECONDS_PER_SECOND)
-    try:
-        date = datetime.fromtimestamp(seconds, timezone.utc)
-    except (OverflowError, ValueError, OSError):
-        return f"{nanoseconds} ns since 1970"
+    date = datetime.fromtimestamp(seconds, timezone.utc)  # 64 bits end in 2554
     return f"{date:%Y-%m-%d %H:%M:%S}.{rest:09d} UTC"

@@ -48,6 +48,13 @@ def require_usable_environment() -> None:
             "ROS_AUTOMATIC_DISCOVERY_RANGE: 'OFF' keeps nodes from finding each other; allowed: "
             "LOCALHOST, SUBNET, SYSTEM_DEFAULT, or unset"
         )
+    for peer in filter(None, os.environ.get("ROS_STATIC_PEERS", "").split(";")):
+        try:
+            socket.getaddrinfo(peer, None)
+        except (OSError, UnicodeError):
+            allowed = "allowed: names or addresses with ; between them"
+            message = f"ROS_STATIC_PEERS: {peer!r} is no host that can be found; {allowed}"
+            raise UnusableEnvironmentError(message) from None
     if SHARED_MEMORY.exists() and shutil.disk_usage(SHARED_MEMORY).free < _LOCKS:
         raise UnusableEnvironmentError(
             f"{SHARED_MEMORY} is full, and Fast DDS needs it; remove what fills it, such as "

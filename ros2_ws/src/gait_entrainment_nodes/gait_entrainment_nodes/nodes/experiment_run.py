@@ -174,9 +174,10 @@ class Run:
 
     def take_progress(self, progress: msg.Progress) -> None:
         """Take the walker's progress; it is answered once all that it covers is here."""
-        if self.conductor is None:
-            return
         stamp = nanoseconds_of(progress.header.stamp)
+        back = self._began is None and stamp < self.known_until  # as no walk in lock-step goes
+        if self.conductor is None or back:
+            return
         if (ahead := stamp - self._latest_stamp()) > 0:
             lead = f"{ahead / NANOSECONDS_PER_SECOND:.3g} s ahead of what can be over by now"
             self.fail(ExperimentError(f"{self.walker} reports what is {lead}", self.walker))

@@ -24,7 +24,7 @@ from std_srvs.srv import Trigger
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
 from gait_entrainment.parameters import Variation, WalkerParameters
 from gait_entrainment.settings import setting
-from gait_entrainment_bags.messages import nanoseconds_of, profile_of, stop_of
+from gait_entrainment_bags.messages import MessageError, nanoseconds_of, profile_of, stop_of
 from gait_entrainment_msgs import msg
 from gait_entrainment_msgs.srv import StartRun
 from gait_entrainment_nodes.messaging import topics
@@ -156,7 +156,10 @@ class WalkerSim(Participant):
             return
         try:
             late = run.promise(profile_of(message, run.start), message.last)
-        except (ValueError, IndexError) as error:
+        except MessageError as error:  # of somebody else; the robot's own is missed by the next
+            self.diagnose(run.stamp, DiagnosticStatus.WARN, f"a message is dropped: {error}")
+            return
+        except ValueError as error:
             self.failure = f"torque profile {message.revision} cannot be walked: {error}"
             return
         if late:

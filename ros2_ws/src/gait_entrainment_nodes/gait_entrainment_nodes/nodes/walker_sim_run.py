@@ -151,7 +151,7 @@ class LockStepRun(_Account):
         """Walk as far as is allowed; what is yielded is published before the next is made."""
         while self.due() is not None:
             until, last = self._promised.popleft()
-            yield self.walker.advance(until, last=last)
+            yield self.walker.advance(max(until, self.walker.reached), last=last)
             yield self.progress()
 
 
