@@ -75,7 +75,12 @@ MISTAKES = [
     ("code: P01", "code: P 01", 3, "person.code: 'P 01'; allowed: letters and digits"),
     ("number: 2, ", "nmber: 2, ", 3, "person.nmber: unknown field; allowed: code, leg_length"),
     ("mass: 72, ", "", 3, "person.mass: missing; allowed: 5 to 500 kg"),
-    ("number: 2, ", "number: 012, ", 3, "person.number: 012 is 10 in YAML; write a decimal number"),
+    (
+        "number: 2, ",
+        "number: 012, ",
+        3,
+        "person.number: 012 is 10 in YAML; write a decimal number",
+    ),
     ("mass: 72", "mass: 7000", 3, "person.mass: 7000.0; allowed: 5 to 500 kg"),
     ("name: slower", "name: faster", 15, "name: faster: appears twice; keep one"),
     ("name: slower, ", "", 15, "name: missing; allowed: a plain name"),
