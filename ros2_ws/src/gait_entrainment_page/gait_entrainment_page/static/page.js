@@ -37,7 +37,7 @@ const entrain = { heartbeat: false, acting: false };
 
   async function alive() {
     const sent = Date.now();
-    if (window.did_handshake && !window.socket.connected) toldAt = -Infinity;
+    if (window.did_handshake && !window.socket?.connected) toldAt = -Infinity;
     try {
       const body = document.visibilityState === "visible" ? "watching" : "";
       const signal = AbortSignal.timeout(2000);
