@@ -130,8 +130,9 @@ class TorqueLoop:
         self._samples.append(Sample(sent, torque, reading, late))
         self._answer_stops(now)
         self._link.send_samples(self._samples)
-        # After a hiccup it goes on from now: commands that were missed are not made up for.
-        self._due = max(self._due + self._period, time.monotonic() - self._settings.lateness)
+        # After a hiccup it goes on from now: commands that were missed are not made up for, and
+        # several short hiccups are not one long one.
+        self._due = max(self._due + self._period, now)
 
     def _exchange(self, torque: float, late: float) -> Reading | None:
         """Exchange a torque for a reading; whatever the driver raises, zero is sent on and on."""

@@ -70,6 +70,8 @@ class MisbehavingDevice(TorqueDevice):
         if does == "hold up the loop":
             self._first = math.inf
             time.sleep(0.2)
+        if does == "stutter":
+            time.sleep(0.1)
         reading = Reading(self._follow(torque, now), 0.1, 0.0, 30.0)
         if does == "answer no more":
             time.sleep(timeout)

@@ -135,6 +135,15 @@ def test_a_loop_that_is_held_up_is_a_fault(bench):
     device.until(lambda: "host_loop_late" in device.faults())
 
 
+def test_short_hiccups_do_not_add_up_to_a_long_one(bench):
+    device = bench(does="stutter")
+    device.push()
+    device.until(device.pushed)
+    commands = len(device.commands())
+    device.until(lambda: len(device.commands()) > commands + 10)
+    assert "host_loop_late" not in device.faults()
+
+
 def test_a_parent_that_is_silent_ends_the_torque(bench):
     device = bench(host_silence=0.1)
     device.push(seconds=0.5, count=20)
