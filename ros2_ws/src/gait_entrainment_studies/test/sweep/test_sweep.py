@@ -198,7 +198,7 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path, capsys):
         sys.executable,
         "-c",
         "import sys; from gait_entrainment_commands import main; sys.exit(main())",
-        *("sweep", "--out", str(out), "--strides", "400", "--jobs", "1", *OPTIONS),
+        *("sweep", "--out", str(out), "--strides", "200", "--jobs", "1", *OPTIONS),
     ]
     process = subprocess.Popen(
         command,
