@@ -4,7 +4,8 @@
 
 # Every test. Most share the processors, a file for each at a time and one more, since some wait;
 # then those that run in real time, one for each processor. Those that stop every robot of this
-# machine, or hold its timing to account, have it to themselves. Arguments go to pytest each time.
+# machine, or hold its timing to account, have it to themselves. Files of few, long tests come
+# first, so that no processor waits for them at the end. Arguments go to pytest each time.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -22,8 +23,9 @@ alone=("$devices/test_torque_loop.py" tests/safety tests/page
 waiting=("$devices"
     tests/system/test_{deaths,drivers,interventions,person,perturbator,races,real_time_run}.py
     tests/system/test_{ros2_control,spectators,stopping}.py)
-run --numprocesses $((processors + 1)) --dist loadfile \
-    "${waiting[@]/#/--ignore=}" "${alone[@]/#/--ignore=}" ros2_ws/src tests "$@"
-run --numprocesses "$processors" --dist loadfile "${alone[@]/#/--ignore=}" "${waiting[@]}" "$@"
+shared=(--dist loadfile --no-loadscope-reorder "${alone[@]/#/--ignore=}")
+run --numprocesses $((processors + 1)) "${shared[@]}" "${waiting[@]/#/--ignore=}" \
+    tests ros2_ws/src/gait_entrainment_studies ros2_ws/src "$@"
+run --numprocesses "$processors" "${shared[@]}" "${waiting[@]}" "$@"
 run "${alone[@]}" "$@"
 exit $failed
