@@ -12,6 +12,7 @@ from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.errors import UsageError
 from gait_entrainment.robot.drivers import split_options
 from gait_entrainment_bags.recorded_signals import read_signals
+from gait_entrainment_commands import cli
 from gait_entrainment_sensors.detection import ChosenDetector, find_detector
 from gait_entrainment_sensors.motion_capture import (
     MARKERS,
@@ -60,7 +61,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--plates", metavar="SIDE,SIDE", help="which foot is on each plate (two belts)"
     )
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    cli.add_json_option(parser)
 
 
 def run(options: argparse.Namespace) -> int:

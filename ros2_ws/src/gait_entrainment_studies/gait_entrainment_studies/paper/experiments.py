@@ -33,8 +33,7 @@ def paper_walk(
 ) -> PulsedWalk:
     """Walk under the paper's pulses with this period [s] off the unperturbed stride period."""
     gait = paper_pulses(parameters)
-    period = gait.unperturbed_period + period_offset
-    return walk_under_pulses(parameters, gait.torque, PULSE_WIDTH, period, initial_phase, strides)
+    return walk_under_pulses(gait, gait.unperturbed_period + period_offset, initial_phase, strides)
 
 
 def speeds_after_collisions(
