@@ -37,6 +37,7 @@ columns: docs/sensors.md
 TRIED = ("vertical_force", "foot_switch", "foot_gyroscope", "shank_gyroscope", "ankle_encoder")
 # What is no detector: it needs the whole recording.
 BY_MARKERS = "markers"
+Found = tuple[list[DetectedEvent], tuple[str, ...]]  # the events, and what is wrong with them
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -105,22 +106,16 @@ def _chosen(options: argparse.Namespace) -> Iterator[ChosenDetector]:
     return map(find_detector, [options.detector] if options.detector else TRIED)
 
 
-def _of_table(
-    path: Path, options: argparse.Namespace
-) -> tuple[list[DetectedEvent], tuple[str, ...]]:
+def _of_table(path: Path, options: argparse.Namespace) -> Found:
     columns = _pairs("column", options.column)
     return detect(*read_streams(path, _chosen(options), columns, options.rate))
 
 
-def _of_bag(
-    path: Path, options: argparse.Namespace
-) -> tuple[list[DetectedEvent], tuple[str, ...]]:
+def _of_bag(path: Path, options: argparse.Namespace) -> Found:
     return detect(*read_signals(path, _chosen(options)))
 
 
-def _of_c3d(
-    path: Path, options: argparse.Namespace
-) -> tuple[list[DetectedEvent], tuple[str, ...]]:
+def _of_c3d(path: Path, options: argparse.Namespace) -> Found:
     names = _pairs("marker", options.marker)
     if unknown := [name for name in names if name not in MARKERS]:
         raise UsageError(f"--marker: {unknown[0]!r}; allowed: {', '.join(MARKERS)}")
