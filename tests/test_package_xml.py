@@ -35,7 +35,7 @@ KEYS = {
 # The page's server comes with nicegui; foxglove is asked for where it is wanted.
 WITHOUT_KEY = {
     *("astropy", "controller_manager_msgs", "distributed", "ezc3d", "pyarrow"),
-    *("fastapi", "foxglove", "nicegui", "uvicorn"),
+    *("fastapi", "foxglove", "nicegui", "starlette", "uvicorn"),
 }
 # What is needed and not imported, and by what.
 NOT_IMPORTED = {

@@ -13,16 +13,8 @@ from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind
 from gait_entrainment.gait import Analysis, Verdict
 from gait_entrainment.run import JudgedBlock
 from gait_entrainment_bags.recorded_run import RecordedRun, drawn_strides
-from gait_entrainment_commands.drawing import (
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    add_legend,
-    new_figure,
-    save_figure,
-)
+from gait_entrainment_commands import drawing
+from gait_entrainment_commands.drawing import BLACK, BLUE, GREEN, GREY, ORANGE
 from gait_entrainment_commands.outcome import (
     distribution,
     from_strikes,
@@ -53,14 +45,14 @@ def run_figures(run: RecordedRun) -> dict[str, Any]:
 def draw_figures(run: RecordedRun, folder: Path) -> list[Path]:
     """Draw the figures of a run as PNG and SVG files into a folder; return their paths."""
     drawn = run_figures(run).items()
-    return [path for name, one in drawn for path in save_figure(one, folder, name)]
+    return [path for name, one in drawn for path in drawing.save_figure(one, folder, name)]
 
 
 def _new_figure(
     run: RecordedRun, title: str, height: float = _HEIGHT, *, right: float = 0.15, top: float = 0.6
 ) -> tuple[Any, Any]:
     """Return a figure and its axes; fitting the margins [inch] would take as long as to draw."""
-    figure, axes = new_figure(size=(_WIDTH, height), layout=None)
+    figure, axes = drawing.new_figure(size=(_WIDTH, height), layout=None)
     figure.subplots_adjust(
         left=0.8 / _WIDTH, right=1 - right / _WIDTH, bottom=0.9 / height, top=1 - top / height
     )
@@ -88,7 +80,7 @@ def _parts(run: RecordedRun) -> list[tuple[str, Analysis]]:
 def _add_legend_below(figure: Any, axes: Any) -> None:
     """Add the legend at the bottom of the figure, where it hides nothing."""
     place = {"bbox_to_anchor": (0.5, 0), "bbox_transform": figure.transFigure, "ncols": 4}
-    add_legend(axes, loc="lower center", **place)
+    drawing.add_legend(axes, loc="lower center", **place)
 
 
 def _add_percent(run: RecordedRun, add_axis: Any, place: str) -> None:

@@ -7,10 +7,9 @@ Playing a bag: which message is due when. Nothing here looks at a clock or sends
 Every call is given the time, so that a node paces by absolute deadlines and a test by numbers.
 """
 
-import queue
-import threading
 from collections.abc import Collection, Generator, Iterator
-from contextlib import closing, suppress
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from fnmatch import fnmatchcase
 from itertools import islice
 from typing import NamedTuple
@@ -25,8 +24,8 @@ FASTEST = float("inf")
 
 # Nobody waits for the ticks of a longer silence [ns], as before a log time that is years ahead.
 _LONGEST_TICKING = 3600 * NANOSECONDS_PER_SECOND
-# Messages are read ahead in this many batches of this many messages.
-_BATCHES, _BATCH = 8, 500
+# So many messages are read ahead while as many are given out.
+_AHEAD = 2000
 
 
 class Moment(NamedTuple):
@@ -212,26 +211,8 @@ def _require_positive(name: str, value: float, unit: str = "") -> None:
 
 def _read_ahead(messages: Iterator[BagMessage]) -> Generator[BagMessage, None, None]:
     """Read messages in a thread until closed: a chunk takes 20 ms, which would make them late."""
-    batches: queue.Queue[list[BagMessage] | Exception | None] = queue.Queue(_BATCHES)
-    stopped = threading.Event()
-
-    def read() -> None:
-        try:
-            while (batch := list(islice(messages, _BATCH))) and not stopped.is_set():
-                batches.put(batch)
-            batches.put(None)
-        except Exception as error:  # raised below, by who takes the messages
-            batches.put(error)
-
-    thread = threading.Thread(target=read, daemon=True)
-    thread.start()
-    try:
-        while (batch := batches.get()) is not None:
-            if isinstance(batch, Exception):
-                raise batch
+    with ThreadPoolExecutor(1) as reader:
+        following = reader.submit(lambda: list(islice(messages, _AHEAD)))
+        while batch := following.result():
+            following = reader.submit(lambda: list(islice(messages, _AHEAD)))
             yield from batch
-    finally:
-        stopped.set()
-        while thread.is_alive():
-            with suppress(queue.Empty):
-                batches.get(timeout=0.01)

@@ -251,6 +251,25 @@ def recorded_outcome(run: RecordedRun, bag: Path) -> dict[str, Any]:
     }
 
 
+def walker_timing(reader: BagReader) -> dict[str, dict[str, float]]:
+    """Return how a walker kept to its time, by its last report; {} without one."""
+    told = list(reader.messages_of(topic_names.WALKER_TIMING))[-1:]
+    timing = {}
+    for walker in told:
+        if walker.samples:
+            timing["publish_lateness_ms"] = {
+                name: 1e3 * getattr(walker, f"publish_late_{name}")
+                for name in ("p50", "p99", "worst")
+            }
+        timing["promises"] = {
+            "late_stretches": walker.late_stretches,
+            "late_ms": 1e3 * walker.late,
+            "starved_stretches": walker.starved_stretches,
+            "starved_ms": 1e3 * walker.starved,
+        }
+    return timing
+
+
 def messages_line(run: RecordedRun) -> str:
     """Say how many messages were recorded, and what is missing."""
     missing = "" if run.lost is None else f", {run.lost} lost"

@@ -26,7 +26,7 @@ from gait_entrainment_bringup.node_list import (
     bag_folder,
     parameters,
 )
-from gait_entrainment_commands.outcome_options import add_onset_option
+from gait_entrainment_commands.cli import add_onset_option
 from gait_entrainment_commands.protocol_options import add_protocol_options, chosen_protocol
 from gait_entrainment_drivers.proof import require_proof
 from gait_entrainment_sessions.session_file import Session, read_session

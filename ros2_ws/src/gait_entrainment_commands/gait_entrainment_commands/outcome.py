@@ -81,7 +81,7 @@ def outcome_of(run: Run) -> dict[str, Any]:
             }
             for block in run.blocks
         ]
-    told: dict[str, Any] = _without_nan(outcome)
+    told: dict[str, Any] = without_nan(outcome)
     return told
 
 
@@ -257,12 +257,12 @@ def _double_stance(events: Sequence[GaitEvent], toe_off: int | None) -> float:
     return (toe_off - max(strikes)) / NANOSECONDS_PER_SECOND if strikes else math.nan
 
 
-def _without_nan(value: Any) -> Any:
+def without_nan(value: Any) -> Any:
     """Replace NaN and infinities, which JSON does not have, by None."""
     if isinstance(value, dict):
-        return {key: _without_nan(item) for key, item in value.items()}
+        return {key: without_nan(item) for key, item in value.items()}
     if isinstance(value, list):
-        return [_without_nan(item) for item in value]
+        return [without_nan(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

@@ -8,8 +8,8 @@ import json
 import sys
 
 from gait_entrainment.simulation import simulate
+from gait_entrainment_commands import cli
 from gait_entrainment_commands.outcome import outcome_of, summary, timing_outcome, timing_summary
-from gait_entrainment_commands.outcome_options import add_outcome_options
 from gait_entrainment_commands.protocol_options import add_protocol_options, chosen_protocol
 from gait_entrainment_commands.timing import timings_of
 
@@ -24,7 +24,8 @@ EXAMPLES = """examples:
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     add_protocol_options(parser)
-    add_outcome_options(parser)
+    cli.add_onset_option(parser)
+    cli.add_json_option(parser)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -2,12 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Who may look and who may act: a gate in front of the page, and the seat of the operator.
+Who may look and who may act: the names of this host, the tokens, and the seat of the operator.
 
-The gate sees every request, websockets included. It refuses names that this host does not have
-(a stranger's site that resolves to it), requests that another site makes, and, beyond this host
-or where a token was chosen, whoever brings no token. Stopping is safe, so whoever may look may
-stop.
+Stopping is safe, so whoever may look may stop.
 """
 
 import errno
@@ -18,18 +15,14 @@ import secrets
 import socket
 import sys
 import time
-from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import urlsplit
 
 from gait_entrainment.errors import UsageError
 
 LOOK, ACT = "look", "act"
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 TOKEN_LENGTH = 8  # at the least, of one that is chosen
-# Who the browser is, and what it may: one name for each port, as cookies know no ports.
-_BROWSER, _TOKEN = "entrain_page_browser", "entrain_page_token"
 TOKENS_VARIABLE = "ENTRAIN_PAGE_TOKENS"  # to act, to look on
 LONGEST_NOTE = 500
 
@@ -104,86 +97,6 @@ class Access:
             own = socket.gethostname().lower()
             return name in {self.host.lower(), "localhost", own, f"{own}.local"}
         return True
-
-
-class Gate:
-    """The gate, an ASGI application before another one."""
-
-    def __init__(self, app: Any, access: Access, port: int) -> None:
-        self._app, self._access, self._port = app, access, port
-
-    async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
-        """Let a request pass, with ``role`` and ``browser`` in its state, or refuse it."""
-        if scope["type"] not in ("http", "websocket"):
-            await self._app(scope, receive, send)
-            return
-        headers = {k.decode("latin-1"): v.decode("latin-1") for k, v in scope["headers"]}
-        # Beside ours come those of whatever else this host serves, which need not be well-formed.
-        pairs = (pair.strip().partition("=") for pair in headers.get("cookie", "").split(";"))
-        cookies = {name: value for name, _, value in pairs}
-        if refusal := self._refusal(scope, headers):
-            await _answer(scope, send, 403, refusal)
-            return
-        query = parse_qs(scope.get("query_string", b"").decode("latin-1"))
-        given = query.get("token", [""])[0]
-        token = given or cookies.get(self._name(_TOKEN), "")
-        role = self._access.role(token)
-        if not role:
-            wrong = "the token is wrong" if token else "this page asks for a token"
-            told = f"{wrong}: open the address that entrain page has printed"
-            await _answer(scope, send, 401, told)
-            return
-        if given and self._access.tokens and scope["type"] == "http":
-            cookie = self._cookie(_TOKEN, given)
-            await _answer(scope, send, 303, "", [("location", "/"), ("set-cookie", cookie)])
-            return
-        browser = cookies.get(self._name(_BROWSER), "")
-        cookie = ""
-        if not browser:
-            browser = secrets.token_hex(8)
-            cookie = self._cookie(_BROWSER, browser)
-        scope.setdefault("state", {}).update(role=role, browser=browser)
-
-        async def send_more(message: Any) -> None:
-            if message["type"] == "http.response.start":
-                more = [(b"x-frame-options", b"DENY")]  # a click within another site's page acts
-                more += [(b"set-cookie", cookie.encode())] if cookie else []
-                message["headers"] = [*message["headers"], *more]
-            await send(message)
-
-        await self._app(scope, receive, send_more)
-
-    def _refusal(self, scope: Any, headers: dict[str, str]) -> str:
-        """Return why a request is refused, whoever makes it; an empty text if it is not."""
-        host = headers.get("host", "")
-        if not self._access.knows(host):
-            return "this host has another name: open the address that entrain page has printed"
-        if headers.get("origin", f"http://{host}").partition("://")[2] != host:
-            return "another site must not use this page"
-        navigates = headers.get("sec-fetch-mode") == "navigate" and scope.get("method") == "GET"
-        if headers.get("sec-fetch-site") in ("cross-site", "same-site") and not navigates:
-            return "another site must not use this page"
-        return ""
-
-    def _name(self, cookie: str) -> str:
-        return f"{cookie}_{self._port}"
-
-    def _cookie(self, name: str, value: str) -> str:
-        # Lax: a link elsewhere that leads here finds the same browser, with its seat and token.
-        return f"{self._name(name)}={value}; Path=/; HttpOnly; SameSite=Lax"
-
-
-async def _answer(
-    scope: Any, send: Any, status: int, text: str, headers: Iterable[tuple[str, str]] = ()
-) -> None:
-    """Answer a request in one line of text; a websocket is closed."""
-    if scope["type"] == "websocket":
-        await send({"type": "websocket.close", "code": 1008})
-        return
-    told = [("content-type", "text/plain; charset=utf-8"), ("cache-control", "no-store"), *headers]
-    encoded = [(name.encode(), value.encode()) for name, value in told]
-    await send({"type": "http.response.start", "status": status, "headers": encoded})
-    await send({"type": "http.response.body", "body": text.encode()})
 
 
 class Seat:

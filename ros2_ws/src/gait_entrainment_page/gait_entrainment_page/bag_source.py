@@ -10,21 +10,10 @@ from typing import Any
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment_bags import BagError, BagReader
 from gait_entrainment_bags import topic_names as names
-from gait_entrainment_page.view import View
+from gait_entrainment_page.view import KEPT, SAMPLED, View
 
-# What has a message a stride or an event is decoded once; a bag of hours has some ten thousand.
-KEPT = (
-    names.EXPERIMENT_STATE,
-    names.STRIDES,
-    names.PULSE_PHASES,
-    names.ENTRAINMENT,
-    names.GAIT_EVENTS,
-    names.ROBOT_SETUP,
-    names.TROUBLE,
-    names.OPERATOR_NOTES,
-)
-# What is sampled is read from the bag around the instant that is shown, this much of it [ns].
-SAMPLED = (names.ROBOT_STATE, names.JOINT_STATES)
+# What is sampled is read from the bag around the instant that is shown, this much of it [ns]. The
+# rest is decoded once: a bag of hours has some ten thousand messages of it.
 _WINDOW = 8 * NANOSECONDS_PER_SECOND
 
 

@@ -356,12 +356,9 @@ class Shown:
                 button.set_enabled(self.acts and usable.get(name, name in offered))
         told = command.told(outcome=not view.blinded) if command is not None else []
         self._set("answer", "\n".join([self.answer, *told[-4:]]).strip())
-        self._tell_script()
-
-    def _tell_script(self) -> None:
-        """Tell the script what it must know, and that what is shown is of now."""
-        told = {"heartbeat": self.page.heartbeat, "acting": self.acts}
-        ui.run_javascript(f"entrain.told({json.dumps(told)})")
+        # The script must know it, and that what is shown is of now.
+        known = {"heartbeat": self.page.heartbeat, "acting": self.acts}
+        ui.run_javascript(f"entrain.told({json.dumps(known)})")
 
     def _record_words(self, view: View) -> list[tuple[str, str]]:
         if self.page.bag is not None:

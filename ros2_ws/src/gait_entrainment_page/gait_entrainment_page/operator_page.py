@@ -16,6 +16,7 @@ import queue
 import threading
 import time
 from collections.abc import Callable
+from concurrent import futures
 from dataclasses import dataclass
 from typing import Any
 
@@ -222,19 +223,17 @@ class OperatorPage(Participant):
         """Ask one of SERVICES; ActionError if it refuses or does not answer."""
         kind, service = SERVICES[what]
         request = kind.Request(reason=reason) if kind is AskSession else kind.Request()
-        answered, answers = threading.Event(), []
-
-        def on_answer(future: Any) -> None:
-            answers.append(future.result())
-            answered.set()
+        answered = futures.Future[Any]()
 
         def ask() -> None:
-            self._services_asked[what].call_async(request).add_done_callback(on_answer)
+            asked = self._services_asked[what].call_async(request)
+            asked.add_done_callback(lambda done: answered.set_result(done.result()))
 
         self._wishes.put(ask)
-        if not answered.wait(ANSWER_TIMEOUT):
-            raise ActionError(f"{service} does not answer")
-        answer = answers[0]
+        try:
+            answer = answered.result(ANSWER_TIMEOUT)
+        except futures.TimeoutError:
+            raise ActionError(f"{service} does not answer") from None
         if not answer.success:
             raise ActionError(answer.message or f"{service} refused")
         return str(answer.message)

@@ -1,19 +1,97 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The web server of the page: in a thread of its own, beside whatever the process does."""
+"""
+The web server of the page, in a thread of its own, and the gate in front of the page.
+
+The gate sees every request, websockets included. It refuses names that this host does not have
+(a stranger's site that resolves to it), requests that another site makes, and, beyond this host
+or where a token was chosen, whoever brings no token.
+"""
 
 import logging
+import secrets
 import socket
 import threading
 from typing import Any
 
 import uvicorn
 from fastapi import FastAPI, Request
+from starlette.datastructures import MutableHeaders
+from starlette.requests import HTTPConnection
+from starlette.responses import PlainTextResponse, RedirectResponse
+from starlette.websockets import WebSocketClose
 
-from gait_entrainment_page.access import Access, Gate
+from gait_entrainment_page.access import Access
 
+# Who the browser is, and what it may: one name for each port, as cookies know no ports.
+_BROWSER, _TOKEN = "entrain_page_browser", "entrain_page_token"
 _CLOSING = 1  # how long open connections may take to end [s]
+_POLICY_VIOLATION = 1008  # code of a websocket that is refused
+
+
+class Gate:
+    """The gate, an ASGI application before another one."""
+
+    def __init__(self, app: Any, access: Access, port: int) -> None:
+        self._app, self._access, self._port = app, access, port
+
+    async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
+        """Let a request pass, with ``role`` and ``browser`` in its state, or refuse it."""
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        request = HTTPConnection(scope)
+        given = request.query_params.get("token", "")
+        token = given or request.cookies.get(f"{_TOKEN}_{self._port}", "")
+        role = self._access.role(token)
+        answer = self._refusal(request, role, token)
+        if answer is None and given and self._access.tokens and scope["type"] == "http":
+            cookie = {"set-cookie": self._cookie(_TOKEN, given), "cache-control": "no-store"}
+            answer = RedirectResponse("/", 303, cookie)
+        if answer is not None:
+            await answer(scope, receive, send)
+            return
+        browser, cookie_to_set = request.cookies.get(f"{_BROWSER}_{self._port}", ""), ""
+        if not browser:
+            browser = secrets.token_hex(8)
+            cookie_to_set = self._cookie(_BROWSER, browser)
+        scope.setdefault("state", {}).update(role=role, browser=browser)
+
+        async def send_more(message: Any) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                headers["x-frame-options"] = "DENY"  # a click within another site's page acts
+                if cookie_to_set:
+                    headers.append("set-cookie", cookie_to_set)
+            await send(message)
+
+        await self._app(scope, receive, send_more)
+
+    def _refusal(self, request: HTTPConnection, role: str, token: str) -> Any:
+        """Return the answer to a request that is refused; None if it is not."""
+        headers, status = request.headers, 403
+        host = headers.get("host", "")
+        navigates = headers.get("sec-fetch-mode") == "navigate" and request.get("method") == "GET"
+        from_elsewhere = headers.get("sec-fetch-site") in ("cross-site", "same-site")
+        if not self._access.knows(host):
+            told = "this host has another name: open the address that entrain page has printed"
+        elif headers.get("origin", f"http://{host}").partition("://")[2] != host or (
+            from_elsewhere and not navigates
+        ):
+            told = "another site must not use this page"
+        elif not role:
+            status, wrong = 401, "the token is wrong" if token else "this page asks for a token"
+            told = f"{wrong}: open the address that entrain page has printed"
+        else:
+            return None
+        if request["type"] == "websocket":
+            return WebSocketClose(_POLICY_VIOLATION)
+        return PlainTextResponse(told, status, {"cache-control": "no-store"})
+
+    def _cookie(self, name: str, value: str) -> str:
+        # Lax: a link elsewhere that leads here finds the same browser, with its seat and token.
+        return f"{name}_{self._port}={value}; Path=/; HttpOnly; SameSite=Lax"
 
 
 class Server:

@@ -72,18 +72,6 @@ class View:
     def __init__(self, *, blinded: bool = False, clock: Callable[[], float] | None = None) -> None:
         self.lock, self.blinded = threading.RLock(), blinded
         self._clock = clock or (lambda: self.now / NANOSECONDS_PER_SECOND)
-        self._take: dict[str, Callable[[Any], None]] = {
-            names.EXPERIMENT_STATE: self._on_state,
-            names.STRIDES: self._on_stride,
-            names.PULSE_PHASES: self._on_phase,
-            names.ENTRAINMENT: self._on_verdict,
-            names.GAIT_EVENTS: self._on_event,
-            names.ROBOT_STATE: self._on_robot,
-            names.ROBOT_SETUP: self._on_setup,
-            names.TROUBLE: self._on_trouble,
-            names.JOINT_STATES: self._on_joints,
-            names.OPERATOR_NOTES: self._on_note,
-        }
         self.version = 0
         self.nodes: dict[str, NodeState] = {}
         self.notes: deque[tuple[int, str, str]] = deque(maxlen=_LINES_KEPT)
@@ -130,7 +118,7 @@ class View:
         if hasattr(message, "header"):
             self.now = max(self.now, nanoseconds_of(message.header.stamp))
         with contextlib.suppress(MessageError, ValueError):
-            self._take[topic](message)
+            _TAKES[topic](self, message)
 
     def _begins(self, state: Any) -> bool:
         """Whether an ExperimentState is of another run than the latest one."""
@@ -393,6 +381,23 @@ class View:
             level = "stale" if stale else state.level
             rows.append((name, level, f"silent for {silent:.0f} s" if stale else state.message))
         return rows
+
+
+_TAKES: dict[str, Callable[[View, Any], None]] = {
+    names.EXPERIMENT_STATE: View._on_state,
+    names.STRIDES: View._on_stride,
+    names.PULSE_PHASES: View._on_phase,
+    names.ENTRAINMENT: View._on_verdict,
+    names.GAIT_EVENTS: View._on_event,
+    names.ROBOT_STATE: View._on_robot,
+    names.ROBOT_SETUP: View._on_setup,
+    names.TROUBLE: View._on_trouble,
+    names.JOINT_STATES: View._on_joints,
+    names.OPERATOR_NOTES: View._on_note,
+}
+# What is sampled; of the others there is a message a stride or an event, or fewer.
+SAMPLED = (names.ROBOT_STATE, names.JOINT_STATES)
+KEPT = [name for name in _TAKES if name not in SAMPLED]
 
 
 def _torque(value: float) -> str:

@@ -15,11 +15,11 @@ from gait_entrainment_page.access import (
     LONGEST_NOTE,
     LOOK,
     Access,
-    Gate,
     Seat,
     listen,
     one_line,
 )
+from gait_entrainment_page.server import Gate
 
 TOKEN, LOOK_TOKEN = "letmeactnow", "letmelooknow"
 HERE = {"host": "127.0.0.1:8080"}

@@ -103,10 +103,10 @@ def places_in(path: Path) -> list[Place]:
     return places
 
 
-def read_runs(path: Path, *, torques: bool = False) -> Iterator[PlacedRun]:
-    """Read the runs of places_in one by one; ``torques`` as in read_run."""
+def read_runs(path: Path) -> Iterator[PlacedRun]:
+    """Read the runs of places_in one by one, without the torques that figures show."""
     for place in places_in(path):
-        yield PlacedRun(place, read_run(place.bag, torques=torques))
+        yield PlacedRun(place, read_run(place.bag, torques=False))
 
 
 def _of_session(folder: SessionFolder) -> Iterator[Place]:

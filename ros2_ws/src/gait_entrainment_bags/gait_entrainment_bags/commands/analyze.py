@@ -21,9 +21,9 @@ from gait_entrainment_bags.recorded_run import (
     recorded_outcome,
 )
 from gait_entrainment_bags.truth import TOE_OFF_BIAS, detection_lines, without_bias
+from gait_entrainment_commands import cli
 from gait_entrainment_commands.drawing import add_dpi_option, chosen_dpi
 from gait_entrainment_commands.outcome import outcome_of, summary, timing_summary
-from gait_entrainment_commands.outcome_options import add_outcome_options
 from gait_entrainment_sensors.offline import read_events, read_onsets
 
 DESCRIPTION = "Analyze a bag again, and compare the result with what was published live."
@@ -58,7 +58,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--figures", type=Path, metavar="FOLDER", help="draw figures into it")
     add_dpi_option(parser)
-    add_outcome_options(parser, onset=None)
+    cli.add_onset_option(parser, onset=None)
+    cli.add_json_option(parser)
 
 
 def run(options: argparse.Namespace) -> int:

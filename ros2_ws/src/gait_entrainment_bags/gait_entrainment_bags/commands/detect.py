@@ -12,6 +12,7 @@ from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.errors import UsageError
 from gait_entrainment.robot.drivers import split_options
 from gait_entrainment_bags.recorded_signals import read_signals
+from gait_entrainment_commands import cli
 from gait_entrainment_sensors.detection import ChosenDetector, find_detector
 from gait_entrainment_sensors.motion_capture import (
     MARKERS,
@@ -36,6 +37,7 @@ columns: docs/sensors.md
 TRIED = ("vertical_force", "foot_switch", "foot_gyroscope", "shank_gyroscope", "ankle_encoder")
 # What is no detector: it needs the whole recording.
 BY_MARKERS = "markers"
+Found = tuple[list[DetectedEvent], tuple[str, ...]]  # the events, and what is wrong with them
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -60,7 +62,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--plates", metavar="SIDE,SIDE", help="which foot is on each plate (two belts)"
     )
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    cli.add_json_option(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -104,22 +106,16 @@ def _chosen(options: argparse.Namespace) -> Iterator[ChosenDetector]:
     return map(find_detector, [options.detector] if options.detector else TRIED)
 
 
-def _of_table(
-    path: Path, options: argparse.Namespace
-) -> tuple[list[DetectedEvent], tuple[str, ...]]:
+def _of_table(path: Path, options: argparse.Namespace) -> Found:
     columns = _pairs("column", options.column)
     return detect(*read_streams(path, _chosen(options), columns, options.rate))
 
 
-def _of_bag(
-    path: Path, options: argparse.Namespace
-) -> tuple[list[DetectedEvent], tuple[str, ...]]:
+def _of_bag(path: Path, options: argparse.Namespace) -> Found:
     return detect(*read_signals(path, _chosen(options)))
 
 
-def _of_c3d(
-    path: Path, options: argparse.Namespace
-) -> tuple[list[DetectedEvent], tuple[str, ...]]:
+def _of_c3d(path: Path, options: argparse.Namespace) -> Found:
     names = _pairs("marker", options.marker)
     if unknown := [name for name in names if name not in MARKERS]:
         raise UsageError(f"--marker: {unknown[0]!r}; allowed: {', '.join(MARKERS)}")

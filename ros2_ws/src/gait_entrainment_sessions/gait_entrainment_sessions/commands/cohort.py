@@ -16,6 +16,7 @@ from tqdm import tqdm
 
 from gait_entrainment.errors import UsageError
 from gait_entrainment.settings import Setting, settings_of
+from gait_entrainment_commands import cli
 from gait_entrainment_commands.drawing import save_figure
 from gait_entrainment_sessions.findings import Findings, StudyFindings
 from gait_entrainment_sessions.rehearsal import rehearse
@@ -32,9 +33,8 @@ from gait_entrainment_studies.cohort.study import (
     verdicts,
 )
 from gait_entrainment_studies.cohort.subjects import SubjectDistributions, Subjects, draw_subjects
-from gait_entrainment_studies.commands import question
 from gait_entrainment_studies.locking.roots import Floats
-from gait_entrainment_studies.sweep.engine import available_cores
+from gait_entrainment_studies.sweep.engine import JOBS, chosen_jobs
 
 DESCRIPTION = (
     "Draw subjects, give each its own stride-to-stride variability, conduct the experiment on "
@@ -50,7 +50,6 @@ EXAMPLES = """examples:
 """
 
 _SUBJECTS = Setting("number of subjects", int, least=2, most=10_000)
-_JOBS = Setting("processes", int, least=1, most=1000)
 _PERIOD_OFFSET = Setting("pulse period minus measured stride period", unit="s")
 _OFFSETS = ("-0.12", "-0.1", "-0.08", "-0.06", "-0.05", "-0.04", "-0.02", "0.02", "0.05")
 _HEADLINE = -0.05
@@ -61,13 +60,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "session", nargs="?", type=Path, metavar="SESSION.yaml", help="rehearse these blocks"
     )
-    question.add_setting(parser, "jobs", _JOBS)
+    cli.add_setting(parser, "jobs", JOBS)
     experiment = parser.add_argument_group("experiment")
-    question.add_setting(experiment, "subjects", _SUBJECTS, "19")
-    question.add_settings(experiment, StudyPlan)
+    cli.add_setting(experiment, "subjects", _SUBJECTS, "19")
+    cli.add_settings(experiment, StudyPlan)
     shown = f"{' '.join(_OFFSETS)}; may be given again"
     told = _PERIOD_OFFSET
-    question.add_setting(experiment, "period_offset", told, shown=shown, action="append")
+    cli.add_setting(experiment, "period_offset", told, shown=shown, action="append")
     drawn = parser.add_argument_group("distributions of the subjects")
     for item in fields(SubjectDistributions):
         mean, deviation = getattr(SubjectDistributions, item.name)
@@ -79,7 +78,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
             metavar=("MEAN", "SD"),
             help=f"{item.metadata['meaning']}; default {mean:g} {deviation:g}",
         )
-    question.add_output_options(parser, "write figure and trials.csv")
+    cli.add_output_options(parser, "write figure and trials.csv")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -90,7 +89,7 @@ def run(options: argparse.Namespace) -> int:
         return _rehearse(options, distributions)
     texts = options.period_offset or _OFFSETS
     offsets = [_PERIOD_OFFSET.parse("period_offset", text) for text in texts]
-    plan = question.chosen(options, StudyPlan, period_offsets=tuple(dict.fromkeys(offsets)))
+    plan = cli.chosen(options, StudyPlan, period_offsets=tuple(dict.fromkeys(offsets)))
     count = _SUBJECTS.parse("subjects", options.subjects)
     subjects = draw_subjects(distributions, count, plan.seed)
     study = run_study(subjects, plan)
@@ -104,7 +103,7 @@ def run(options: argparse.Namespace) -> int:
         return paths
 
     outcome = _outcome(study, subjects, plan, asdict(distributions))
-    return question.answer(options, outcome, _summary(outcome), write, "written          ")
+    return cli.answer(options, outcome, _summary(outcome), write, "written          ")
 
 
 def _rehearse(options: argparse.Namespace, distributions: SubjectDistributions) -> int:
@@ -113,11 +112,11 @@ def _rehearse(options: argparse.Namespace, distributions: SubjectDistributions) 
         said.append("period_offset")
     if other := [name for name in said if name not in ("seed", "hurst")]:
         raise UsageError(f"{other[0]}: the session file says it; leave the option out")
-    plan = question.chosen(options, StudyPlan)
+    plan = cli.chosen(options, StudyPlan)
     session = read_session(options.session)
     count = _SUBJECTS.parse("subjects", options.subjects)
     subjects = draw_subjects(distributions, count, plan.seed)
-    jobs = _JOBS.parse("jobs", options.jobs) if options.jobs else available_cores()
+    jobs = chosen_jobs(options.jobs)
     rehearsed = rehearse(session, subjects, seed=plan.seed, hurst=plan.hurst, jobs=jobs)
     tqdm.monitor_interval = 0  # no thread: see by_processes
     total = count * len(session.blocks)
@@ -151,7 +150,7 @@ def _rehearse(options: argparse.Namespace, distributions: SubjectDistributions) 
         tables = write_tables(runs, folder)
         return [*tables, *save_figure(draw_verdicts(findings), folder, "verdicts")]
 
-    return question.answer(options, outcome, "\n".join(lines), write, "written          ")
+    return cli.answer(options, outcome, "\n".join(lines), write, "written          ")
 
 
 def _outcome(

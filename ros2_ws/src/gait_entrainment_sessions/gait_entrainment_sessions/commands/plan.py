@@ -9,9 +9,9 @@ from dataclasses import asdict
 from typing import Any
 
 from gait_entrainment.settings import Setting
+from gait_entrainment_commands import cli
 from gait_entrainment_sessions.power import COUNTS, PowerPlan, enough_of, power
 from gait_entrainment_sessions.statistics import Estimate
-from gait_entrainment_studies.commands import question
 
 DESCRIPTION = (
     "Say, for a variation of the stride and a pulse period, after how many pulses the verdict is "
@@ -29,16 +29,16 @@ _ENOUGH = 0.8
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    question.add_settings(parser, PowerPlan)
-    question.add_setting(parser, "period_offset", _OFFSET, "-0.05")
+    cli.add_settings(parser, PowerPlan)
+    cli.add_setting(parser, "period_offset", _OFFSET, "-0.05")
     default = " ".join(map(str, COUNTS))
-    question.add_setting(parser, "pulses", _PULSES, shown=default, nargs="+")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    cli.add_setting(parser, "pulses", _PULSES, shown=default, nargs="+")
+    cli.add_json_option(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Draw, judge, print."""
-    plan = question.chosen(options, PowerPlan)
+    plan = cli.chosen(options, PowerPlan)
     offset = _OFFSET.parse("period_offset", options.period_offset)
     counts = [_PULSES.parse("pulses", text) for text in options.pulses or map(str, COUNTS)]
     found = power(plan, offset, counts)

@@ -14,9 +14,8 @@ from gait_entrainment.conventions import nanoseconds
 from gait_entrainment_bags import BagReader
 from gait_entrainment_bags.messages import state_of
 from gait_entrainment_bags.reader import bag_files
-from gait_entrainment_bags.recorded_run import RecordedRun
+from gait_entrainment_bags.recorded_run import RecordedRun, walker_timing
 from gait_entrainment_bags.topic_names import ROBOT_SETUP, ROBOT_STATE, TROUBLE
-from gait_entrainment_bags.walker_timing import walker_timing
 from gait_entrainment_commands.outcome import holes_of, timing_outcome, timing_summary
 
 GOOD, DOUBTFUL, BAD = "good", "doubtful", "bad"
@@ -74,13 +73,8 @@ def _holes(run: RecordedRun) -> Check:
 
 def _events(run: RecordedRun) -> Check:
     counts = run.analysis.event_counts
-    odd = {
-        "missing": counts.missing,
-        "implausible": counts.implausible,
-        "contradictory": counts.contradictory,
-        "late": counts.late,
-        "repeated": counts.repeated,
-    }
+    doubts = ("missing", "implausible", "contradictory", "late", "repeated")
+    odd = {name: getattr(counts, name) for name in doubts}
     told = ", ".join(f"{number} {name}" for name, number in odd.items() if number)
     state = DOUBTFUL if any(odd.values()) else GOOD
     return Check("gait events", state, f"{counts.accepted} believed; {told or 'none in doubt'}")

@@ -11,17 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from gait_entrainment_commands.drawing import (
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PINK,
-    SKY,
-    add_legend,
-    new_figure,
-)
+from gait_entrainment_commands import drawing
+from gait_entrainment_commands.drawing import BESIDE, BLUE, GREEN, GREY, ORANGE, PINK, SKY
 from gait_entrainment_sessions.findings import Findings, StudyFindings
+from gait_entrainment_sessions.statistics import Direction
 
 COLOURS = {
     "entrained": GREEN,
@@ -59,10 +52,7 @@ def _thinned(path: str) -> str:
 
 def draw_circle(findings: Findings) -> Any:
     """Draw the phase of each pulse, the first in the middle, the last at the rim."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(4.6, 4.6), layout="constrained")
-    axes = _round(figure)
+    figure, axes = _new_circle(findings.direction)
     pulses = findings.part.analysis.pulses
     angles = 2 * np.pi * np.array([pulse.phase for pulse in pulses])
     places = np.array([pulse.number for pulse in pulses])
@@ -70,28 +60,22 @@ def draw_circle(findings: Findings) -> Any:
     last = len(pulses) - findings.direction.count
     axes.plot(angles[:last], places[:last], ".", color=GREY, ms=5)
     axes.plot(angles[last:], places[last:], ".", color=BLUE, ms=5)
-    if findings.direction.count:
-        angle = 2 * math.pi * findings.direction.phase
-        arrow = {"arrowstyle": "-|>", "color": ORANGE, "lw": 2}
-        axes.annotate("", (angle, findings.direction.resultant), (0, 0), arrowprops=arrow)
     return figure
 
 
 def draw_directions(study: StudyFindings) -> Any:
     """Draw the mean phase of each person, and their mean."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(4.6, 4.6), layout="constrained")
-    axes = _round(figure)
+    figure, axes = _new_circle(study.direction)
     axes.plot(2 * np.pi * np.array(study.phases), np.ones(len(study.phases)), "o", color=BLUE)
-    arrow = {"arrowstyle": "-|>", "color": ORANGE, "lw": 2}
-    angle = 2 * math.pi * study.direction.phase
-    axes.annotate("", (angle, study.direction.resultant), (0, 0), arrowprops=arrow)
     return figure
 
 
-def _round(figure: Any) -> Any:
-    axes = figure.add_subplot(projection="polar")
+def _new_circle(direction: Direction) -> tuple[Any, Any]:
+    """Return a figure, and its axes with the stride around them and an arrow to a mean phase."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(4.6, 4.6), layout="constrained")
+    axes: Any = figure.add_subplot(projection="polar")
     axes.set_theta_zero_location("N")
     axes.set_theta_direction(-1)
     axes.set_ylim(0, 1.08)
@@ -100,13 +84,17 @@ def _round(figure: Any) -> Any:
         np.arange(8) * math.pi / 4,
         ["0\nheel strike", "", "0.25", "", "0.5", "", "0.75", ""],
     )
-    return axes
+    if direction.count:
+        mean = 2 * math.pi * direction.phase, direction.resultant
+        arrow = {"arrowstyle": "-|>", "color": ORANGE, "lw": 2}
+        axes.annotate("", mean, (0, 0), arrowprops=arrow)
+    return figure, axes
 
 
 def draw_verdicts(findings: Sequence[Findings]) -> Any:
     """Draw the verdict of each run over its pulse period, a line per person."""
     persons = sorted({one.placed.place.person for one in findings})
-    figure, axes = new_figure(size=(7.2, 1.6 + 0.28 * len(persons)))
+    figure, axes = drawing.new_figure(size=(7.2, 1.6 + 0.28 * len(persons)))
     axes.axvline(0, color=GREY, ls="--", lw=1.2)
     for one in findings:
         verdict = one.verdict
@@ -120,5 +108,5 @@ def draw_verdicts(findings: Sequence[Findings]) -> Any:
     axes.set_yticks(range(len(persons)), persons)
     axes.set_ylim(len(persons) - 0.5, -0.5)
     axes.set(xlabel="pulse period minus stride period [% of the stride]")
-    add_legend(axes, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    drawing.add_legend(axes, **BESIDE)
     return figure

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, nanoseconds
 from gait_entrainment.errors import UsageError
@@ -62,8 +61,8 @@ class PopulationWalk:
     """(steps + 1, n), both legs; even ones are the perturbed leg's."""
     toe_offs: Floats
     """(steps, n), in step s the toe-off after heel strike s."""
-    fell: NDArray[np.bool_]
-    flew_off: NDArray[np.bool_]
+    endings: list[EndingKind | None]
+    """How each ended before its last step, if it did."""
 
     @property
     def stride_periods(self) -> Floats:
@@ -134,9 +133,7 @@ class Population:
             strikes[: walked.heel_strikes.size, index] = walked.heel_strikes
             offs[: walked.toe_offs.size, index] = walked.toe_offs
             endings.append(walked.ending)
-        fell = np.array([ending is EndingKind.FALL for ending in endings])
-        flew_off = np.array([ending is EndingKind.FLY_OFF for ending in endings])
-        return PopulationWalk(strikes, offs, fell, flew_off)
+        return PopulationWalk(strikes, offs, endings)
 
 
 def noise_for(

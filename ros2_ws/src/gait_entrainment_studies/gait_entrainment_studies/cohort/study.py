@@ -31,6 +31,7 @@ from gait_entrainment_studies.cohort.subjects import Subjects
 from gait_entrainment_studies.locking.branches import basin_of, locked_gaits, pieces_of
 from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
 from gait_entrainment_studies.locking.roots import Floats
+from gait_entrainment_studies.locking.walked import ENDINGS
 
 # Streams of noise beside the one that draws the subjects. That of a trial depends on its pulse
 # period alone: it is the same trial, whatever other periods are asked for.
@@ -160,8 +161,8 @@ def _trial(
 ) -> Trial:
     period = float(trains.period[subject])
     measured = period - offset
-    if walk.fell[subject] or walk.flew_off[subject]:
-        return Trial(subject, offset, measured, "fell" if walk.fell[subject] else "flew off")
+    if (ending := walk.endings[subject]) is not None:
+        return Trial(subject, offset, measured, ENDINGS[ending].value)
     onsets = trains.first_onset[subject] + np.arange(trains.count) * period
     events = events_of(walk.heel_strikes[:, subject], walk.toe_offs[:, subject])
     analysis = analyze(events, [nanoseconds(float(t)) for t in onsets], Side.RIGHT)

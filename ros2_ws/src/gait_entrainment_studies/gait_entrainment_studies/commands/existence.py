@@ -8,6 +8,7 @@ from dataclasses import asdict
 
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.settings import Setting
+from gait_entrainment_commands import cli
 from gait_entrainment_studies.commands import question
 from gait_entrainment_studies.existence.figures import draw_existence
 from gait_entrainment_studies.existence.stiffness_range import existence_map, stiffness_range
@@ -20,14 +21,14 @@ _POINTS = Setting("leg angles", int, least=2, most=100_000)
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    question.add_setting(parser, "points", _POINTS, "120")
+    cli.add_setting(parser, "points", _POINTS, "120")
     question.add_walker_options(parser)
-    question.add_output_options(parser, "draw the map into a folder")
+    cli.add_output_options(parser, "draw the map into a folder")
 
 
 def run(options: argparse.Namespace) -> int:
     """Print the range of the walker, and the map in JSON."""
-    walker = question.chosen(options, WalkerParameters)
+    walker = cli.chosen(options, WalkerParameters)
     own = stiffness_range(walker)
     ranges = existence_map(walker, _POINTS.parse("points", options.points))
     text = (
@@ -38,4 +39,4 @@ def run(options: argparse.Namespace) -> int:
         f" {sum(r.exists for r in ranges)} with a gait"
     )
     outcome = {"walker": asdict(own), "map": [asdict(r) for r in ranges]}
-    return question.answer(options, outcome, text, lambda out: draw_existence(ranges, walker, out))
+    return cli.answer(options, outcome, text, lambda out: draw_existence(ranges, walker, out))

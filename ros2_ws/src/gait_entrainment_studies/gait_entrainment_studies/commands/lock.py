@@ -4,13 +4,16 @@
 """entrain lock: all phase-locked gaits under one kind of pulse, solved."""
 
 import argparse
+import math
 from collections import Counter
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 from gait_entrainment.settings import Setting
+from gait_entrainment_commands import cli
 from gait_entrainment_studies.commands import question
-from gait_entrainment_studies.locking.branches import Piece, locked_gaits, pieces_of
+from gait_entrainment_studies.locking.branches import locked_gaits, pieces_of
 from gait_entrainment_studies.locking.figures import draw_branches
 from gait_entrainment_studies.locking.walked import shares_of
 
@@ -30,10 +33,10 @@ _PHASES = Setting("initial phases walked from", int, least=1, most=10_000)
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    question.add_setting(parser, "period_offset", question.PERIOD_OFFSET, "-0.05")
-    question.add_setting(parser, "phases", _PHASES, "32")
+    cli.add_setting(parser, "period_offset", question.PERIOD_OFFSET, "-0.05")
+    cli.add_setting(parser, "phases", _PHASES, "32")
     question.add_gait_options(parser)
-    question.add_output_options(parser, "draw the branches into a folder")
+    cli.add_output_options(parser, "draw the branches into a folder")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -49,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
         "pulse_period": period,
         "torque": gait.torque,
         "width": gait.width,
-        "branches": [_branch(piece) for piece in pieces],
+        "branches": [asdict(piece) for piece in pieces],
         "locked_gaits": [
             {
                 **asdict(lock),
@@ -60,21 +63,11 @@ def run(options: argparse.Namespace) -> int:
         ],
         "walked": {kind.value: count for kind, count in Counter(outcomes).items()},
     }
-    return question.answer(
-        options,
-        outcome,
-        _summary(outcome),
-        lambda folder: draw_branches(gait, pieces, locks, folder),
-    )
 
+    def draw(folder: Path) -> list[Path]:
+        return draw_branches(gait, pieces, locks, folder)
 
-def _branch(piece: Piece) -> dict[str, Any]:
-    """Return a piece as JSON holds it: None for the numbers of a gait that does not exist."""
-    ends = {
-        name: {key: None if value != value else value for key, value in asdict(end).items()}
-        for name, end in (("first", piece.first), ("last", piece.last))
-    }
-    return {**asdict(piece), **ends}
+    return cli.answer(options, outcome, _summary(outcome), draw)
 
 
 def _summary(outcome: dict[str, Any]) -> str:
@@ -88,7 +81,7 @@ def _summary(outcome: dict[str, Any]) -> str:
     ]
     for piece in outcome["branches"]:
         first, last = (
-            ("-" if end["period"] is None else f"{(end['period'] - unperturbed) * 1e3:+.6f}")
+            ("-" if math.isnan(end["period"]) else f"{(end['period'] - unperturbed) * 1e3:+.6f}")
             + f" ({end['border'].value})"
             for end in (piece["first"], piece["last"])
         )

@@ -7,7 +7,7 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import asdict
 
-from gait_entrainment_studies.commands import question
+from gait_entrainment_commands import cli
 from gait_entrainment_studies.paper.comparison import Comparison, compare, explain
 from gait_entrainment_studies.paper.figures import draw_figures
 
@@ -21,7 +21,7 @@ EXAMPLES = """examples:
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    question.add_output_options(parser, "draw the figures into a folder")
+    cli.add_output_options(parser, "draw the figures into a folder")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -33,9 +33,8 @@ def run(options: argparse.Namespace) -> int:
         "Explanations tested: Table 1 with k, mu or both as they may have been unrounded\n\n"
         f"{_table(explanations)}"
     )
-    return question.answer(
-        options, [asdict(row) for row in [*rows, *explanations]], text, draw_figures
-    )
+    outcome = [asdict(row) for row in [*rows, *explanations]]
+    return cli.answer(options, outcome, text, draw_figures)
 
 
 def _table(rows: Sequence[Comparison]) -> str:

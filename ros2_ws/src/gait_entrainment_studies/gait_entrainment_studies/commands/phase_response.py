@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from gait_entrainment.settings import Setting
+from gait_entrainment_commands import cli
 from gait_entrainment_studies.commands import question
 from gait_entrainment_studies.phase_response.figures import draw_response
 from gait_entrainment_studies.phase_response.response import (
@@ -36,11 +37,11 @@ _POINTS = Setting("points on each branch", int, least=2, most=100_000)
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    told, shown = question.PERIOD_OFFSET, "-0.05; may be given again"
-    question.add_setting(parser, "period_offset", told, shown=shown, action="append")
-    question.add_setting(parser, "points", _POINTS, "201")
+    shown = "-0.05; may be given again"
+    cli.add_setting(parser, "period_offset", question.PERIOD_OFFSET, shown=shown, action="append")
+    cli.add_setting(parser, "points", _POINTS, "201")
     question.add_gait_options(parser)
-    question.add_output_options(parser, "write curve and CSV to a folder")
+    cli.add_output_options(parser, "write curve and CSV to a folder")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -60,15 +61,14 @@ def run(options: argparse.Namespace) -> int:
         }
         for one in found
     ]
-    rows = [[None if np.isnan(x) else x for x in row] for row in curve.tolist()]
 
     def write(folder: Path) -> list[Path]:
         paths = [*draw_response(response, found, folder), folder / "phase_response.csv"]
         np.savetxt(paths[-1], curve, "%.12g", ",", header=_HEADER, comments="")
         return paths
 
-    outcome = {"columns": _COLUMNS, "curve": rows, "locks": locks}
-    return question.answer(options, outcome, _summary(response, found), write, "written          ")
+    outcome = {"columns": _COLUMNS, "curve": curve.tolist(), "locks": locks}
+    return cli.answer(options, outcome, _summary(response, found), write, "written          ")
 
 
 def _summary(response: PhaseResponse, found: Sequence[Prediction]) -> str:

@@ -16,8 +16,9 @@ from tqdm import tqdm
 
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment.settings import Setting
+from gait_entrainment_commands import cli
 from gait_entrainment_studies.commands import question
-from gait_entrainment_studies.sweep.engine import available_cores, by_processes, rows_by_dask
+from gait_entrainment_studies.sweep.engine import JOBS, by_processes, chosen_jobs, rows_by_dask
 from gait_entrainment_studies.sweep.figures import draw_locked_lags, draw_tongue
 from gait_entrainment_studies.sweep.plan import Axis, SweepPlan
 from gait_entrainment_studies.sweep.row import StableInterval, exact_borders, sweep_row
@@ -38,7 +39,6 @@ EXAMPLES = """examples:
   entrain sweep --out tongue --scheduler tcp://host:8786
 """
 
-_JOBS = Setting("processes; default: all cores", int, least=1, most=1000)
 _OFFSET = Setting("pulse period minus stride period", unit="s")
 _FRACTION = Setting("torque over the peak ankle torque", unit="1")
 _COUNT = Setting("number of values", int, least=1, most=10_000)
@@ -57,20 +57,20 @@ def add_options(parser: argparse.ArgumentParser) -> None:
             metavar=("MIN", "MAX", "COUNT"),
             help=f"{told.meaning} [{told.unit}]; default {' '.join(default)}",
         )
-    question.add_settings(parser, SweepPlan)
-    question.add_setting(parser, "jobs", _JOBS)
+    cli.add_settings(parser, SweepPlan)
+    cli.add_setting(parser, "jobs", JOBS)
     parser.add_argument("--scheduler", metavar="ADDRESS", help="use a Dask cluster instead")
     question.add_walker_options(parser)
-    question.add_output_options(parser, _OUT, Path("sweep"))
+    cli.add_output_options(parser, _OUT, Path("sweep"))
 
 
 def run(options: argparse.Namespace) -> int:
     """Sweep what is missing, join, draw."""
-    jobs = _JOBS.parse("jobs", options.jobs) if options.jobs else available_cores()
-    plan = question.chosen(
+    jobs = chosen_jobs(options.jobs)
+    plan = cli.chosen(
         options,
         SweepPlan,
-        walker=question.chosen(options, WalkerParameters),
+        walker=cli.chosen(options, WalkerParameters),
         period_offsets=_axis("period_offsets", _OFFSET, options.period_offsets),
         torque_fractions=_axis("torque_fractions", _FRACTION, options.torque_fractions),
     )
@@ -134,7 +134,7 @@ def _report(plan: SweepPlan, store: SweepStore, options: argparse.Namespace) -> 
         return [store.table_path, *draw_sweep(plan, table, borders, folder)]
 
     outcome = {re.sub(r"\W", "_", name): count for name, count in counts.items()}
-    return question.answer(
+    return cli.answer(
         options,
         {**outcome, "borders": [vars(one) for one in borders]},
         "\n".join(f"{name:25} {count}" for name, count in counts.items()),

@@ -57,7 +57,7 @@ class Outcome(str, Enum):
     FLEW_OFF = "flew off"
 
 
-_ENDINGS = {None: None, EndingKind.FALL: Outcome.FELL, EndingKind.FLY_OFF: Outcome.FLEW_OFF}
+ENDINGS = {EndingKind.FALL: Outcome.FELL, EndingKind.FLY_OFF: Outcome.FLEW_OFF}
 
 
 @dataclass(frozen=True)
@@ -113,33 +113,29 @@ class PulsedWalk:
 
 
 def walk_under_pulses(
-    parameters: WalkerParameters,
-    torque: float,
-    width: float,
-    period: float,
-    initial_phase: float,
-    strides: int,
+    gait: PulsedGait, period: float, initial_phase: float, strides: int
 ) -> PulsedWalk:
     """
-    Walk `strides` strides from the unperturbed gait with pulses on one leg.
+    Walk `strides` strides from the unperturbed gait with the gait's pulses on one leg.
 
-    Torque is in N m, width and period in s. The first pulse comes `initial_phase` of an
-    unperturbed stride after the leg's heel strike 0. Pulses begin and end on whole nanoseconds.
+    The period is in s. The first pulse comes `initial_phase` of an unperturbed stride after the
+    leg's heel strike 0. Pulses begin and end on whole nanoseconds.
     """
-    model, stride = _prepared(parameters)
+    model, stride = _prepared(gait.parameters)
     # Enough for strides a third longer than the pulse period or the walker's own.
     count = int(4 / 3 * (strides + 1) * max(stride / period, 1.0)) + 1
     # There are no pulses after the end of the clock.
     count = min(count, 1 + int(_CLOCK / period))
     onsets = np.rint(np.arange(count) * (min(period, _CLOCK) * 1e9)).astype(np.int64)
     onsets += nanoseconds(initial_phase * stride)
-    walked = walk(model, 2 * strides, Pulses(onsets, nanoseconds(width), torque))
+    pulses = Pulses(onsets, nanoseconds(gait.width), gait.torque)
+    walked = walk(model, 2 * strides, pulses)
     return PulsedWalk(
         period=period,
         heel_strikes=walked.heel_strikes[::2],
         toe_offs=walked.toe_offs[1::2],
         onsets=onsets[: np.searchsorted(onsets, walked.heel_strikes[-1] * 1e9)] * 1e-9,
-        ending=_ENDINGS[walked.ending],
+        ending=None if walked.ending is None else ENDINGS[walked.ending],
     )
 
 
@@ -165,9 +161,7 @@ def shares_of(
     for phase in np.arange(phases) / phases:
         strides = min(enough, _LONGEST)
         while True:
-            walked = walk_under_pulses(
-                gait.parameters, gait.torque, gait.width, period, float(phase), strides
-            )
+            walked = walk_under_pulses(gait, period, float(phase), strides)
             outcome = walked.outcome()
             if outcome is not Outcome.CENSORED or strides >= _LONGEST:
                 break

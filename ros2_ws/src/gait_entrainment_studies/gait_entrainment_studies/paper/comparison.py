@@ -29,6 +29,7 @@ from gait_entrainment_studies.locking.pulsed_gait import Place, PulsedGait
 from gait_entrainment_studies.locking.walked import Outcome
 from gait_entrainment_studies.paper.experiments import (
     PULSE_WIDTH,
+    TABLE_1,
     floquet_by_convergence,
     floquet_by_differences,
     least_force,
@@ -37,7 +38,6 @@ from gait_entrainment_studies.paper.experiments import (
     paper_walk,
 )
 
-TABLE_1 = WalkerParameters()
 STATEMENTS = yaml.safe_load(Path(__file__).with_name("statements.yaml").read_text())
 _ROUNDED = "k and mu are rounded in Table 1: see the table of explanations"
 
@@ -59,9 +59,9 @@ class Comparison:
 
 def compare() -> list[Comparison]:
     """Return all comparisons, for Table 1."""
-    rows = [*_gait(TABLE_1), *_entrainment(TABLE_1)]
+    rows = [*_gait(), *_entrainment()]
     for steps, every in ((2, "pulse in every stride"), (1, "pulse in every step")):
-        rows += _speed_curve(TABLE_1, steps, every)
+        rows += _speed_curve(steps, every)
     return rows
 
 
@@ -86,9 +86,9 @@ def _rows(group: str, found: Mapping[str, Found], **words: Any) -> list[Comparis
     return rows
 
 
-def _gait(p: WalkerParameters) -> list[Comparison]:
-    step = paper_pulses(p).unperturbed_period / 2
-    force, instant = least_force(p)
+def _gait() -> list[Comparison]:
+    p, step = TABLE_1, paper_pulses().unperturbed_period / 2
+    force, instant = least_force()
     later = f"{instant:.4f} s into the step"
     found: dict[str, Found] = {
         "step": step,
@@ -98,23 +98,23 @@ def _gait(p: WalkerParameters) -> list[Comparison]:
         "force": force,
         "place": later if instant else "beginning of double stance",
         "closed_form": p.floquet_multiplier,
-        "differences": floquet_by_differences(p),
-        "convergence": floquet_by_convergence(p),
+        "differences": floquet_by_differences(),
+        "convergence": floquet_by_convergence(),
     }
     return _rows("gait", found, rounded=_ROUNDED)
 
 
-def _entrainment(p: WalkerParameters) -> list[Comparison]:
-    gait = paper_pulses(p)
+def _entrainment() -> list[Comparison]:
+    gait = paper_pulses()
     period = gait.unperturbed_period
     pieces = pieces_of(gait)
     shortest, longest = _basin(gait, pieces)
     # At exactly 2 tau_0 every onset at which the pulse does nothing repeats itself: no lock.
     grid = np.concatenate([np.arange(-100, 0, 2), np.arange(2, 101, 2)])
-    outcomes = outcomes_along(p, grid * 1e-3, np.array([0.0, 0.25, 0.5, 0.75]))
+    outcomes = outcomes_along(grid * 1e-3, np.array([0.0, 0.25, 0.5, 0.75]))
     locked = [int(grid[i]) for i, one in enumerate(outcomes) if one is Outcome.LOCKED]
     least, coarse = min(locked), min(ms for ms in locked if ms % 4 == 0)
-    walks = [paper_walk(p, -0.05, phase, 120) for phase in np.arange(24) / 24]
+    walks = [paper_walk(-0.05, phase, 120) for phase in np.arange(24) / 24]
     lags = np.array([walk.lags[-1] for walk in walks])
     lock = next(one for one in locked_gaits(gait, period - 0.05, pieces) if one.stable)
     last = float(walks[0].stride_periods[-1])
@@ -147,13 +147,13 @@ def _entrainment(p: WalkerParameters) -> list[Comparison]:
     )
 
 
-def _speed_curve(p: WalkerParameters, steps: int, every: str) -> list[Comparison]:
+def _speed_curve(steps: int, every: str) -> list[Comparison]:
     """Fig. 8, with the pulse in every stride (as in the experiments) or in every step."""
-    gait = paper_pulses(p, steps)
+    gait = paper_pulses(steps_per_pulse=steps)
     pieces = pieces_of(gait)
     shortest, longest = _basin(gait, pieces)
-    slowest = steps * p.step_length / max(piece.greatest_period.period for piece in pieces)
-    fastest = steps * p.step_length / min(piece.least_period.period for piece in pieces)
+    slowest = steps * TABLE_1.step_length / max(piece.greatest_period.period for piece in pieces)
+    fastest = steps * TABLE_1.step_length / min(piece.least_period.period for piece in pieces)
     early = next(piece for piece in pieces if piece.stable and piece.place is Place.INSIDE)
     low, high = early.least_period, early.greatest_period
     width = high.period - low.period
@@ -161,7 +161,7 @@ def _speed_curve(p: WalkerParameters, steps: int, every: str) -> list[Comparison
         "slowest": slowest,
         "fastest": fastest,
         "range": 100 * (fastest / slowest - 1),
-        "width": 100 * width / paper_pulses(p).unperturbed_period,
+        "width": 100 * width / paper_pulses().unperturbed_period,
         "ratio": (longest - shortest) / width,
         # Speed falls while the period grows.
         "signs": " ".join("-" if one.last.period > one.first.period else "+" for one in pieces),
@@ -185,8 +185,8 @@ def explain() -> list[Comparison]:
     """
     p, degrees = TABLE_1, math.radians(147.6)
     turned = replace(p, max_plantarflexion=degrees)
-    both = replace(turned, ankle_stiffness=_stiffness_of_torque(turned, 0.17))
-    stiffness = _stiffness_of_torque(p, 0.17)
+    both = replace(turned, ankle_stiffness=_stiffness_of_torque(turned))
+    stiffness = _stiffness_of_torque(p)
     rows = _rows("unrounded", {"stiffness": stiffness, "degrees": degrees})
     variants = {"k": replace(p, ankle_stiffness=stiffness), "mu": turned, "both": both}
     for name, one in variants.items():
@@ -202,9 +202,9 @@ def explain() -> list[Comparison]:
     return [*rows, *_rows("both", {"basin": 100 * (longest - shortest) / gait.unperturbed_period})]
 
 
-def _stiffness_of_torque(p: WalkerParameters, fraction: float) -> float:
-    """Stiffness [N m/rad] whose peak torque is this fraction of body weight times leg length."""
-    torque = fraction * p.mass * p.gravity * p.leg_length
+def _stiffness_of_torque(p: WalkerParameters) -> float:
+    """Stiffness [N m/rad] whose peak torque is 0.17 of body weight times leg length."""
+    torque = 0.17 * p.mass * p.gravity * p.leg_length
     return torque / (p.max_plantarflexion - p.double_stance_start)
 
 

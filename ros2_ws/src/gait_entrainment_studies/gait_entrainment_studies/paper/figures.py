@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from gait_entrainment.conventions import Side
-from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment_commands import drawing
 from gait_entrainment_commands.drawing import BESIDE, BLACK, COLOURS, DASHES, GREY, ORANGE
 from gait_entrainment_studies.locking.branches import branches_of
 from gait_entrainment_studies.locking.figures import PLACE_COLOURS
 from gait_entrainment_studies.paper.experiments import (
+    TABLE_1,
     paper_pulses,
     paper_walk,
     speeds_after_collisions,
@@ -37,17 +37,17 @@ def draw_figures(folder: Path) -> list[Path]:
     }
     paths = []
     for name, draw in figures.items():
-        paths += drawing.save_figure(draw(WalkerParameters()), folder, name)
+        paths += drawing.save_figure(draw(), folder, name)
     return paths
 
 
-def _convergence(p: WalkerParameters) -> Any:
+def _convergence() -> Any:
     """Fig. 4: errors of the angular velocity after the collisions."""
     figure, axes = drawing.new_figure()
-    fixed, steps = p.speed_after_collision, 6
+    fixed, steps = TABLE_1.speed_after_collision, 6
     for factor, colour, dash in zip((1.2, 1.1, 1.05, 0.95, 0.9), COLOURS, DASHES, strict=False):
-        speeds = speeds_after_collisions(p, factor * fixed, steps)
-        errors = (np.array([factor * fixed, *speeds]) - fixed) / p.leg_length
+        speeds = speeds_after_collisions(factor * fixed, steps)
+        errors = (np.array([factor * fixed, *speeds]) - fixed) / TABLE_1.leg_length
         # Walking on, the angle theta falls: the angular velocity is negative.
         label = f"initial error {-errors[0]:+.3f} rad/s"
         axes.plot(range(errors.size), -errors, "o", ls=dash, color=colour, ms=4, label=label)
@@ -58,17 +58,17 @@ def _convergence(p: WalkerParameters) -> Any:
     return figure
 
 
-def _entrainment(p: WalkerParameters) -> Any:
+def _entrainment() -> Any:
     """Fig. 5: stride period against stride number, entrained and, one below another, not."""
     shares = [4.0] + [1.0] * len(_NOT_ENTRAINED)
     figure, (above, *below) = drawing.new_figure(
         len(shares), size=(7.2, 9.0), sharex=True, height_ratios=shares
     )
-    period = paper_pulses(p).unperturbed_period
+    period = paper_pulses().unperturbed_period
     panels = [above] * len(_ENTRAINED) + below
     lines = zip(_ENTRAINED + _NOT_ENTRAINED, 2 * COLOURS[:5], 2 * DASHES[:5], strict=True)
     for axes, (offset, colour, dash) in zip(panels, lines, strict=True):
-        strides = paper_walk(p, offset * 1e-3, 0.9, 110).stride_periods[:100]
+        strides = paper_walk(offset * 1e-3, 0.9, 110).stride_periods[:100]
         label = rf"$\tau_p = 2\tau_0 {offset:+d}$ ms"
         number = np.arange(1, strides.size + 1)
         style = {"ls": dash} if axes is above else {}
@@ -90,13 +90,13 @@ def _entrainment(p: WalkerParameters) -> Any:
     return figure
 
 
-def _phase_locking(p: WalkerParameters) -> Any:
+def _phase_locking() -> Any:
     """Fig. 6b: pulse onset after toe-off, from many initial phases."""
     figure, axes = drawing.new_figure()
     axes.axhline(0, color=GREY, ls="--", lw=1.0)
     axes.annotate("toe-off", (60, 0), textcoords="offset points", xytext=(-40, 4), color=GREY)
     for i, phase in enumerate(np.arange(16) / 16):
-        lags = paper_walk(p, -0.05, float(phase), 62).lags[:61]
+        lags = paper_walk(-0.05, float(phase), 62).lags[:61]
         # Break the line where the lag wraps by a stride.
         lags = np.where(np.abs(np.diff(lags, prepend=lags[0])) > 1, np.nan, lags)
         axes.plot(lags, color=COLOURS[i % len(COLOURS)], ls=DASHES[i // 6], lw=1.1)
@@ -107,13 +107,13 @@ def _phase_locking(p: WalkerParameters) -> Any:
     return figure
 
 
-def _torque_profiles(p: WalkerParameters) -> Any:
+def _torque_profiles() -> Any:
     """Fig. 7: torque of the trailing ankle, stride by stride."""
     count = 20
-    walk = paper_walk(p, -0.05, 0.86, count + 2)
+    walk = paper_walk(-0.05, 0.86, count + 2)
     figure, axes = drawing.new_figure(size=(7.2, 7.0))
-    spacing = 0.62 * p.peak_torque
-    for number, (time, samples) in enumerate(torque_profiles(p, walk, 1200)[:count], start=1):
+    spacing = 0.62 * TABLE_1.peak_torque
+    for number, (time, samples) in enumerate(torque_profiles(walk, 1200)[:count], start=1):
         base = -number * spacing
         ankle = samples.effort[:, 2 + Side.RIGHT]
         delivered = samples.delivered_torque[:, Side.RIGHT]
@@ -145,15 +145,15 @@ def _torque_profiles(p: WalkerParameters) -> Any:
     return figure
 
 
-def _speed_curve(p: WalkerParameters) -> Any:
+def _speed_curve() -> Any:
     """Fig. 8: average speed against the onset of the pulse after the start of double stance."""
     figure, axes = drawing.new_figure()
     for steps, dash, every in ((2, "-", "stride"), (1, "--", "step")):
-        gait = paper_pulses(p, steps)
-        slowest = steps * p.step_length / gait.unperturbed_period
+        gait = paper_pulses(steps_per_pulse=steps)
+        slowest = steps * TABLE_1.step_length / gait.unperturbed_period
         for place, first, last, _ in branches_of(gait):
             gaits = gait.gaits(place, np.linspace(first, last, 100))
-            speed = steps * p.step_length / gaits.period
+            speed = steps * TABLE_1.step_length / gaits.period
             axes.plot(gaits.onset, speed, color=PLACE_COLOURS[place], ls=dash, lw=1.8)
         axes.plot([], [], color=BLACK, ls=dash, label=f"pulse in every {every}")
     toe_off = float(gaits.double_stance[-1])

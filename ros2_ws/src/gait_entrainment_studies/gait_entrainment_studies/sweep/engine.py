@@ -18,9 +18,11 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
+from gait_entrainment.settings import Setting
 from gait_entrainment_studies.sweep.plan import SweepError, SweepPlan
 from gait_entrainment_studies.sweep.row import Row, sweep_row
 
+JOBS = Setting("processes; default: all cores", int, least=1, most=1000)
 # A scheduler that does not answer within this time [s] is reported.
 SCHEDULER_TIMEOUT = 6.0
 
@@ -28,9 +30,9 @@ Rows = Iterator[tuple[int, Row]]
 Made = TypeVar("Made")
 
 
-def available_cores() -> int:
-    """Return the number of cores that this process may use."""
-    return len(os.sched_getaffinity(0))
+def chosen_jobs(text: str | None) -> int:
+    """Return the number of JOBS that is given; without one, of the cores of this process."""
+    return len(os.sched_getaffinity(0)) if text is None else int(JOBS.parse("jobs", text))
 
 
 def by_processes(

@@ -66,16 +66,16 @@ def sweep_row(plan: SweepPlan, index: int) -> Row:
         elif abs(period - gait.unperturbed_period) < _CREEP:
             walked = {"problem": "the stride period itself: a pulse in swing stays where it is"}
         else:
-            walked = _walked(plan, torque, period)
+            walked = _walked(plan, gait, period)
         cells.append(Cell(torque, fraction, float(offset), locks, **walked))
     names = [field.name for field in fields(Cell)]
     return {name: np.array([getattr(cell, name) for cell in cells]) for name in names}
 
 
-def _walked(plan: SweepPlan, torque: float, period: float) -> dict[str, float]:
+def _walked(plan: SweepPlan, gait: PulsedGait, period: float) -> dict[str, float]:
     """Return the fields of a cell that walks from every initial phase give."""
     walks = [
-        walk_under_pulses(plan.walker, torque, plan.width, period, float(phase), plan.strides)
+        walk_under_pulses(gait, period, float(phase), plan.strides)
         for phase in np.arange(plan.phases) / plan.phases
     ]
     outcomes = [walk.outcome(_CREEP) for walk in walks]

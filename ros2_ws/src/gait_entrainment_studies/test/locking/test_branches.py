@@ -100,24 +100,21 @@ def test_dorsiflexion_pulses_lock_to_longer_periods_where_they_are_solved_to():
     assert [lock.place for lock in stable] == [Place.EARLY]
     _, drawn = shares_of(gait, period, stable, 8)
     assert list(drawn.values()) == [1.0]
-    walk = walk_under_pulses(TABLE_1, gait.torque, 0.1, period, 0.3, 200)
+    walk = walk_under_pulses(gait, period, 0.3, 200)
     # To the end of the walk, though its strides are longer than the unperturbed ones.
     assert walk.lags[-1] == pytest.approx(stable[0].lag, abs=5e-9)
 
 
 def test_a_walk_too_short_to_slip_through_is_censored_not_failed():
     period = GAIT.unperturbed_period + 0.01
-    outcomes = [
-        walk_under_pulses(TABLE_1, GAIT.torque, 0.1, period, 0.3, strides).outcome()
-        for strides in (50, 300)
-    ]
+    outcomes = [walk_under_pulses(GAIT, period, 0.3, strides).outcome() for strides in (50, 300)]
     assert outcomes == [Outcome.CENSORED, Outcome.SLIPPING]
 
 
 def test_beyond_the_flip_every_other_stride_is_alike():
-    torque = 0.25 * TABLE_1.peak_torque
+    strong = PulsedGait(TABLE_1, 0.25 * TABLE_1.peak_torque, 0.1)
     period = GAIT.unperturbed_period - 0.03
-    walk = walk_under_pulses(TABLE_1, torque, 0.1, period, 0.3, 1000)
+    walk = walk_under_pulses(strong, period, 0.3, 1000)
     assert walk.outcome() is Outcome.ALTERNATING
     assert abs(walk.lags[-1] - walk.lags[-2]) > 1e-3
 
@@ -138,7 +135,7 @@ def test_every_border_is_where_the_walkers_poincare_map_has_it(fraction):
 
 def test_a_walk_with_a_pulse_or_two_is_not_called_locked():
     for period in (150.0, 1e3, 1e10, 1e300):
-        walk = walk_under_pulses(TABLE_1, GAIT.torque, GAIT.width, period, 0.0, 100)
+        walk = walk_under_pulses(GAIT, period, 0.0, 100)
         assert walk.outcome() in (Outcome.CENSORED, Outcome.SLIPPING)
 
 

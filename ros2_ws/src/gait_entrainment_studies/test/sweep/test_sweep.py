@@ -18,6 +18,7 @@ import pytest
 from gait_entrainment.errors import UsageError
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment_commands import main
+from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
 from gait_entrainment_studies.locking.walked import Outcome, walk_under_pulses
 from gait_entrainment_studies.sweep import engine
 from gait_entrainment_studies.sweep.engine import by_processes, rows_by_dask
@@ -49,10 +50,8 @@ def same(left, right):
 def test_a_cell_is_what_its_walks_are():
     row = sweep_row(plan_of(), 1)
     period = 1.9332295304390836 - 0.05
-    walks = [
-        walk_under_pulses(TABLE_1, row["torque"][2], 0.1, period, phase, 120)
-        for phase in (0.0, 0.25, 0.5, 0.75)
-    ]
+    gait = PulsedGait(TABLE_1, row["torque"][2], 0.1)
+    walks = [walk_under_pulses(gait, period, phase, 120) for phase in (0.0, 0.25, 0.5, 0.75)]
     locked = [walk.outcome() is Outcome.LOCKED for walk in walks]
     assert row["period_offset"][2] == pytest.approx(-0.05)
     assert row["share_locked"][2] == np.mean(locked) == 1.0
