@@ -129,12 +129,18 @@ class WalkerSim(Participant):
         due_at = time.monotonic_ns() + start - time.time_ns() + delay
         return RealTimeRun(number, walker, start, due_at=due_at)
 
-    def new_walk(self) -> WalkerRun:
-        """Return the walk of a run."""
+    def new_walk(self, kind: type[WalkerRun] = WalkerRun, **more: Any) -> WalkerRun:
+        """Return the walk of a run, of a kind that may take ``more``."""
         settings = self.settings
-        rate, first = settings.sample_rate, settings.first_heel_strike
-        both = settings.both_ankles
-        return WalkerRun(self.walker, first, rate, self.variation, settings.seed, both_ankles=both)
+        return kind(
+            self.walker,
+            settings.first_heel_strike,
+            settings.sample_rate,
+            self.variation,
+            settings.seed,
+            both_ankles=settings.both_ankles,
+            **more,
+        )
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Any:
         if self.run is not None:
