@@ -6,7 +6,7 @@
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 from gait_entrainment.robot.contract import Capabilities
 from gait_entrainment.robot.faults import Fault
@@ -36,7 +36,6 @@ class TorqueDevice(ABC):
     torque that it sends had an effect: ask first, then command, if the device gives the choice.
     """
 
-    Options: ClassVar[type[Any]]
     name: str  # what it is called in messages, such as "motor 1"
     address: str  # what nobody else may open meanwhile, such as "motor 1 on can0"
     capabilities: Capabilities
