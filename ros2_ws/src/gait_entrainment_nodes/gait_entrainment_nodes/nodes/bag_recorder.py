@@ -40,7 +40,6 @@ from gait_entrainment_msgs.msg import Progress, PublishedCounts
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.raw_messages import message_class
 from gait_entrainment_nodes.nodes.late import raw_reader
-from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.parameters import texts
 from gait_entrainment_nodes.nodes.participant import Participant
 from gait_entrainment_nodes.nodes.rclpy_internals import RawReader
@@ -92,8 +91,7 @@ class BagRecorder(Participant):
     settings: Settings
 
     def __init__(self) -> None:
-        super().__init__("bag_recorder")
-        self.begin_participation(settings=Settings, fixed=settings_of(Settings))
+        super().__init__("bag_recorder", settings=Settings, fixed=settings_of(Settings))
         self._chosen, self._expected = set(self.settings.topics), set(self.settings.publishers)
         self._bag = self._make_bag()
         # Ready means, for this topic too, that everyone will hear: the walker waits for it.
@@ -427,6 +425,4 @@ def _offered(profile: QoSProfile) -> OfferedQos:
     )
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node(BagRecorder)
+main = BagRecorder.main

@@ -20,7 +20,6 @@ from gait_entrainment_bags.messages import nanoseconds_of
 from gait_entrainment_msgs import msg
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.sensors import SensorWriter
-from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.walker_run import Stretch, WalkerRun
 from gait_entrainment_nodes.nodes.walker_sim import WalkerSim
 from gait_entrainment_nodes.nodes.walker_sim_run import Run
@@ -122,6 +121,4 @@ class SensorSim(WalkerSim):
         super().send_progress(run, progress)
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node(SensorSim)
+main = SensorSim.main
