@@ -25,7 +25,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
-from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, nanoseconds_of
 from gait_entrainment.robot.faults import DeviceError, Fault, LimitError
 from gait_entrainment.settings import setting
 from gait_entrainment_drivers.device import Reading, TorqueDevice
@@ -162,7 +162,7 @@ class EffortJoint(TorqueDevice):
         now = time.time_ns()
 
         def fresh() -> bool:
-            return self._state is not None and _stamp(self._state) >= now
+            return self._state is not None and nanoseconds_of(self._state.header.stamp) >= now
 
         self._state = None
         self._client.wait(fresh, _FRESH_STATE_TIMEOUT)
@@ -182,7 +182,8 @@ class EffortJoint(TorqueDevice):
         """Take a fresh state that has the joint in it; others are nobody's business."""
         if self._options.joint not in message.name:
             return
-        self._age = (time.time_ns() - _stamp(message)) / NANOSECONDS_PER_SECOND
+        age = time.time_ns() - nanoseconds_of(message.header.stamp)
+        self._age = age / NANOSECONDS_PER_SECOND
         if abs(self._age) < self._options.silence:
             self._place = list(message.name).index(self._options.joint)
             self._state = message
@@ -241,10 +242,6 @@ class EffortJoint(TorqueDevice):
         if not self._client.wait(future.done, _SERVICE_TIMEOUT):
             raise DeviceError("controller_manager does not answer: see whether it runs")
         return future.result()
-
-
-def _stamp(message: JointState) -> int:
-    return message.header.stamp.sec * NANOSECONDS_PER_SECOND + message.header.stamp.nanosec
 
 
 class Ros2ControlRobot(HostTimedRobot):

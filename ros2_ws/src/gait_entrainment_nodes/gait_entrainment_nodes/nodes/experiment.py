@@ -169,7 +169,7 @@ class Experiment(Participant):
             self.publish(topics.EXPERIMENT_STATE, run.state(Part.FINISHED, result.message))
             self.note_state(DiagnosticStatus.OK, f"run {run.number} finished")
         except (ExperimentError, ProtocolError) as failure:
-            result.message, result.blamed = str(failure), getattr(failure, "blamed", "")
+            result.message, result.blamed = str(failure), getattr(failure, "node", "")
             await self._give_up(run, result.message)
             if self._server.cancelled:
                 result.outcome = result.CANCELLED
@@ -242,7 +242,7 @@ class Experiment(Participant):
             except ExperimentError as missing:
                 if time.monotonic() > give_up:
                     what = f"not ready within {timeout:g} s: {missing}"
-                    raise ExperimentError(what, missing.blamed) from None
+                    raise ExperimentError(what, missing.node) from None
             await self._waiting.tick()
 
     async def _activate_perturbator(self, run: Run) -> None:
