@@ -33,14 +33,8 @@ from gait_entrainment_nodes.messaging.raw_messages import serialize
 from gait_entrainment_nodes.messaging.topics import JOINT_STATES
 
 
-class Source(Participant):
-    def __init__(self):
-        super().__init__("source")
-        self.begin_participation()
-
-
 rclpy.init()
-node = Source()
+node = Participant("source")
 publisher = node.offer(JOINT_STATES)
 names = ["l_hip", "r_hip", "l_ankle", "r_ankle"]
 data = serialize(JointState(name=names, position=[0.0] * 4, velocity=[0.0] * 4, effort=[0.0] * 4))

@@ -94,13 +94,8 @@ class PneumaticAnkleRobot(AnkleRobot):
         self._stopped = True
         self._train = None
 
-    def deactivate(self) -> None:
-        """Vent."""
-        self._train = None
-
-    def close(self) -> None:
-        """Vent."""
-        self._train = None
+    # There is nothing to switch off or to let go of.
+    deactivate = close = cancel
 
     def _changes(self, begin: int, until: int) -> Iterator[tuple[int, float]]:
         """Yield instant [ns] and torque [N m] of each change of torque, and note the states."""

@@ -17,7 +17,6 @@ import select
 import sys
 import time
 import tty
-from collections.abc import Sequence
 
 from serial_ankle_robot.frames import (
     DRIVER_FAULT,
@@ -68,7 +67,7 @@ class EmulatedRobot:
         return reply
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main() -> int:
     """Run the emulator until it is terminated."""
     parser = argparse.ArgumentParser(
         "serial_ankle_emulator",
@@ -78,7 +77,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--bandwidth", type=float, default=30.0, help="of the torque [Hz]")
     parser.add_argument("--timeout", type=float, default=0.0, help="of its watchdog [s]; 0: off")
     parser.add_argument("--fault-after", type=float, help="from the first torque to a fault [s]")
-    options = parser.parse_args(arguments)
+    options = parser.parse_args()
     ours, theirs = pty.openpty()
     tty.setraw(theirs)  # kept open: a driver that closes the line leaves the robot running
     with contextlib.suppress(PermissionError):  # it stands for hardware, which waits for nobody

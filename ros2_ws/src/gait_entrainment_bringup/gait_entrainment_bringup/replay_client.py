@@ -6,6 +6,7 @@
 from std_srvs.srv import Trigger
 from tqdm import tqdm
 
+from gait_entrainment_bringup.node_list import REPLAY_NODES
 from gait_entrainment_bringup.supervisor import Supervisor
 from gait_entrainment_bringup.watch import Watch
 from gait_entrainment_msgs.msg import PublishedCounts
@@ -13,15 +14,8 @@ from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.client import TIMEOUT, Client
 from gait_entrainment_nodes.messaging.errors import SilenceError
 from gait_entrainment_nodes.messaging.player_services import srv
-from gait_entrainment_nodes.messaging.topics import (
-    ENTRAINMENT,
-    PUBLISHED_COUNTS,
-    PULSE_PHASES,
-    STRIDES,
-)
-
-RESULTS = (STRIDES, PULSE_PHASES, ENTRAINMENT)
-NODES = ("gait_analyzer", "bag_player")
+from gait_entrainment_nodes.messaging.topics import PUBLISHED_COUNTS, STRIDES
+from gait_entrainment_nodes.nodes.gait_analyzer_run import RESULTS
 
 
 class ReplayClient(Client):
@@ -37,17 +31,19 @@ class ReplayClient(Client):
         super().__init__("entrain_replay", namespace=namespace)
         self._supervisor, self._beneath, self._recorded = supervisor, f"{namespace}/", recorded
         self._counts: dict[str, int] | None = None  # of messages that the analyzer has published
-        self.results: dict[str, list[bytes]] = {topic.name: [] for topic in RESULTS}
-        for topic in RESULTS:
+        self.results: dict[str, list[bytes]] = {topic.name: [] for topic in RESULTS.values()}
+        for topic in RESULTS.values():
             self.subscribe(topic, self.results[topic.name].append, raw=True)
         self.subscribe(PUBLISHED_COUNTS, self._on_counts)
         # Player and recorder end by themselves once everything was played and recorded.
         may_end = ("bag_player", "bag_recorder")
-        self.each_round = Watch(self, supervisor, may_end=may_end, asked=NODES, silence=TIMEOUT)
+        self.each_round = Watch(
+            self, supervisor, may_end=may_end, asked=REPLAY_NODES, silence=TIMEOUT
+        )
 
     def play(self, *, quiet: bool) -> None:
         """Play the bag, wait for all that the analyzer makes of it; NodeError if a node fails."""
-        for node in NODES:
+        for node in REPLAY_NODES:
             self.call(Ready, f"{node}/ready", accept=self._all_listen)
         self.call(srv.Resume, "bag_player/resume")
         bar = tqdm(desc="replay", unit="stride", disable=True if quiet else None, leave=False)

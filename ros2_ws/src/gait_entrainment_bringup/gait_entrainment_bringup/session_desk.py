@@ -21,7 +21,6 @@ from gait_entrainment.settings import setting, settings_of
 from gait_entrainment_msgs.msg import Note
 from gait_entrainment_msgs.srv import AskSession
 from gait_entrainment_nodes.messaging import topics
-from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.participant import Participant
 from gait_entrainment_sessions.folder import SessionFolder
 from gait_entrainment_sessions.session_file import SessionError
@@ -44,8 +43,7 @@ class SessionDesk(Participant):
     real_time = False  # it waits for nobody, but its turn does not come before that of others
 
     def __init__(self) -> None:
-        super().__init__("session")
-        self.begin_participation(settings=Settings, fixed=settings_of(Settings))
+        super().__init__("session", settings=Settings, fixed=settings_of(Settings))
         self._folder, self._due = SessionFolder(Path(self.settings.folder)), 0.0
         self.subscribe(topics.OPERATOR_NOTES, self._on_note)
         for name in ("pause", "go_on", "repeat"):
@@ -94,6 +92,4 @@ class SessionDesk(Participant):
         self.note_state(level, self._folder.standing())
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node(SessionDesk)
+main = SessionDesk.main

@@ -4,7 +4,6 @@
 """ak_motor_emulator: the motor's side of MIT mode, as a process. See motor_emulator.py."""
 
 import sys
-from collections.abc import Sequence
 
 from gait_entrainment_drivers import ak_mit
 from gait_entrainment_drivers.motor_emulator import EmulatedMotor, Frames, run_emulator
@@ -49,7 +48,7 @@ class EmulatedAkMotor(EmulatedMotor):
         return ak_mit.pack_reply(reply, self.motor, self._reply_bytes)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main() -> int:
     """Run the emulator."""
     return run_emulator(
         "ak_motor_emulator",
@@ -61,7 +60,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
             options.timeout,
             options.reply_bytes,
         ),
-        arguments,
         motor={"choices": ak_mit.MOTORS, "default": "AK80-9", "help": "type of the motor"},
         motor_id={"type": int, "default": 1, "help": "1 to 127"},
         reply_bytes={"type": int, "choices": (6, 8), "default": 8, "help": "length of a reply"},

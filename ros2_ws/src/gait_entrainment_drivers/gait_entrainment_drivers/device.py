@@ -6,7 +6,7 @@
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 from gait_entrainment.robot.contract import Capabilities
 from gait_entrainment.robot.faults import Fault
@@ -28,24 +28,7 @@ class TorqueDevice(ABC):
     One device that takes a torque command and answers with a reading.
 
     All methods are called from one thread of a process of its own (torque_loop.py), where nothing
-    else runs. The constructor is also called in the robot's process, for the capabilities: it
-    touches no hardware.
-
-    =========  =======================================================  ==========================
-    method     must                                                     may raise
-    =========  =======================================================  ==========================
-    open       connect, and see that the right device answers           DeviceError
-    enable     enable the device at zero torque                         DeviceError
-    exchange   send a torque, return the answer or None if none came    anything: the loop counts
-               in time; return within ``timeout``                      it as silence, goes on
-                                                                        sending zero and reports
-                                                                        the text
-    forget     drop answers that have come and were not read: the loop  as exchange
-               was held up, and they are old
-    disable    disable the device, whose torque is zero already         anything: ignored
-    shut       release everything; bears being called twice, and        anything: ignored
-               without ``open``
-    =========  =======================================================  ==========================
+    else runs. The constructor is also called in the robot's process, for the capabilities.
 
     The loop sends the last zero: before ``disable`` it exchanges zero torque until the reading has
     run down. A device must go to zero by itself when commands stop; no software on the host can
@@ -53,7 +36,6 @@ class TorqueDevice(ABC):
     torque that it sends had an effect: ask first, then command, if the device gives the choice.
     """
 
-    Options: ClassVar[type[Any]]
     name: str  # what it is called in messages, such as "motor 1"
     address: str  # what nobody else may open meanwhile, such as "motor 1 on can0"
     capabilities: Capabilities
@@ -65,24 +47,29 @@ class TorqueDevice(ABC):
 
     @abstractmethod
     def open(self) -> None:
-        """Connect, and see that the right device answers."""
+        """Connect, and see that the right device answers; may raise DeviceError."""
 
     @abstractmethod
     def enable(self) -> None:
-        """Enable the device at zero torque."""
+        """Enable the device at zero torque; may raise DeviceError."""
 
     @abstractmethod
     def exchange(self, torque: float, timeout: float) -> Reading | None:
-        """Send a torque [N m]; return the answer, or None if none comes in time [s]."""
+        """
+        Send a torque [N m]; return the answer, or None if none comes within ``timeout`` [s].
+
+        May raise anything: the loop counts it as silence, goes on sending zero and reports the
+        text.
+        """
 
     @abstractmethod
     def forget(self) -> None:
-        """Drop answers that have come and were not read."""
+        """Drop answers that were not read: the loop was held up. May raise as ``exchange``."""
 
     @abstractmethod
     def disable(self) -> None:
-        """Disable the device, whose torque is zero."""
+        """Disable the device, whose torque is zero; what is raised is ignored."""
 
     @abstractmethod
     def shut(self) -> None:
-        """Release everything."""
+        """Release everything, also twice or without ``open``; what is raised is ignored."""

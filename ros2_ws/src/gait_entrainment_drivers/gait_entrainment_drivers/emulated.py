@@ -23,9 +23,8 @@ once. Noise is white.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -37,8 +36,7 @@ from gait_entrainment.robot.simulated import SimulatedRobot
 from gait_entrainment.settings import Checked, setting
 
 _TICK = 1_000_000  # of the device's torque loop [ns]
-# Bounds of random numbers drawn ahead at a time: a generator call per tick would be slow.
-_BLOCK = 1024
+_BLOCK = 1024  # random numbers that are drawn at a time
 
 
 @dataclass(frozen=True)
@@ -96,8 +94,8 @@ class EmulatedAnkleRobot(SimulatedRobot):
         super().begin(start)
         jitter, loss, noise = np.random.SeedSequence(self._seed).spawn(3)
         self._jitter = np.random.default_rng(jitter)
-        self._loss = _Draws(np.random.default_rng(loss).random)
-        self._noise = _Draws(np.random.default_rng(noise).standard_normal)
+        self._loss = _draws(np.random.default_rng(loss).random)
+        self._noise = _draws(np.random.default_rng(noise).standard_normal)
         self._start = start
         self._tick = 0  # the next one
 
@@ -127,7 +125,7 @@ class EmulatedAnkleRobot(SimulatedRobot):
         """Run the device's torque loop once, at a tick [ns]."""
         options = self._options
         asked = self._asked(instant - self._delay)
-        if self._loss.next() >= options.loss:
+        if next(self._loss) >= options.loss:
             limited = min(max(asked, -options.peak_torque), options.peak_torque)
             self._command = round(limited / options.resolution) * options.resolution
         gap = self._command - self._torque
@@ -137,7 +135,7 @@ class EmulatedAnkleRobot(SimulatedRobot):
             else:
                 step = gap * self._follow
                 self._torque += min(max(step, -self._largest_step), self._largest_step)
-        noise = self._noise.next()
+        noise = next(self._noise)
         if self._tick % self._ticks_per_state == 0:
             measured = self._torque + options.bias + options.noise * noise
             self._states.append(RobotState(instant, asked, measured, math.nan))
@@ -155,14 +153,7 @@ class EmulatedAnkleRobot(SimulatedRobot):
         return train.pulses[number].torque_at(instant - self._late[number])
 
 
-class _Draws:
-    """Random numbers one at a time, drawn in blocks."""
-
-    def __init__(self, draw: Any) -> None:
-        self._draw = draw
-        self._block: list[float] = []
-
-    def next(self) -> float:
-        if not self._block:
-            self._block = self._draw(_BLOCK)[::-1].tolist()
-        return self._block.pop()
+def _draws(draw: Callable[[int], np.ndarray]) -> Iterator[float]:
+    """Yield random numbers one at a time, drawn in blocks: a call for each would be slow."""
+    while True:
+        yield from draw(_BLOCK).tolist()

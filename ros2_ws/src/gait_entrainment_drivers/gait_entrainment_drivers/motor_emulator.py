@@ -20,7 +20,7 @@ import signal
 import sys
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import Any, TextIO
@@ -100,7 +100,6 @@ def run_emulator(
     name: str,
     description: str,
     make: Callable[[argparse.Namespace], EmulatedMotor],
-    arguments: Sequence[str] | None,
     **more: dict[str, Any],
 ) -> int:
     """
@@ -116,7 +115,7 @@ def run_emulator(
         parser.add_argument(option, type=kind, default=default, help=meaning)
     for option, settings in more.items():
         parser.add_argument("--" + option.replace("_", "-"), **settings)
-    options = parser.parse_args(arguments)
+    options = parser.parse_args()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
     try:

@@ -12,6 +12,7 @@ itself, every 100 ms unless it is set otherwise.
 import math
 import struct
 from dataclasses import dataclass
+from typing import Any
 
 from gait_entrainment.robot.faults import Fault
 
@@ -65,14 +66,9 @@ def pack_torque(torque: float, peak: float) -> bytes:
     return TORQUE.pack(min(max(torque, -peak), peak))
 
 
-def unpack_pair(data: bytes) -> tuple[float, float] | None:
-    """Return the two floats of ENCODER or TORQUES; None for a frame of another length."""
-    return PAIR.unpack(data) if len(data) == PAIR.size else None
-
-
-def unpack_errors(data: bytes) -> tuple[int, int] | None:
-    """Return the two words of ERRORS; None for a frame of another length."""
-    return BITS.unpack(data) if len(data) == BITS.size else None
+def unpack(layout: struct.Struct, data: bytes) -> tuple[Any, ...] | None:
+    """Return the numbers of a frame; None for a frame of another length."""
+    return layout.unpack(data) if len(data) == layout.size else None
 
 
 def pack_heartbeat(heartbeat: Heartbeat) -> bytes:

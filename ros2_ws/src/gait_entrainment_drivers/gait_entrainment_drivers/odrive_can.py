@@ -146,23 +146,23 @@ class OdriveAxis(CanMotor):
         elif command == odrive.HEARTBEAT and (heartbeat := odrive.unpack_heartbeat(data)):
             self._heartbeat, self._beat_at = heartbeat, time.monotonic()
             return heartbeat
-        elif command == odrive.ERRORS and (errors := odrive.unpack_errors(data)):
+        elif command == odrive.ERRORS and (errors := odrive.unpack(odrive.BITS, data)):
             active, reason = errors
             self._old_reason = reason if self._old_reason is None else self._old_reason
             self._errors = active | (reason if reason != self._old_reason else 0)
-        elif command == odrive.ENCODER and (estimates := odrive.unpack_pair(data)):
-            self._angle, self._velocity = (2 * math.pi * value for value in estimates)
+        elif command == odrive.ENCODER and (pair := odrive.unpack(odrive.PAIR, data)):
+            self._angle, self._velocity = (2 * math.pi * value for value in pair)
             self._angle_at = time.monotonic()
         return None
 
     def _version(self, message: Any) -> str | None:
         """Return what a frame says of the versions, in words, if it does."""
-        data = bytes(message.data)
-        told = message.arbitration_id == odrive.frame_id(self._options.node_id, odrive.VERSION)
-        if not told or len(data) != odrive.VERSIONS.size:
+        told = odrive.unpack(odrive.VERSIONS, bytes(message.data))
+        wanted = odrive.frame_id(self._options.node_id, odrive.VERSION)
+        if told is None or message.arbitration_id != wanted:
             self._beat(message)
             return None
-        _, *hardware, major, minor, revision, unreleased = odrive.VERSIONS.unpack(data)
+        _, *hardware, major, minor, revision, unreleased = told
         return (
             f"ODrive {'.'.join(map(str, hardware))}, firmware {major}.{minor}.{revision}"
             f"{' (not released)' if unreleased else ''}"
@@ -173,7 +173,7 @@ class OdriveAxis(CanMotor):
         if message.arbitration_id != odrive.frame_id(self._options.node_id, odrive.TORQUES):
             self._beat(message)
             return None
-        torques = odrive.unpack_pair(bytes(message.data))
+        torques = odrive.unpack(odrive.PAIR, bytes(message.data))
         return None if torques is None else torques[1]
 
 

@@ -4,7 +4,6 @@
 """odrive_emulator: an ODrive axis that speaks CANSimple, as a process. See motor_emulator.py."""
 
 import sys
-from collections.abc import Sequence
 
 from gait_entrainment_drivers import odrive
 from gait_entrainment_drivers.motor_emulator import EmulatedMotor, Frames, run_emulator
@@ -75,13 +74,12 @@ class EmulatedOdrive(EmulatedMotor):
         return [(odrive.frame_id(self._node, what), answers[what])] if what in answers else []
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main() -> int:
     """Run the emulator."""
     return run_emulator(
         "odrive_emulator",
         "An ODrive axis by CANSimple, on a CAN bus.",
         lambda options: EmulatedOdrive(options.node_id, options.bandwidth, options.timeout),
-        arguments,
         node_id={"type": int, "default": 0, "help": "0 to 62"},
     )
 

@@ -108,26 +108,26 @@ def test_torque_goes_through_the_transmission_and_back(make, ratio):
     assert robot.capabilities.peak_torque == pytest.approx(18.0 * abs(ratio))
     step = resolution(AK)
     for torque in (4.0, -2.5):
-        robot.exchange(torque, 0.01)
+        robot.exchange(torque, 1.0)
         assert wire.motor.torque == pytest.approx(torque / ratio, abs=step)
-        reading = robot.exchange(torque, 0.01)
+        reading = robot.exchange(torque, 1.0)
         assert reading.torque == pytest.approx(torque, abs=2 * step * abs(ratio))
-    robot.exchange(0.0, 0.01)
+    robot.exchange(0.0, 1.0)
     if make is ak:  # zero has no code of its own
-        assert robot.exchange(0.0, 0.01).torque == 0.0
+        assert robot.exchange(0.0, 1.0).torque == 0.0
 
 
 @pytest.mark.parametrize("ratio", RATIOS)
 def test_angle_and_torque_are_the_ankles(ratio):
     robot, wire = ak(ratio)
     wire.motor = Telling([(0, pack_reply(Reply(1, 1.5, 0.0, 0.0), AK, 8))])
-    assert robot.exchange(0.0, 0.01).angle == pytest.approx(1.5 / ratio, abs=1e-3 / abs(ratio))
+    assert robot.exchange(0.0, 1.0).angle == pytest.approx(1.5 / ratio, abs=1e-3 / abs(ratio))
     robot, wire = odrive(ratio)
     estimates = PAIR.pack(0.25, 0.0)  # a quarter of a turn
     wire.motor = Telling(
         [(frame_id(0, ENCODER), estimates), (frame_id(0, TORQUES), PAIR.pack(7.0, 2.0))]
     )
-    reading = robot.exchange(7.0, 0.01)
+    reading = robot.exchange(7.0, 1.0)
     assert reading.angle == pytest.approx(math.pi / 2 / ratio)
     assert reading.torque == pytest.approx(2.0 * ratio)  # the estimate, not the target
 
@@ -136,14 +136,14 @@ def test_an_odrive_whose_heartbeat_is_switched_off_is_asked_for_it(monkeypatch):
     monkeypatch.setattr(odrive_can, "HEARTBEAT_PERIOD", 0.0)
     robot, wire = odrive()  # this bus carries answers only
     robot.enable()
-    assert robot.exchange(1.0, 0.01).faults == ()
+    assert robot.exchange(1.0, 1.0).faults == ()
     wire.motor.obey(frame_id(0, STOP), b"", remote=False, now=wire.now)
-    assert [fault.name for fault in robot.exchange(1.0, 0.01).faults] == ["emergency_stop"]
+    assert [fault.name for fault in robot.exchange(1.0, 1.0).faults] == ["emergency_stop"]
 
 
 def faults_of(robot):
     """Return the faults of the second of two readings: by then everything has been asked for."""
-    return [robot.exchange(0.0, 0.01), robot.exchange(0.0, 0.01)][1].faults
+    return [robot.exchange(0.0, 1.0), robot.exchange(0.0, 1.0)][1].faults
 
 
 def test_an_odrive_whose_heartbeat_stays_away_is_a_fault_by_name(monkeypatch):
@@ -158,10 +158,10 @@ def test_an_odrive_whose_heartbeat_stays_away_is_a_fault_by_name(monkeypatch):
 def test_an_odrive_that_tells_its_angle_no_longer_does_not_stay_at_it(monkeypatch):
     robot, wire = odrive()
     robot.enable()
-    assert [robot.exchange(0.0, 0.01), robot.exchange(0.0, 0.01)][1].angle == 0.0
+    assert [robot.exchange(0.0, 1.0), robot.exchange(0.0, 1.0)][1].angle == 0.0
     wire.lost.add(frame_id(0, ENCODER))
     monkeypatch.setattr(odrive_can, "HEARTBEAT_LOST", 0.0)
-    assert math.isnan(robot.exchange(0.0, 0.01).angle)
+    assert math.isnan(robot.exchange(0.0, 1.0).angle)
 
 
 @pytest.mark.parametrize("make", [ak, odrive])
@@ -171,7 +171,7 @@ def test_who_sends_the_very_same_commands_is_a_second_master_an_echo_is_none(mak
     robot.enable()
     for tick in range(150):
         wire.echo = echo and tick % 3 > 0  # some get lost
-        assert SECOND_MASTER not in robot.exchange(0.0, 0.01).faults
+        assert SECOND_MASTER not in robot.exchange(0.0, 1.0).faults
     wire.waiting += [wire.command] * (120 if echo else 1)
     assert SECOND_MASTER in robot.exchange(0.0, 1.0).faults
 
@@ -221,7 +221,7 @@ def test_a_command_that_the_motor_still_holds_is_never_delivered(make):
     robot.enable()
     assert motor.enabled
     assert wire.strongest < 0.01
-    robot.exchange(10.0, 0.01)
+    robot.exchange(10.0, 1.0)
     robot.shut()
     assert not motor.enabled
     assert abs(motor.command) < 0.01  # motors hold it across modes
@@ -265,7 +265,7 @@ def test_an_odrive_that_missed_its_mode_is_told_again(monkeypatch):
     monkeypatch.setattr(robot, "_command", lose_the_first)
     robot.enable()
     assert missed
-    robot.exchange(1.0, 0.01)
+    robot.exchange(1.0, 1.0)
     assert wire.motor.torque == pytest.approx(1.0)
 
 
@@ -285,7 +285,7 @@ def test_frames_that_are_no_data_frames_of_the_motor_are_no_answer(make):
         wire.waiting.append(
             can.Message(arbitration_id=identifier, data=data, is_extended_id=False)
         )
-    assert robot.exchange(0.0, 0.05) is None
+    assert robot.exchange(0.0, 1.0) is None
     assert not wire.waiting
 
 

@@ -24,8 +24,8 @@ from gait_entrainment_drivers.odrive import (
     frame_id,
     pack_heartbeat,
     pack_torque,
+    unpack,
     unpack_heartbeat,
-    unpack_pair,
 )
 
 
@@ -61,7 +61,7 @@ floats = st.floats(width=32, allow_nan=False)
 @settings(derandomize=True, deadline=None, max_examples=200)
 @given(floats, floats, st.integers(0, 2**32 - 1), st.integers(0, 255))
 def test_any_value_arrives(first, second, error, state):
-    assert unpack_pair(PAIR.pack(first, second)) == (first, second)
+    assert unpack(PAIR, PAIR.pack(first, second)) == (first, second)
     heartbeat = Heartbeat(error, state)
     assert unpack_heartbeat(pack_heartbeat(heartbeat)) == heartbeat
     clamped = min(max(first, -18.0), 18.0)
@@ -72,7 +72,7 @@ def test_any_value_arrives(first, second, error, state):
 
 @pytest.mark.parametrize("length", [0, 3, 4, 7])
 def test_frames_of_other_lengths_are_not_taken(length):
-    assert unpack_pair(bytes(length)) is None
+    assert unpack(PAIR, bytes(length)) is None
     assert (unpack_heartbeat(bytes(length)) is None) is (length < 5)
 
 

@@ -21,20 +21,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import rclpy
-from rclpy.context import Context
-from rclpy.experimental import EventsExecutor
-from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
-from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, nanoseconds_of
 from gait_entrainment.robot.faults import DeviceError, Fault, LimitError
 from gait_entrainment.settings import setting
 from gait_entrainment_drivers.device import Reading, TorqueDevice
 from gait_entrainment_drivers.host_timed import HostTimedRobot, LoopOptions
 from gait_entrainment_drivers.monitor import SECOND_MASTER
+from gait_entrainment_nodes.messaging.client import Client
 
 try:
     from controller_manager_msgs.srv import ListControllers, SwitchController
@@ -95,7 +92,7 @@ class EffortJoint(TorqueDevice):
         self.address = f"{options.controller}{under} in ROS domain {options.domain}"
         self._options = options
         self.capabilities = options.capabilities(options.peak_torque)
-        self._node: Any = None
+        self._client: Any = None  # while the device is open
         self._manager: list[Any] = []  # clients of controller_manager: to list, to switch
         self._state: JointState | None = None  # not read yet
         self._age = math.inf  # of the joint's last state when it came [s]
@@ -111,25 +108,16 @@ class EffortJoint(TorqueDevice):
                 "joint_states would meet the robot's; allowed: another domain, a namespace of the "
                 "robot, or another name for its joint_states"
             )
-        self._context = Context()
-        rclpy.init(args=[], context=self._context, domain_id=options.domain)
-        self._node = Node(
-            "gait_entrainment_driver",
-            context=self._context,
-            namespace=options.namespace or None,
-            enable_rosout=False,
-            start_parameter_services=False,
-        )
-        self._executor = EventsExecutor(context=self._context)
-        self._executor.add_node(self._node)
-        self._node.create_subscription(JointState, options.joint_states, self._on_state, _STATES)
-        self._commands = self._node.create_publisher(
-            Float64MultiArray, f"{options.controller}/commands", _COMMANDS
-        )
+        name, namespace = "gait_entrainment_driver", options.namespace
+        self._client = Client(name, namespace=namespace, domain=options.domain)
+        node = self._client.node
+        node.create_subscription(JointState, options.joint_states, self._on_state, _STATES)
+        topic = f"{options.controller}/commands"
+        self._commands = node.create_publisher(Float64MultiArray, topic, _COMMANDS)
         if options.manage and ListControllers is not None:
             self._manager = [
-                self._node.create_client(ListControllers, "controller_manager/list_controllers"),
-                self._node.create_client(SwitchController, "controller_manager/switch_controller"),
+                node.create_client(ListControllers, "controller_manager/list_controllers"),
+                node.create_client(SwitchController, "controller_manager/switch_controller"),
             ]
         self._wait(
             lambda: self._age < math.inf,
@@ -165,17 +153,19 @@ class EffortJoint(TorqueDevice):
     def exchange(self, torque: float, timeout: float) -> Reading | None:
         """Publish a torque; return the joint's state if a new one has come or comes meanwhile."""
         self._publish(torque / self._options.ratio)
-        self._spin(lambda: self._state is not None, timeout)
+        self._client.wait(lambda: self._state is not None, timeout)
         state, self._state = self._state, None
         return None if state is None else self._reading(state)
 
     def forget(self) -> None:
         """Drop the states that have come, and take one that is measured now."""
         now = time.time_ns()
+
+        def fresh() -> bool:
+            return self._state is not None and nanoseconds_of(self._state.header.stamp) >= now
+
         self._state = None
-        self._spin(
-            lambda: self._state is not None and _stamp(self._state) >= now, _FRESH_STATE_TIMEOUT
-        )
+        self._client.wait(fresh, _FRESH_STATE_TIMEOUT)
 
     def disable(self) -> None:
         """Send zero and deactivate the controller."""
@@ -184,18 +174,16 @@ class EffortJoint(TorqueDevice):
 
     def shut(self) -> None:
         """Leave the robot's domain."""
-        if self._node is None:
-            return
-        self._executor.shutdown()
-        self._node.destroy_node()
-        rclpy.try_shutdown(context=self._context)
-        self._node = None
+        client, self._client = self._client, None
+        if client is not None:
+            client.close()
 
     def _on_state(self, message: JointState) -> None:
         """Take a fresh state that has the joint in it; others are nobody's business."""
         if self._options.joint not in message.name:
             return
-        self._age = (time.time_ns() - _stamp(message)) / NANOSECONDS_PER_SECOND
+        age = time.time_ns() - nanoseconds_of(message.header.stamp)
+        self._age = age / NANOSECONDS_PER_SECOND
         if abs(self._age) < self._options.silence:
             self._place = list(message.name).index(self._options.joint)
             self._state = message
@@ -210,29 +198,21 @@ class EffortJoint(TorqueDevice):
 
     def _masters(self) -> tuple[Fault, ...]:
         """The fault of a second master, if there is one."""
-        return (
-            (SECOND_MASTER,) if self._node.count_publishers(self._commands.topic_name) > 1 else ()
-        )
+        masters = self._client.node.count_publishers(self._commands.topic_name)
+        return (SECOND_MASTER,) if masters > 1 else ()
 
     def _publish(self, effort: float) -> None:
         command = [0.0] * self._options.joint_count
         command[self._options.joint_index] = effort
         self._commands.publish(Float64MultiArray(data=command))
 
-    def _spin(self, until: Callable[[], bool], timeout: float) -> bool:
-        """Take what comes until something is so; return whether it is."""
-        give_up = time.monotonic() + timeout
-        while not (so := until()) and (left := give_up - time.monotonic()) > 0:
-            self._executor.spin_once(timeout_sec=left)
-        return so
-
     def _wait(self, until: Callable[[], bool], lacking: Callable[[], str]) -> None:
-        if not self._spin(until, _DISCOVERY_TIMEOUT):
+        if not self._client.wait(until, _DISCOVERY_TIMEOUT):
             raise DeviceError(f"{self.name} of {self.address}: {lacking()}")
 
     def _switch(self, wanted: str) -> None:
         """Make the controller active or inactive, if controller_manager can be asked."""
-        if not self._manager or not self._spin(self._manager[0].service_is_ready, 0.2):
+        if not self._manager or not self._client.wait(self._manager[0].service_is_ready, 0.2):
             return
         listing, switching = self._manager
         name = self._options.controller
@@ -259,13 +239,9 @@ class EffortJoint(TorqueDevice):
 
     def _answer(self, client: Any, request: Any) -> Any:
         future = client.call_async(request)
-        if not self._spin(future.done, _SERVICE_TIMEOUT):
+        if not self._client.wait(future.done, _SERVICE_TIMEOUT):
             raise DeviceError("controller_manager does not answer: see whether it runs")
         return future.result()
-
-
-def _stamp(message: JointState) -> int:
-    return message.header.stamp.sec * NANOSECONDS_PER_SECOND + message.header.stamp.nanosec
 
 
 class Ros2ControlRobot(HostTimedRobot):

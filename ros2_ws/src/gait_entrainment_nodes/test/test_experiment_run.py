@@ -95,7 +95,7 @@ def bench():
 
 
 def blamed(failure):
-    return str(failure), failure.blamed
+    return str(failure), failure.node
 
 
 def test_each_progress_is_answered_once_all_that_it_covers_is_here(bench):
@@ -358,7 +358,7 @@ def test_impossible_pulses_fail_the_run():
         bench.strike(instant)
         bench.report(instant)
         instant += HALF
-    assert bench.run.failure.blamed == ""
+    assert bench.run.failure.node == ""
     assert "overlap" in str(bench.run.failure)
 
 

@@ -16,6 +16,7 @@ from gait_entrainment_nodes.nodes import experiment, gait_analyzer, walker_sim
 from gait_entrainment_nodes.nodes.experiment import Experiment
 from gait_entrainment_nodes.nodes.gait_analyzer import GaitAnalyzerNode
 from gait_entrainment_nodes.nodes.parameters import HelpRequestedError
+from gait_entrainment_nodes.nodes.sensor_sim import SensorSim
 from gait_entrainment_nodes.nodes.walker_sim import WalkerSim
 
 
@@ -114,3 +115,9 @@ def test_what_a_node_was_dumped_with_starts_it_again_without_a_word(make, tmp_pa
         made.offer_ready()
         assert {n: made.get_parameter(n).value for n in values} == values
     assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("make", [WalkerSim, SensorSim])
+def test_a_walk_awaits_the_torque_of_both_ankles_if_both_are_pushed(make):
+    with node(make, "-p", "both_ankles:=true") as made:
+        assert made.new_walk().ankles == 2

@@ -107,8 +107,7 @@ class OperatorPage(Participant):
     real_time = False
 
     def __init__(self) -> None:
-        super().__init__("operator_page")
-        self.begin_participation(settings=Settings, fixed=settings_of(Settings))
+        super().__init__("operator_page", settings=Settings, fixed=settings_of(Settings))
         settings = self.settings
         self.view = View(blinded=settings.blinded, clock=time.monotonic)
         access = Access.of_environment(settings.host)

@@ -5,13 +5,12 @@
 
 import argparse
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 from gait_entrainment.errors import UsageError
 from gait_entrainment.robot import find_driver
 from gait_entrainment.settings import Setting
-from gait_entrainment_bringup.checklist import Point, points
+from gait_entrainment_bringup.checklist import points
 from gait_entrainment_bringup.operator_console import keys_at_once
 from gait_entrainment_bringup.run_options import (
     SESSION_FILE,
@@ -65,8 +64,12 @@ def run(options: argparse.Namespace) -> int:
         raise UsageError(
             f"driver: {protocol.driver} applies no real torque; allowed: a real robot"
         )
+    found = []
     with keys_at_once():
-        found = list(_told(points(protocol, bag, options.elsewhere, timeout), options))
+        for point in points(protocol, bag, options.elsewhere, timeout):
+            found.append(point)
+            if not options.json:
+                print(f"{'ok  ' if point.passed else 'FAIL'}  {point.name:<10} {point.finding}")
     failed = ", ".join(point.name for point in found if not point.passed)
     keep_preflight(protocol.driver, failed)
     if options.json:
@@ -76,10 +79,3 @@ def run(options: argparse.Namespace) -> int:
     else:
         print("fit for a session")
     return int(bool(failed))
-
-
-def _told(found: Iterator[Point], options: argparse.Namespace) -> Iterator[Point]:
-    for point in found:
-        if not options.json:
-            print(f"{'ok  ' if point.passed else 'FAIL'}  {point.name:<10} {point.finding}")
-        yield point

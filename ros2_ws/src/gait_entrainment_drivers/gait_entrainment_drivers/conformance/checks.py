@@ -18,7 +18,7 @@ from dataclasses import fields, is_dataclass
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, nanoseconds
 from gait_entrainment.robot import DeviceError, DeviceLimits, Pulse, PulseTrain, Shape
 from gait_entrainment.robot.faults import EXPERIMENT_SILENT
-from gait_entrainment_commands.timing import MeasuredOnsets, lateness_ms, quantile
+from gait_entrainment_commands.timing import lateness_ms, quantile, timings_of
 from gait_entrainment_drivers.conformance.bench import (
     PERIOD,
     POLL,
@@ -359,14 +359,7 @@ def timing(bench: Bench) -> None:
     train = bench.schedule(count=count, duration=0.12, period=0.3)
     bench.run(bench.lead + count * 0.3 + 0.3)
     bench.wait_for(lambda: bench.states and bench.states[-1].stamp >= train.end)
-    audit = MeasuredOnsets()
-    audit.add_promise(train.onsets, train.end + nanoseconds(0.1))
-    for pulse in train.pulses:
-        audit.add_pulse(pulse.onset, pulse.torque, pulse.duration)
-    for state in bench.states:
-        audit.add_state(state)
-    audit.finish()
-    late = lateness_ms(audit.timings, "measured")
+    late = lateness_ms(timings_of(train.pulses, bench.states), "measured")
     missing = count - len(late)
     require(not missing, f"{missing} of {count} pulses show in no state.")
     bench.figures |= _distribution("", late)

@@ -13,7 +13,7 @@ of a process in the order in which they were made: whoever answers the latest on
 import math
 import time
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import rclpy
 from rclpy.action import ActionClient
@@ -26,7 +26,9 @@ from gait_entrainment.errors import UsageError
 from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.environment import UnusableEnvironmentError
 from gait_entrainment_nodes.messaging.errors import SilenceError
-from gait_entrainment_nodes.messaging.topics import Topic
+
+if TYPE_CHECKING:  # it loads every type of message, which a client need not wait for
+    from gait_entrainment_nodes.messaging.topics import Topic
 
 # How long to wait for a node before it counts as silent [s].
 TIMEOUT = 60.0
@@ -119,7 +121,7 @@ class Client:
         rclpy.try_shutdown(context=self._context)
 
     def subscribe(
-        self, topic: Topic, callback: Callable[[Any], None], *, raw: bool = False
+        self, topic: "Topic", callback: Callable[[Any], None], *, raw: bool = False
     ) -> None:
         """Hear a topic; ``raw`` gives the callback serialized messages."""
         self.node.create_subscription(topic.type, topic.name, callback, topic.qos, raw=raw)
@@ -127,8 +129,8 @@ class Client:
     def wait(self, condition: Callable[[], Any], timeout: float = math.inf) -> Any:
         """Serve ROS until a condition holds, at most ``timeout`` [s]; return its last value."""
         give_up = time.monotonic() + timeout
-        while not (value := condition()) and time.monotonic() < give_up:
-            self._executor.spin_once(timeout_sec=ROUND)
+        while not (value := condition()) and (left := give_up - time.monotonic()) > 0:
+            self._executor.spin_once(timeout_sec=min(left, ROUND))
             self.each_round()
         return value
 

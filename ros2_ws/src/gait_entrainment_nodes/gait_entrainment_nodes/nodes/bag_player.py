@@ -41,7 +41,6 @@ from gait_entrainment_nodes.messaging.older_messages import converter_of
 from gait_entrainment_nodes.messaging.player_services import srv
 from gait_entrainment_nodes.messaging.raw_messages import message_class
 from gait_entrainment_nodes.nodes.lateness import Lateness
-from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.parameters import texts
 from gait_entrainment_nodes.nodes.participant import Participant
 
@@ -100,9 +99,8 @@ class BagPlayer(Participant):
         return False
 
     def __init__(self) -> None:
-        super().__init__("bag_player")
         fixed = settings_of(Settings).keys() - {"rate"}
-        self.begin_participation(settings=Settings, fixed=fixed)
+        super().__init__("bag_player", settings=Settings, fixed=fixed)
         settings = self.settings
         if not settings.bag:
             raise ValueError("bag: is empty; give the folder of the bag to play")
@@ -368,6 +366,4 @@ def _offer(topic: TopicInfo) -> QoSProfile:
     return topics.quality(kept, reliable=not best_effort, lasting=lasting)
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node(BagPlayer)
+main = BagPlayer.main

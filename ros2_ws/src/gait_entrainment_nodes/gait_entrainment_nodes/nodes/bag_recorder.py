@@ -35,11 +35,11 @@ from gait_entrainment_bags import (
     find_definition,
 )
 from gait_entrainment_bags import QosProfile as OfferedQos
+from gait_entrainment_bags.definitions import fields_of
 from gait_entrainment_msgs.msg import Progress, PublishedCounts
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.raw_messages import message_class
 from gait_entrainment_nodes.nodes.late import raw_reader
-from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.parameters import texts
 from gait_entrainment_nodes.nodes.participant import Participant
 from gait_entrainment_nodes.nodes.rclpy_internals import RawReader
@@ -58,7 +58,7 @@ CLOSING_TIMEOUT = 5.0
 LONGEST_OVERTAKING = 60 * NANOSECONDS_PER_SECOND
 # A message whose first field is a header or a stamp has it behind four bytes of CDR header.
 _STAMP = struct.Struct("<iI")
-_STAMPED = ("std_msgs/Header ", "builtin_interfaces/Time ")
+_STAMPED = ("std_msgs/Header", "builtin_interfaces/Time")
 # Stamped by the wall clock also where time is simulated: log entries always, parameter events
 # while a node is being made. With one of them among simulated stamps a bag would span decades.
 _BY_WALL_CLOCK = ("rcl_interfaces/msg/Log", "rcl_interfaces/msg/ParameterEvent")
@@ -91,8 +91,7 @@ class BagRecorder(Participant):
     settings: Settings
 
     def __init__(self) -> None:
-        super().__init__("bag_recorder")
-        self.begin_participation(settings=Settings, fixed=settings_of(Settings))
+        super().__init__("bag_recorder", settings=Settings, fixed=settings_of(Settings))
         self._chosen, self._expected = set(self.settings.topics), set(self.settings.publishers)
         self._bag = self._make_bag()
         # Ready means, for this topic too, that everyone will hear: the walker waits for it.
@@ -229,9 +228,10 @@ class BagRecorder(Participant):
 
     def _writer_for(self, name: str, definition: Definition) -> Callable[[bytes, int], None]:
         """Return what writes a message of one topic, and when it was received [ns]."""
-        stamped = definition.type not in _BY_WALL_CLOCK and _first_field(
-            definition.schema_text
-        ).startswith(_STAMPED)
+        first = next(fields_of(definition.schema_text, ""), None)
+        stamped = definition.type not in _BY_WALL_CLOCK and (
+            first is not None and first.type in _STAMPED and first.length is None
+        )
         write, unpack, latest = self._bag.write, _STAMP.unpack_from, self._latest
         then = {
             self._progress_topic: self._on_progress,
@@ -410,15 +410,6 @@ def _texts(custom_data: str) -> dict[str, str]:
     return texts
 
 
-def _first_field(schema_text: str) -> str:
-    """Return the first line of a message definition that declares a field."""
-    for line in schema_text.splitlines():
-        declaration = line.split("#")[0].strip()
-        if declaration and "=" not in declaration:
-            return declaration
-    return ""
-
-
 def _offered(profile: QoSProfile) -> OfferedQos:
     """Return the quality that a publisher offers in the terms of a bag."""
     return OfferedQos(
@@ -434,6 +425,4 @@ def _offered(profile: QoSProfile) -> OfferedQos:
     )
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node(BagRecorder)
+main = BagRecorder.main

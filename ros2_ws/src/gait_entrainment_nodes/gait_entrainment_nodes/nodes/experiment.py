@@ -40,7 +40,6 @@ from gait_entrainment_nodes.nodes.experiment_run import (
     Run,
 )
 from gait_entrainment_nodes.nodes.goal_server import GoalServer
-from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.parameters import texts
 from gait_entrainment_nodes.nodes.participant import Participant
 from gait_entrainment_nodes.nodes.participants import ClockError, Participants
@@ -104,8 +103,7 @@ class Experiment(Participant):
     run: Run | None
 
     def __init__(self) -> None:
-        super().__init__("experiment")
-        self.begin_participation(settings=Settings, fixed=("protocol",))
+        super().__init__("experiment", settings=Settings, fixed=("protocol",))
         self._runs = 0  # how many have begun
         self._waiting = Waiting()
 
@@ -171,7 +169,7 @@ class Experiment(Participant):
             self.publish(topics.EXPERIMENT_STATE, run.state(Part.FINISHED, result.message))
             self.note_state(DiagnosticStatus.OK, f"run {run.number} finished")
         except (ExperimentError, ProtocolError) as failure:
-            result.message, result.blamed = str(failure), getattr(failure, "blamed", "")
+            result.message, result.blamed = str(failure), getattr(failure, "node", "")
             await self._give_up(run, result.message)
             if self._server.cancelled:
                 result.outcome = result.CANCELLED
@@ -191,7 +189,7 @@ class Experiment(Participant):
         await self._waiting.until(lambda: run.over)
         if run.failure is not None:
             raise run.failure
-        await self._close(run, ANSWER_TIMEOUT)
+        await self._close(run)
         # The answer came after any stop: to walk to the end without torque is no success.
         if run.stopped_at is not None:
             await self._wait_for_reason(run)
@@ -205,7 +203,7 @@ class Experiment(Participant):
         run.fail_if_troubled()
         return final
 
-    async def _close(self, run: Run, timeout: float) -> None:
+    async def _close(self, run: Run, timeout: float = ANSWER_TIMEOUT) -> None:
         """Say that the run is over, and wait until the perturbator has heard it."""
         run.close()
         silence = ExperimentError(f"{PERTURBATOR} does not answer", PERTURBATOR)
@@ -244,7 +242,7 @@ class Experiment(Participant):
             except ExperimentError as missing:
                 if time.monotonic() > give_up:
                     what = f"not ready within {timeout:g} s: {missing}"
-                    raise ExperimentError(what, missing.blamed) from None
+                    raise ExperimentError(what, missing.node) from None
             await self._waiting.tick()
 
     async def _activate_perturbator(self, run: Run) -> None:
@@ -256,7 +254,7 @@ class Experiment(Participant):
             await self._transition(run, Transition.TRANSITION_ACTIVATE)
         run.activated = True
 
-    async def _transition(self, run: Run, number: int, timeout: float | None = None) -> None:
+    async def _transition(self, run: Run, number: int, timeout: float = ANSWER_TIMEOUT) -> None:
         """Take the perturbator through one lifecycle transition."""
         request = ChangeState.Request(transition=Transition(id=number))
         response = await self._answer(self._change_state, request, PERTURBATOR, timeout)
@@ -273,12 +271,11 @@ class Experiment(Participant):
         return nanoseconds_of(response.start)
 
     async def _answer(
-        self, client: Any, request: Any, node: str, timeout: float | None = None
+        self, client: Any, request: Any, node: str, timeout: float = ANSWER_TIMEOUT
     ) -> Any:
         """Return a node's answer; wait for it a time [s], by default as long as it may take."""
         call = client.call_async(request)
         silence = ExperimentError(f"{node} does not answer", node)
-        timeout = ANSWER_TIMEOUT if timeout is None else timeout
         await self._waiting.until(call.done, timeout, silence)
         return call.result()
 
@@ -343,6 +340,4 @@ class Experiment(Participant):
             self.failure = "stopped before the end of the protocol"
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node(Experiment)
+main = Experiment.main

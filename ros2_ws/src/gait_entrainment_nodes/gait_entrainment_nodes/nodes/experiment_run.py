@@ -22,6 +22,7 @@ from gait_entrainment.robot import PulseTrain
 from gait_entrainment_bags.messages import MessageError, event_of, nanoseconds_of
 from gait_entrainment_msgs import msg
 from gait_entrainment_nodes.messaging import topics
+from gait_entrainment_nodes.messaging.errors import NodeError
 from gait_entrainment_nodes.messaging.goals import seal_of
 from gait_entrainment_nodes.messaging.stamps import header, to_time
 
@@ -32,12 +33,8 @@ STAMP_TOLERANCE = 100_000_000
 PERTURBATOR, WALKER, RECORDER = "perturbator", "walker_sim", "bag_recorder"
 
 
-class ExperimentError(EntrainmentError):
-    """The run cannot go on; ``blamed`` is the node whose log may say more, "" if none."""
-
-    def __init__(self, message: str, blamed: str = "") -> None:
-        super().__init__(message)
-        self.blamed = blamed
+class ExperimentError(NodeError):
+    """The run cannot go on."""
 
 
 class Run:

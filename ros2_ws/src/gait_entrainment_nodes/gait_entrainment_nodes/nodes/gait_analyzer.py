@@ -25,7 +25,6 @@ from gait_entrainment_bags.truth import TOE_OFF_BIAS
 from gait_entrainment_msgs import msg
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.nodes.gait_analyzer_run import RESULTS, Run
-from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.participant import Participant
 
 
@@ -64,9 +63,8 @@ class GaitAnalyzerNode(Participant):
     run: Legs | None
 
     def __init__(self) -> None:
-        super().__init__("gait_analyzer")
         verdict = (VerdictSettings, "verdict.")
-        self.begin_participation(settings=Settings, verdict=verdict, fixed=("onset",))
+        super().__init__("gait_analyzer", settings=Settings, verdict=verdict, fixed=("onset",))
         for topic in RESULTS.values():
             self.offer(topic)
         self._latest_run = 0  # number of the latest run
@@ -152,6 +150,4 @@ class GaitAnalyzerNode(Participant):
             self.publish(RESULTS[type(result)], run.message_of(result))
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node(GaitAnalyzerNode)
+main = GaitAnalyzerNode.main

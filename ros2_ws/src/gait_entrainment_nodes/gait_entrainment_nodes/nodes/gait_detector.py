@@ -32,7 +32,6 @@ from gait_entrainment_nodes.messaging.stamps import (
     to_time,
 )
 from gait_entrainment_nodes.nodes.gait_detector_run import Run
-from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.participant import STATE_PERIOD, Participant
 from gait_entrainment_sensors import Detection, find_detector
 from gait_entrainment_sensors.sources import source_of
@@ -72,9 +71,8 @@ class GaitDetector(Participant):
     run: Run | None
 
     def __init__(self) -> None:
-        super().__init__("gait_detector")
         fixed = ("detector", "left", "right", "left_topic", "right_topic", "simulated")
-        self.begin_participation(settings=Settings, fixed=fixed)
+        super().__init__("gait_detector", settings=Settings, fixed=fixed)
         self._events = self.offer(topics.GAIT_EVENTS)
         self.offer(topics.WALKER_PROGRESS)
         self._epoch = time.time_ns() if self.real_time else LOCK_STEP_START
@@ -301,6 +299,4 @@ class GaitDetector(Participant):
             self._send_progress(self.run.aborted())
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node(GaitDetector)
+main = GaitDetector.main

@@ -5,12 +5,10 @@
 
 import time
 from collections import deque
-from collections.abc import Callable
 from typing import Any
 
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
-from rclpy.serialization import deserialize_message
 from rclpy.task import Future
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
@@ -83,16 +81,3 @@ class LateClient:
         while self._answers and self._answers[0][0] <= time.time():
             _, late, answer = self._answers.popleft()
             late.set_result(answer)
-
-
-class LateSubscription:
-    """A subscription that hears late."""
-
-    def __init__(self, reader: RawReader, kind: Any, callback: Callable[[Any], None]) -> None:
-        self._reader, self._kind, self._callback = reader, kind, callback
-
-    def deliver(self) -> None:
-        """Hand on the messages that are due; without a ``kind`` they stay bytes."""
-        for _, data in self._reader.take(100):
-            kind = self._kind
-            self._callback(data if kind is None else deserialize_message(data, kind))

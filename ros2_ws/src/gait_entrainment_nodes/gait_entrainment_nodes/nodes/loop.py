@@ -114,8 +114,8 @@ def _serve_once(executor: Any, node: Any) -> None:
         # Whoever asked a service has gone, or is not matched yet and asks again.
         if "client will not receive response" not in str(error):
             raise
-    for late in node.late:
-        late.deliver()
+    for deliver in node.late:
+        deliver()
     node.publish_state()
     deadline = node.next_deadline()
     if deadline is not None and time.monotonic() >= deadline:

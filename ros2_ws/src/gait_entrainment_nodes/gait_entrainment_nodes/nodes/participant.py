@@ -14,6 +14,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
+from rclpy.serialization import deserialize_message
 
 from gait_entrainment.errors import EntrainmentError
 from gait_entrainment.settings import SettingError
@@ -24,7 +25,8 @@ from gait_entrainment_nodes.messaging.environment import PRIORITY
 from gait_entrainment_nodes.messaging.publisher import CountedPublisher, StopRequestedError
 from gait_entrainment_nodes.messaging.stamps import header, to_time
 from gait_entrainment_nodes.messaging.topics import DIAGNOSTICS, PUBLISHED_COUNTS, Topic
-from gait_entrainment_nodes.nodes.late import LateClient, LateSubscription, raw_reader
+from gait_entrainment_nodes.nodes.late import LateClient, LateReader
+from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.parameters import (
     answer_help,
     chosen_quality,
@@ -45,7 +47,9 @@ class Participant(Node):
     """
     A node that takes part in a run.
 
-    A node calls ``begin_participation``, then makes its publishers, subscriptions and services.
+    ``settings`` are its parameters, of which some are ``fixed``: by the attribute that holds their
+    values a settings dataclass, or a pair of it and the prefix of its parameters. Raises
+    EntrainmentError if a value is not allowed, or the values do not fit each other.
     """
 
     get_logger: Callable[[], RcutilsLogger]  # which rclpy does not type
@@ -54,26 +58,11 @@ class Participant(Node):
     failure: str | None = None  # why the node must end with exit code 1
     finished = False  # set to end the loop with exit code 0
     run: Any = None  # the run that goes on, with its ``number``; None between runs
-    late: tuple[LateSubscription | LateClient, ...] = ()  # what hears late, in tests
+    late: tuple[Callable[[], None], ...] = ()  # what hands on what is heard late, in tests
 
-    def __init__(self, node_name: str, **options: Any) -> None:
+    def __init__(self, node_name: str, *, fixed: Collection[str] = (), **settings: Any) -> None:
         self._own = f"{node_name}/"  # how the names of its own topics begin in the table
-        super().__init__(node_name, **options)
-
-    @property
-    def real_time(self) -> bool:
-        """Whether this node waits for nobody: neither for a reader nor for its turn."""
-        return not self.get_parameter("use_sim_time").value
-
-    def begin_participation(self, *, fixed: Collection[str] = (), **settings: Any) -> None:
-        """
-        Set up what every participant has.
-
-        ``settings`` are the node's parameters, of which some are ``fixed``: by the attribute that
-        holds their values a settings dataclass, or a pair of it and the prefix of its parameters.
-
-        Raises EntrainmentError if a value is not allowed, or the values do not fit each other.
-        """
+        super().__init__(node_name)
         groups = {n: s if isinstance(s, tuple) else (s, "") for n, s in settings.items()}
         answer_help(self, groups.values())
         for group, prefix in groups.values():
@@ -89,6 +78,11 @@ class Participant(Node):
         self.note_state(DiagnosticStatus.OK, "ready")
         # Not counted itself: its message says what the others published.
         self.offer(PUBLISHED_COUNTS, counted=False)
+
+    @property
+    def real_time(self) -> bool:
+        """Whether this node waits for nobody: neither for a reader nor for its turn."""
+        return not self.get_parameter("use_sim_time").value
 
     # Parameters
 
@@ -164,8 +158,13 @@ class Participant(Node):
         """Create a subscription with the quality of service of its topic; ``raw``: to bytes."""
         name = self.name_of(topic)
         if delays_wanted():
-            reader = raw_reader(self, topic.type, name, topic.qos)
-            self.late += (LateSubscription(reader, None if raw else topic.type, callback),)
+            reader = LateReader(self, topic.type, name, topic.qos)
+
+            def deliver() -> None:
+                for _, data in reader.take(100):
+                    callback(data if raw else deserialize_message(data, topic.type))
+
+            self.late += (deliver,)
             return
         qos = self.quality_of(name, "subscription", topic.qos)
         self.create_subscription(topic.type, name, callback, raw=raw, **qos)
@@ -175,7 +174,7 @@ class Participant(Node):
         client: Any = self.create_client(service_type, name)
         if delays_wanted():
             client = LateClient(client, delay_between(name.partition("/")[0], self.get_name()))
-            self.late += (client,)
+            self.late += (client.deliver,)
         return client
 
     def subscribe_to_run(self, topic: Topic, callback: Callable[[Any, Any], None]) -> None:
@@ -267,6 +266,11 @@ class Participant(Node):
         self.publish(DIAGNOSTICS, DiagnosticArray(header=header(stamp), status=[status]))
 
     # The loop and its end
+
+    @classmethod
+    def main(cls) -> int:
+        """Run such a node as this process; return the exit code, see `run_node`."""
+        return run_node(cls)
 
     def next_deadline(self) -> float | None:
         """Return the steady time [s] at which ``on_deadline`` is due; None for never."""

@@ -41,7 +41,6 @@ from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.environment import user_and_host
 from gait_entrainment_nodes.messaging.stamps import header
 from gait_entrainment_nodes.nodes.goal_server import GoalServer
-from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.parameters import texts
 from gait_entrainment_nodes.nodes.participant import Participant
 from gait_entrainment_nodes.nodes.perturbator_run import Run, SignsOfLife, do_with_all, setups
@@ -106,8 +105,8 @@ class Perturbator(Participant, TolerantLifecycleNode):
     run: Run | None
 
     def __init__(self) -> None:
-        super().__init__("perturbator")
-        self.begin_participation(
+        super().__init__(
+            "perturbator",
             settings=Settings,
             limits=(DeviceLimits, "limits."),
             planned=(PlannedPulses, "planned."),
@@ -445,6 +444,4 @@ class Perturbator(Participant, TolerantLifecycleNode):
         self._report_faults()
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node(Perturbator)
+main = Perturbator.main

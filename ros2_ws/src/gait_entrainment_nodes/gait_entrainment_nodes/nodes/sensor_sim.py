@@ -20,7 +20,6 @@ from gait_entrainment_bags.messages import nanoseconds_of
 from gait_entrainment_msgs import msg
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.sensors import SensorWriter
-from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.walker_run import Stretch, WalkerRun
 from gait_entrainment_nodes.nodes.walker_sim import WalkerSim
 from gait_entrainment_nodes.nodes.walker_sim_run import Run
@@ -51,8 +50,10 @@ class Measured(Stretch):
 class SensedWalk(WalkerRun):
     """A walk with sensors on both feet."""
 
-    def __init__(self, *of_walk: Any, sensors: list[EmulatedSensor], buffer: float) -> None:
-        super().__init__(*of_walk)
+    def __init__(
+        self, *of_walk: Any, both_ankles: bool, sensors: list[EmulatedSensor], buffer: float
+    ) -> None:
+        super().__init__(*of_walk, both_ankles=both_ankles)
         self._sensors, self._buffer = sensors, nanoseconds(buffer)
         self.readings = 0  # of all sensors together, so far
 
@@ -91,13 +92,11 @@ class SensorSim(WalkerSim):
     def offer_start(self) -> None:
         """Offer nothing: who is sensed is not asked to start, gait_detector is."""
 
-    def new_walk(self) -> WalkerRun:
+    def new_walk(self, kind: type[WalkerRun] = SensedWalk, **more: Any) -> WalkerRun:
         """Return a walk with sensors."""
-        settings = self.settings
-        sensors = [EmulatedSensor(self._kind, side, self._quality, settings.seed) for side in Side]
-        rate, first = settings.sample_rate, settings.first_heel_strike
-        of_walk = self.walker, first, rate, self.variation, settings.seed
-        return SensedWalk(*of_walk, sensors=sensors, buffer=self.sensors.buffer)
+        seed = self.settings.seed
+        sensors = [EmulatedSensor(self._kind, side, self._quality, seed) for side in Side]
+        return super().new_walk(kind, sensors=sensors, buffer=self.sensors.buffer, **more)
 
     def run_of(self, message: Any) -> Run | None:
         """Return the run of a message; the first torque profile of a run begins it."""
@@ -122,6 +121,4 @@ class SensorSim(WalkerSim):
         super().send_progress(run, progress)
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node(SensorSim)
+main = SensorSim.main

@@ -33,7 +33,6 @@ from gait_entrainment_msgs.msg import AnkleTorque
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.environment import PACKAGE, shared_file
 from gait_entrainment_nodes.nodes.footing import Footing
-from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.participant import Participant
 
 WORLD = "world"  # of the ground reactions too; shared by all walkers, so without a prefix
@@ -70,8 +69,7 @@ class WalkerDisplay(Participant):
     settings: Settings
 
     def __init__(self) -> None:
-        super().__init__("walker_display")
-        self.begin_participation(settings=Settings, fixed=settings_of(Settings))
+        super().__init__("walker_display", settings=Settings, fixed=settings_of(Settings))
         settings = self.settings
         self._period = round(NANOSECONDS_PER_SECOND / settings.rate)
         self._footing = Footing(settings.leg_length, settings.foot_length)
@@ -199,6 +197,4 @@ def draw_arc(marker: Marker, radius: float, begin: float, end: float) -> None:
     marker.points += [point(back, 0.85 * radius), tip, point(back, 1.15 * radius)]
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node(WalkerDisplay)
+main = WalkerDisplay.main

@@ -31,7 +31,6 @@ from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.environment import PUNCTUAL
 from gait_entrainment_nodes.messaging.raw_messages import MessageTemplate
 from gait_entrainment_nodes.messaging.stamps import LOCK_STEP_START, START_DELAY, header, to_time
-from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.participant import Participant
 from gait_entrainment_nodes.nodes.walker_run import Stretch, WalkerRun
 from gait_entrainment_nodes.nodes.walker_sim_run import LockStepRun, RealTimeRun, Run, Starved
@@ -69,8 +68,8 @@ class WalkerSim(Participant):
     events_topic, progress_topic = topics.GAIT_EVENTS, topics.WALKER_PROGRESS
 
     def __init__(self, name: str = "walker_sim", **more_settings: type) -> None:
-        super().__init__(name)
-        self.begin_participation(
+        super().__init__(
+            name,
             settings=Settings,
             walker=WalkerParameters,
             variation=(Variation, "variation."),
@@ -129,12 +128,18 @@ class WalkerSim(Participant):
         due_at = time.monotonic_ns() + start - time.time_ns() + delay
         return RealTimeRun(number, walker, start, due_at=due_at)
 
-    def new_walk(self) -> WalkerRun:
-        """Return the walk of a run."""
+    def new_walk(self, kind: type[WalkerRun] = WalkerRun, **more: Any) -> WalkerRun:
+        """Return the walk of a run, of a kind that may take ``more``."""
         settings = self.settings
-        rate, first = settings.sample_rate, settings.first_heel_strike
-        both = settings.both_ankles
-        return WalkerRun(self.walker, first, rate, self.variation, settings.seed, both_ankles=both)
+        return kind(
+            self.walker,
+            settings.first_heel_strike,
+            settings.sample_rate,
+            self.variation,
+            settings.seed,
+            both_ankles=settings.both_ankles,
+            **more,
+        )
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Any:
         if self.run is not None:
@@ -243,6 +248,4 @@ class WalkerSim(Participant):
         self.publish_counts(run.number, stamp)
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node(WalkerSim)
+main = WalkerSim.main
