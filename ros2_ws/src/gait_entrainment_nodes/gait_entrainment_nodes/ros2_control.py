@@ -25,7 +25,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
-from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, nanoseconds_of
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment.robot.faults import DeviceError, Fault, LimitError
 from gait_entrainment.settings import setting
 from gait_entrainment_drivers.device import Reading, TorqueDevice
@@ -92,7 +92,7 @@ class EffortJoint(TorqueDevice):
         self.address = f"{options.controller}{under} in ROS domain {options.domain}"
         self._options = options
         self.capabilities = options.capabilities(options.peak_torque)
-        self._client: Any = None  # while the device is open
+        self._client: Client | None = None  # while the device is open
         self._manager: list[Any] = []  # clients of controller_manager: to list, to switch
         self._state: JointState | None = None  # not read yet
         self._age = math.inf  # of the joint's last state when it came [s]
@@ -110,14 +110,15 @@ class EffortJoint(TorqueDevice):
             )
         name, namespace = "gait_entrainment_driver", options.namespace
         self._client = Client(name, namespace=namespace, domain=options.domain)
-        node = self._client.node
-        node.create_subscription(JointState, options.joint_states, self._on_state, _STATES)
-        topic = f"{options.controller}/commands"
-        self._commands = node.create_publisher(Float64MultiArray, topic, _COMMANDS)
+        self._node = self._client.node
+        self._node.create_subscription(JointState, options.joint_states, self._on_state, _STATES)
+        self._commands = self._node.create_publisher(
+            Float64MultiArray, f"{options.controller}/commands", _COMMANDS
+        )
         if options.manage and ListControllers is not None:
             self._manager = [
-                node.create_client(ListControllers, "controller_manager/list_controllers"),
-                node.create_client(SwitchController, "controller_manager/switch_controller"),
+                self._node.create_client(ListControllers, "controller_manager/list_controllers"),
+                self._node.create_client(SwitchController, "controller_manager/switch_controller"),
             ]
         self._wait(
             lambda: self._age < math.inf,
@@ -153,19 +154,17 @@ class EffortJoint(TorqueDevice):
     def exchange(self, torque: float, timeout: float) -> Reading | None:
         """Publish a torque; return the joint's state if a new one has come or comes meanwhile."""
         self._publish(torque / self._options.ratio)
-        self._client.wait(lambda: self._state is not None, timeout)
+        self._spin(lambda: self._state is not None, timeout)
         state, self._state = self._state, None
         return None if state is None else self._reading(state)
 
     def forget(self) -> None:
         """Drop the states that have come, and take one that is measured now."""
         now = time.time_ns()
-
-        def fresh() -> bool:
-            return self._state is not None and nanoseconds_of(self._state.header.stamp) >= now
-
         self._state = None
-        self._client.wait(fresh, _FRESH_STATE_TIMEOUT)
+        self._spin(
+            lambda: self._state is not None and _stamp(self._state) >= now, _FRESH_STATE_TIMEOUT
+        )
 
     def disable(self) -> None:
         """Send zero and deactivate the controller."""
@@ -182,8 +181,7 @@ class EffortJoint(TorqueDevice):
         """Take a fresh state that has the joint in it; others are nobody's business."""
         if self._options.joint not in message.name:
             return
-        age = time.time_ns() - nanoseconds_of(message.header.stamp)
-        self._age = age / NANOSECONDS_PER_SECOND
+        self._age = (time.time_ns() - _stamp(message)) / NANOSECONDS_PER_SECOND
         if abs(self._age) < self._options.silence:
             self._place = list(message.name).index(self._options.joint)
             self._state = message
@@ -198,21 +196,27 @@ class EffortJoint(TorqueDevice):
 
     def _masters(self) -> tuple[Fault, ...]:
         """The fault of a second master, if there is one."""
-        masters = self._client.node.count_publishers(self._commands.topic_name)
-        return (SECOND_MASTER,) if masters > 1 else ()
+        return (
+            (SECOND_MASTER,) if self._node.count_publishers(self._commands.topic_name) > 1 else ()
+        )
 
     def _publish(self, effort: float) -> None:
         command = [0.0] * self._options.joint_count
         command[self._options.joint_index] = effort
         self._commands.publish(Float64MultiArray(data=command))
 
+    def _spin(self, until: Callable[[], bool], timeout: float) -> bool:
+        """Take what comes until something is so; return whether it is."""
+        assert self._client is not None
+        return bool(self._client.wait(until, timeout))
+
     def _wait(self, until: Callable[[], bool], lacking: Callable[[], str]) -> None:
-        if not self._client.wait(until, _DISCOVERY_TIMEOUT):
+        if not self._spin(until, _DISCOVERY_TIMEOUT):
             raise DeviceError(f"{self.name} of {self.address}: {lacking()}")
 
     def _switch(self, wanted: str) -> None:
         """Make the controller active or inactive, if controller_manager can be asked."""
-        if not self._manager or not self._client.wait(self._manager[0].service_is_ready, 0.2):
+        if not self._manager or not self._spin(self._manager[0].service_is_ready, 0.2):
             return
         listing, switching = self._manager
         name = self._options.controller
@@ -239,9 +243,13 @@ class EffortJoint(TorqueDevice):
 
     def _answer(self, client: Any, request: Any) -> Any:
         future = client.call_async(request)
-        if not self._client.wait(future.done, _SERVICE_TIMEOUT):
+        if not self._spin(future.done, _SERVICE_TIMEOUT):
             raise DeviceError("controller_manager does not answer: see whether it runs")
         return future.result()
+
+
+def _stamp(message: JointState) -> int:
+    return message.header.stamp.sec * NANOSECONDS_PER_SECOND + message.header.stamp.nanosec
 
 
 class Ros2ControlRobot(HostTimedRobot):

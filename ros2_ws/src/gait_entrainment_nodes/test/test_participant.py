@@ -103,6 +103,12 @@ def test_help_says_what_a_node_takes(make, module, monkeypatch):
         assert f"\n  {setting}: {told.meaning}" in text
 
 
+@pytest.mark.parametrize("make", [WalkerSim, SensorSim])
+def test_a_walk_awaits_the_torque_of_both_ankles_if_both_are_pushed(make):
+    with node(make, "-p", "both_ankles:=true") as made:
+        assert made.new_walk().ankles == 2
+
+
 @pytest.mark.parametrize("make", [Experiment, GaitAnalyzerNode, WalkerSim])
 def test_what_a_node_was_dumped_with_starts_it_again_without_a_word(make, tmp_path, capfd):
     with node(make) as made:
@@ -115,9 +121,3 @@ def test_what_a_node_was_dumped_with_starts_it_again_without_a_word(make, tmp_pa
         made.offer_ready()
         assert {n: made.get_parameter(n).value for n in values} == values
     assert capfd.readouterr().err == ""
-
-
-@pytest.mark.parametrize("make", [WalkerSim, SensorSim])
-def test_a_walk_awaits_the_torque_of_both_ankles_if_both_are_pushed(make):
-    with node(make, "-p", "both_ankles:=true") as made:
-        assert made.new_walk().ankles == 2
