@@ -61,9 +61,10 @@ def detect(
     troubles: list[str] = []
     end = max((t for s in streams for t in s.times if math.isfinite(t)), default=0.0)
     for stream in streams:
-        settings = chosen.detector.calibrated(chosen.settings, stream.times, stream.values)
+        walk = [*zip(stream.times, stream.values, strict=True)]
+        settings = chosen.detector.calibrated(chosen.settings, walk)
         detector = chosen.detector(stream.side, settings)
-        for time, values in zip(stream.times, stream.values, strict=True):
+        for time, values in walk:
             found += detector.add(time, values)
         troubles += detector.troubles(end)
     events, told = number(found, chosen.name)
