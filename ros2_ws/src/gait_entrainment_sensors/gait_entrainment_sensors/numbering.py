@@ -106,7 +106,7 @@ class Numbering:
                 "place in the gait"
             )
         if counts.airborne:
-            told.append(f"{counts.airborne} toe-offs precede the other foot's strike: running?")
+            told.append(f"{counts.airborne} toe-offs precede the other's strike: running? clocks?")
         if counts.missed:
             told.append(f"{counts.missed} events were missed")
         if counts.restarts:
