@@ -51,8 +51,7 @@ class ShankGyroscopeDetector(GyroscopeDetector):
     foot = False
 
     def __init__(self, side: Side, settings: Any = None) -> None:
-        # Forward rates, and when, before the swing and after it; those around begin it.
-        self._latest: deque[tuple[float, float]] = deque()
+        self._latest: deque[tuple[float, float]] = deque()  # forward rates, when: beside a swing
         super().__init__(side, settings)
 
     def _enter(self, *, swinging: bool, time: float) -> None:
