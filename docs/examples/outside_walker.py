@@ -11,14 +11,15 @@ A metronome: strides of 0.8 s, made up. Put your own source of events in the pla
 """
 
 import time
+from contextlib import suppress
 
 import rclpy.node
 
 from gait_entrainment_msgs import msg, srv
 from gait_entrainment_nodes.messaging.stamps import header, to_time
 
-STEP, PUSH_OFF = 400_000_000, 100_000_000  # from strike to strike, from strike to toe-off [ns]
-LATENCY = 50_000_000  # an event is known this long after its instant [ns]
+# From strike to strike, from strike to toe-off, and until an event is known [ns].
+STEP, PUSH_OFF, LATENCY = 400_000_000, 100_000_000, 50_000_000
 
 
 def event_at(place):
@@ -39,14 +40,13 @@ class OutsideWalker(rclpy.node.Node):
         self.create_service(srv.StartRun, "walker/start", self.begin)
 
     def begin(self, request, response):
-        self.run, self.start, self.end = request.run, time.time_ns(), 2**62  # not named yet
-        self.place = 0
+        self.run, self.start, self.end, self.place = request.run, time.time_ns(), 2**62, 0
         self.timer = self.create_timer(0.02, self.report)  # every 20 ms
         response.success, response.start = True, to_time(self.start)
         return response
 
     def hear(self, horizon):
-        if horizon.last:  # the experiment has named the end of the run
+        if horizon.last:  # the experiment names the end of the run, which was far
             self.end = horizon.until.sec * 10**9 + horizon.until.nanosec
 
     def report(self):
@@ -55,13 +55,14 @@ class OutsideWalker(rclpy.node.Node):
             stamp = header(self.start + event[0])
             self.events.publish(msg.GaitEvent(header=stamp, run=self.run, **event[1]))
             self.place += 1
-        state = msg.Progress.FINISHED if known == self.end else msg.Progress.WALKING
-        report = msg.Progress(header=header(known), run=self.run, events=self.place, state=state)
-        self.progress.publish(report)
-        if state == msg.Progress.FINISHED:
+        report = msg.Progress(header=header(known), run=self.run, events=self.place)
+        if known == self.end:
+            report.state = msg.Progress.FINISHED
             self.destroy_timer(self.timer)
+        self.progress.publish(report)
 
 
 if __name__ == "__main__":
     rclpy.init()
-    rclpy.spin(OutsideWalker())
+    with suppress(KeyboardInterrupt, rclpy.executors.ExternalShutdownException):
+        rclpy.spin(OutsideWalker())

@@ -117,15 +117,15 @@ def test_a_sensor_that_dies_ends_the_torque(tmp_path):
 
 def test_a_walker_from_outside_plays_the_role(tmp_path, monkeypatch):
     monkeypatch.setenv("ROS_DOMAIN_ID", "231")  # which no run takes by itself
-    outside = subprocess.Popen([sys.executable, EXAMPLE])
+    outside = subprocess.Popen([sys.executable, EXAMPLE], stderr=subprocess.PIPE, text=True)
     try:
         options = ("--real-time", "--walker=person", "--elsewhere=walker", "--json")
         with entrain_run(tmp_path / "bag", *options, *SHORT) as run:
             outcome = run.outcome()
-        assert outside.poll() is None  # how rclpy ends it is another matter
     finally:
-        outside.terminate()
-        outside.wait()
+        outside.send_signal(signal.SIGINT)
+        said = outside.communicate()[1]
+    assert (outside.returncode, said) == (0, "")
     assert outcome["lost"] == 0
     assert outcome["stride_period"] == pytest.approx([0.8] * 7, abs=1e-9)
     assert outcome["final_phase_lag_uncertainty"] == 0.001

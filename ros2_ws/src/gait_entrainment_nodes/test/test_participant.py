@@ -15,6 +15,7 @@ from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.nodes import experiment, gait_analyzer, walker_sim
 from gait_entrainment_nodes.nodes.experiment import Experiment
 from gait_entrainment_nodes.nodes.gait_analyzer import GaitAnalyzerNode
+from gait_entrainment_nodes.nodes.gait_detector import GaitDetector
 from gait_entrainment_nodes.nodes.parameters import HelpRequestedError
 from gait_entrainment_nodes.nodes.sensor_sim import SensorSim
 from gait_entrainment_nodes.nodes.walker_sim import WalkerSim
@@ -121,3 +122,16 @@ def test_what_a_node_was_dumped_with_starts_it_again_without_a_word(make, tmp_pa
         made.offer_ready()
         assert {n: made.get_parameter(n).value for n in values} == values
     assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("-p", "left_topic:=insole", "-p", "right_topic:=/insole"),
+        ("-r", "ground_reaction/right:=ground_reaction/left"),
+    ],
+)
+def test_both_feet_on_one_topic_are_refused(arguments):
+    refused = "left_topic, right_topic: both are"
+    with pytest.raises(ValueError, match=refused), node(GaitDetector, *arguments):
+        pass

@@ -57,7 +57,6 @@ class AnkleEncoderDetector(Detector):
     def __init__(self, side: Side, settings: Any = None) -> None:
         super().__init__(side, settings)
         self._period, self._range = OwnMedian(), OwnMedian()
-        self._unlikely = 0
         self._restart()
 
     @property
@@ -73,12 +72,8 @@ class AnkleEncoderDetector(Detector):
         self._strike = math.nan  # foreseen [s]
 
     def troubles(self, now: float | None = None) -> tuple[str, ...]:
-        """Say that this is the fallback, and which angles cannot be."""
-        where = f"{self.side.name.lower()} {self.name}"
-        told = (*super().troubles(now), f"{where}: {self.lacks}")
-        if not self._unlikely:
-            return told
-        return (*told, f"{where}: {self._unlikely} angles beyond 2 rad: in degrees?")
+        """Say that this is the fallback."""
+        return (*super().troubles(now), f"{self.side.name.lower()} {self.name}: {self.lacks}")
 
     def _take(self, time: float, values: Sequence[float]) -> list[Detection]:
         found: list[Detection] = []
@@ -86,8 +81,7 @@ class AnkleEncoderDetector(Detector):
             found = self._found(EventKind.HEEL_STRIKE, self._strike, time)
             self._strike = math.nan
         angle, torque = values
-        if abs(angle) > 2.0:
-            self._unlikely += 1
+        self.counts.unlikely += abs(angle) > 2.0
         if abs(torque) > self.settings.blank_torque:
             return found
         extreme = self._extreme

@@ -20,7 +20,7 @@ from typing import Any, ClassVar
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.errors import UsageError
 from gait_entrainment.robot.drivers import read_options
-from gait_entrainment.settings import Checked, setting
+from gait_entrainment.settings import Checked, SettingError, setting
 
 ENTRY_POINTS = "gait_entrainment.detectors"
 # A walk of this length has shown what the signal reaches [s].
@@ -64,6 +64,8 @@ class OwnMedian:
 class DetectorSettings(Checked):
     """What every detector can be told."""
 
+    hysteresis: ClassVar[tuple[str, ...]] = ()  # two levels, the first of which is the lower one
+
     longest_gap: float = setting(0.1, "longest time between two samples", "s", (1e-3, 1.0))
     longest_constant: float = setting(3.0, "longest time without change", "s", (0.1, 60.0))
     heel_strike_bias: float = setting(
@@ -72,6 +74,14 @@ class DetectorSettings(Checked):
     toe_off_bias: float = setting(
         0.0, "measured against a reference, taken off each toe-off", "s", (-0.2, 0.2)
     )
+
+    def __post_init__(self) -> None:
+        """Check every field, and that there is hysteresis."""
+        super().__post_init__()
+        levels = [f"{getattr(self, name):g}" for name in self.hysteresis]
+        if levels and not float(levels[0]) < float(levels[1]):
+            low, high = self.hysteresis
+            raise SettingError(f"{low}: {levels[0]}; allowed: below {high}, {levels[1]}")
 
 
 def _counted(told: str) -> Any:
@@ -93,6 +103,8 @@ class SignalCounts:
     )
     held: int = _counted("times the signal stuck while it moved: raise the range of the sensor")
     rejected: int = _counted("events were found and not believed")
+    lost: int = _counted("samples are zeros in mid-movement: lost on the way; see the link")
+    unlikely: int = _counted("angles beyond 2 rad: in degrees?")
     impossible: int = 0  # samples left out: beyond what a person can do: units, wrong sensor
 
 
@@ -141,15 +153,11 @@ class Detector(ABC):
         self._told_constant = self._told_held = False
         self._longest_gap = self.settings.longest_gap
         self._doubt = 0.0  # that the signals are what they should be
+        self._found_any = False
 
     @classmethod
-    def calibrated(
-        cls,
-        settings: Any,
-        times: Sequence[float],  # noqa: ARG003
-        samples: Sequence[Sequence[float]],  # noqa: ARG003
-    ) -> Any:
-        """Return settings completed by what a whole recorded walk tells; here as they are."""
+    def calibrated(cls, settings: Any, walk: Sequence[Any]) -> Any:  # noqa: ARG003
+        """Return settings completed by a whole walk, (time, values) each; here as they are."""
         return settings
 
     @property
@@ -216,11 +224,16 @@ class Detector(ABC):
         self._restart()
         return True
 
+    def _passed(self, level: float, before: float, value: float) -> float:
+        """Return when [s] what the latest two samples show passed a level."""
+        return self._time - (self._time - self._before) * (value - level) / (value - before)
+
     def _found(self, kind: EventKind, event: float, now: float) -> list[Detection]:
         """Return the event of an instant [s] that is decided now; none if late or doubted."""
         if self._doubt > _DOUBTED or now - event > self.latency + (now - self._before):
             self.counts.rejected += 1
             return []
+        self._found_any = True
         bias = self.settings.heel_strike_bias, self.settings.toe_off_bias
         return [Detection(kind, self.side, event - bias[kind], now, self.uncertainty[kind])]
 
@@ -258,6 +271,8 @@ class Detector(ABC):
             told.append(
                 f"{where}: never above {self._largest:.3g}, which a walk exceeds: {self.suspicion}"
             )
+        if self._walked_long and not (told or self._found_any):
+            told.append(f"{where}: no event yet: does anybody walk? else see sensor and settings")
         if now is not None and not now - self._time <= self._longest_gap:
             silent = "no sample yet" if self._time == -math.inf else "no sample for "
             seconds = "" if self._time == -math.inf else f"{now - self._time:.2f} s"

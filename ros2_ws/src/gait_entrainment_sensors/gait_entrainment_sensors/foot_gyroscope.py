@@ -46,44 +46,42 @@ class FootGyroscopeDetector(GyroscopeDetector):
         super().__init__(side, settings)
         self._pushes = Peaks(self.settings.least_peak, self.settings.peak_share)
 
-    def _restart(self) -> None:
-        super()._restart()
-        self._peak = 0.0  # of push-off; of a swing, its magnitude [rad/s]
-        self._fall = math.nan  # when the rate fell from that peak [s]
+    def _enter(self, *, swinging: bool, time: float) -> None:
+        super()._enter(swinging=swinging, time=time)
+        self._fall = math.nan  # when the rate fell from the peak of push-off [s]
         self._rest = self._turn = math.nan  # when it came to zero, and left it [s]
         self._slaps = False
 
     def _stance(self, time: float, before: float, rate: float) -> list[Detection]:
         found: list[Detection] = []
-        if rate < -self._swings.threshold:  # a swing, whose toe-off was not seen
-            self._begin_swing(time)
-            return found
         if self._slaps:  # until it lies flat
             self._peak = max(rate, self._peak)
             self._slaps = rate > _FALLEN * self._peak
             if not self._slaps:
                 self._peak = 0.0
-        if self._slaps or time - self._changed < self.settings.shortest_stance:
-            return found
+        elif time - self._changed >= self.settings.shortest_stance:
+            found = self._push_off(time, before, rate)
+        if not self._swinging and rate < -self._swings.threshold:  # its toe-off was not seen
+            self._enter(swinging=True, time=time)
+        return found
+
+    def _push_off(self, time: float, before: float, rate: float) -> list[Detection]:
+        """Follow the rate over its peak; the fall after that ends the stance."""
         level = _FALLING * self._peak
         if rate > self._peak:
             self._peak, self._fall = rate, math.nan
         elif rate > level:
             self._fall = math.nan
         elif before > level:
-            self._fall = self._crossing(time, before, rate, level)
-        if rate < _FALLEN * self._peak:
-            fall, peak = self._fall, self._peak
-            self._peak, self._fall = 0.0, math.nan
-            if self._pushes.is_step(peak):
-                found = self._found(EventKind.TOE_OFF, fall, time)
-                self._begin_swing(time)
-        return found
-
-    def _begin_swing(self, time: float) -> None:
-        self._enter(swinging=True, time=time)
+            self._fall = self._crossing(before, rate, level)
+        if rate >= _FALLEN * self._peak:
+            return []
+        fall, peak = self._fall, self._peak
         self._peak, self._fall = 0.0, math.nan
-        self._rest = self._turn = math.nan
+        if not self._pushes.is_step(peak):
+            return []
+        self._enter(swinging=True, time=time)
+        return self._found(EventKind.TOE_OFF, fall, time)
 
     def _swing(self, time: float, before: float, rate: float) -> list[Detection]:
         if rate < -_LEFT_ZERO:
@@ -97,22 +95,17 @@ class FootGyroscopeDetector(GyroscopeDetector):
                 self._enter(swinging=False, time=time)
             return []
         if self._rest != self._rest:
-            self._rest = self._crossing(time, before, rate, -_LEFT_ZERO)
+            self._rest = self._crossing(before, rate, -_LEFT_ZERO)
         if rate <= 0.0:
             self._turn = math.nan
         elif before <= 0.0:
-            self._turn = self._crossing(time, before, rate, 0.0)
+            self._turn = self._crossing(before, rate, 0.0)
         if before <= _LEFT_ZERO < rate:
-            self._turn = self._crossing(time, before, rate, _LEFT_ZERO)
+            self._turn = self._crossing(before, rate, _LEFT_ZERO)
         turned = self._turn == self._turn
         certain = (turned and rate > _SLAPPING) or time - self._rest >= self.settings.decision
         if not certain or time - self._changed < self.settings.shortest_swing:
             return []
-        strike, peak = self._turn if turned else self._rest, self._peak
+        found = self._land(self._turn if turned else self._rest, time)
         self._slaps = turned
-        self._enter(swinging=False, time=time)
-        self._peak, self._fall = 0.0, math.nan
-        if not self._swings.is_step(peak):
-            self.counts.rejected += 1
-            return []
-        return self._found(EventKind.HEEL_STRIKE, strike, time)
+        return found

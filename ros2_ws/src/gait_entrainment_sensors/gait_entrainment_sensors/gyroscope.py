@@ -14,10 +14,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-from gait_entrainment.conventions import Side
+from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.settings import setting
 from gait_entrainment_sensors.detection import Detection, Detector, DetectorSettings, OwnMedian
-from gait_entrainment_sensors.mounting import Mounting, find_mounting
+from gait_entrainment_sensors.mounting import Mounting, find_mounting, usual_mounting
 
 # Lean of the axis of swing from which on the toes turn in [rad]: 9 degrees.
 _TOES_IN = 0.15
@@ -99,17 +99,13 @@ class GyroscopeDetector(Detector):
         self._restart()
 
     @classmethod
-    def calibrated(
-        cls, settings: Any, times: Sequence[float], samples: Sequence[Sequence[float]]
-    ) -> Any:
+    def calibrated(cls, settings: Any, walk: Sequence[Any]) -> Any:
         """Return settings with the axis that a recorded walk tells, unless they name one."""
         if settings.axis is not None:
             return settings
-        found = find_mounting([*zip(times, samples, strict=True)], foot=cls.foot)
-        if found is None:
-            return settings
-        x, y, z = found.axis
-        return replace(settings, axis_x=x, axis_y=y, axis_z=z)
+        found = usual_mounting(walk, settings.calibration, foot=cls.foot)
+        axis = found.axis if found else (0.0, 0.0, 0.0)
+        return replace(settings, axis_x=axis[0], axis_y=axis[1], axis_z=axis[2])
 
     @property
     def latency(self) -> float:
@@ -118,8 +114,7 @@ class GyroscopeDetector(Detector):
 
     def _restart(self) -> None:
         self._first_pole = self._rate = math.nan
-        self._swinging = False
-        self._changed = self._time  # when the stance or swing in progress began [s]
+        self._enter(swinging=False, time=self._time)
 
     def troubles(self, now: float | None = None) -> tuple[str, ...]:
         """Add what the calibration found."""
@@ -145,7 +140,11 @@ class GyroscopeDetector(Detector):
         if axis is None:
             return []
         rate = axis[0] * values[0] + axis[1] * values[1] + axis[2] * values[2]
-        self._watch(time, rate)
+        if rate == 0.0 and not any(values) and abs(self._value) > self.moving:  # one was lost
+            self.counts.lost += 1
+            rate, self._value = self._value, 0.0
+        else:
+            self._watch(time, rate)
         interval = time - self._before
         if interval != self._interval:
             self._interval = interval
@@ -182,13 +181,23 @@ class GyroscopeDetector(Detector):
         # Before it is known it is asked for again soon.
         self._asked = time - (0.8 * longest if self._axis is None else 0.0)
 
-    def _crossing(self, time: float, before: float, rate: float, level: float) -> float:
+    def _crossing(self, before: float, rate: float, level: float) -> float:
         """Return when the rate crossed a level between two samples, the delay taken off."""
-        share = (level - before) / (rate - before)
-        return time - (1 - share) * (time - self._before) - self._delay
+        return self._passed(level, before, rate) - self._delay
 
     def _enter(self, *, swinging: bool, time: float) -> None:
+        """Begin a stance or a swing."""
         self._swinging, self._changed = swinging, time
+        self._peak = 0.0  # of push-off; of a swing, its magnitude [rad/s]
+
+    def _land(self, strike: float, time: float) -> list[Detection]:
+        """End a swing; return the strike if it was that of a step."""
+        peak = self._peak
+        self._enter(swinging=False, time=time)
+        if self._swings.is_step(peak):
+            return self._found(EventKind.HEEL_STRIKE, strike, time)
+        self.counts.rejected += 1
+        return []
 
     @abstractmethod
     def _stance(self, time: float, before: float, rate: float) -> list[Detection]:

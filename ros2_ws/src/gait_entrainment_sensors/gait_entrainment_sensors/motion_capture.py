@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 
 # Names of markers in the usual sets, in capitals and without the signs between, by what they are
 # here; where there are several, it is their mean.
-_HEEL = ("HEE", "HEEL", "CAL", "FCC")
+_HEEL = ("HEE", "HEEL", "CAL", "CALC", "FCC")
 _TOE = ("TOE", "MT1", "MT2", "MT5", "MTH2", "FM1", "FM2", "FM5")
 _PELVIS = ("SACR", "SACRUM", "VSAC", "LPSI", "RPSI", "LPSIS", "RPSIS", "LIPS", "RIPS")
 MARKERS: dict[str, tuple[str, ...]] = {
@@ -76,11 +76,11 @@ def read_c3d(
     try:
         file = ezc3d.c3d(str(path), extract_forceplat_data=plates)
     except (OSError, RuntimeError, ValueError, IndexError) as error:
-        reason = str(error).partition("\n")[0]
+        reason = str(error).partition("\n")[0].partition(", please")[0]  # please tell ezc3d
         raise RecordingError(f"{path}: cannot be read as C3D: {reason}") from None
     # Some systems put the subject's name and a colon before each.
     labels = [label.rpartition(":")[2] for label in file["parameters"]["POINT"]["LABELS"]["value"]]
-    plain = [re.sub(r"[\W_]", "", label).upper() for label in labels]
+    plain = [re.sub(r"[\W_]|(?<=^L)EFT|(?<=^R)IGHT", "", label.upper()) for label in labels]
     unit = _unit(path, file["parameters"]["POINT"].get("UNITS", {"value": ["mm"]})["value"])
     points = np.moveaxis(np.asarray(file["data"]["points"][:3], float), 0, -1) * unit
     points[~points.any(axis=-1)] = np.nan  # hidden, as some systems write it
@@ -101,7 +101,8 @@ def read_c3d(
                 f"{path}: has no marker {names[what]}, which is to be {what}; it has: "
                 f"{', '.join(labels) or 'none'}"
             )
-    platforms = file["data"].get("platform", [])
+    # There may be plates without a sample, as in a file of a standing trial.
+    platforms = [p for p in file["data"].get("platform", []) if np.size(p["force"])]
     up = _vertical(platforms)
     analog = float(file["header"]["analogs"]["frame_rate"])
     found_plates = tuple(_plate(path, platform, analog, up) for platform in platforms)
@@ -165,10 +166,10 @@ def events_on_plates(
         )
     contacts: list[list[Detection]] = []
     for index, plate in enumerate(capture.plates):
-        times, samples = plate.times.tolist(), plate.force[:, np.newaxis].tolist()
-        settings = chosen.detector.calibrated(chosen.settings, times, samples)
+        samples = [*zip(plate.times.tolist(), plate.force[:, np.newaxis].tolist(), strict=True)]
+        settings = chosen.detector.calibrated(chosen.settings, samples)
         detector = chosen.detector(Side.LEFT if sides is None else sides[index], settings)
-        events = [e for t, v in zip(times, samples, strict=True) for e in detector.add(t, v)]
+        events = [event for t, v in samples for event in detector.add(t, v)]
         if sides is not None:
             found += events
             told += detector.troubles()

@@ -37,7 +37,6 @@ class NumberingCounts:
     repeated: int = 0  # dropped: its place was taken
     implausible: int = 0  # dropped: too early or too late for any place
     airborne: int = 0  # dropped: toe-offs before the other foot's strike, as in running
-    before_first_strike: int = 0  # dropped: a run begins with a heel strike
     missed: int = 0  # places that were passed by without a detection
     restarts: int = 0  # times that the detections fitted together, but not what was known
 
@@ -79,8 +78,7 @@ class Numbering:
     def add(self, detection: Detection) -> GaitEvent | None:
         """Return the event, numbered, or None if it can have no place in the gait."""
         if not self._known:
-            if detection.kind is not EventKind.HEEL_STRIKE:
-                self.counts.before_first_strike += 1
+            if detection.kind is not EventKind.HEEL_STRIKE:  # with which a run begins
                 return None
             fate, place = "", self._begin(detection)
         else:
@@ -108,7 +106,7 @@ class Numbering:
                 "place in the gait"
             )
         if counts.airborne:
-            told.append(f"{counts.airborne} toe-offs precede the other foot's strike: running?")
+            told.append(f"{counts.airborne} toe-offs precede the other's strike: running? clocks?")
         if counts.missed:
             told.append(f"{counts.missed} events were missed")
         if counts.restarts:

@@ -59,13 +59,16 @@ def detect(
     """Return the events in recorded signals, in the order of detection; and what was wrong."""
     found: list[Detection] = []
     troubles: list[str] = []
-    end = max((t for s in streams for t in s.times if math.isfinite(t)), default=0.0)
+    times = [t for s in streams for t in s.times if math.isfinite(t)] or [0.0]
     for stream in streams:
-        settings = chosen.detector.calibrated(chosen.settings, stream.times, stream.values)
+        walk = [*zip(stream.times, stream.values, strict=True)]
+        settings = chosen.detector.calibrated(chosen.settings, walk)
         detector = chosen.detector(stream.side, settings)
-        for time, values in zip(stream.times, stream.values, strict=True):
+        for time, values in walk:
             found += detector.add(time, values)
-        troubles += detector.troubles(end)
+        troubles += detector.troubles(max(times))
+    if not (found or troubles):
+        troubles.append(f"it lasts {max(times) - min(times):.3g} s")
     events, told = number(found, chosen.name)
     return events, (*troubles, *told)
 

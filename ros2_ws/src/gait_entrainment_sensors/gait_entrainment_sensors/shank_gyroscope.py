@@ -3,7 +3,6 @@
 
 """A gyroscope on the shank."""
 
-import math
 from collections import deque
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -15,6 +14,8 @@ from gait_entrainment_sensors.gyroscope import GyroscopeDetector, GyroscopeSetti
 
 # Share of a peak below which the rate is past it for certain.
 _PAST = 0.75
+# The peak of push-off comes at most so long before the swing [s].
+_PUSH_OFF = 0.3
 
 
 @dataclass(frozen=True)
@@ -30,18 +31,18 @@ class ShankGyroscopeDetector(GyroscopeDetector):
     Events from the sagittal rate of the shank.
 
     The shank leans forward through stance, fastest at push-off, and swings back to a peak at
-    mid-swing. Toe-off is the forward peak before the zero crossing to swing, heel strike the first
-    one after the zero crossing that ends it (Aminian et al., J. Biomech. 35, 2002; Catalfamo et
-    al., Sensors 10, 2010).
+    mid-swing (Aminian et al., J. Biomech. 35, 2002; Catalfamo et al., Sensors 10, 2010). Push-off
+    is a plateau, which toe-off ends: taken is where the rate has fallen to three quarters of its
+    peak. Heel strike lies between the zero crossing after swing and the forward peak after that:
+    taken is where the rate has risen to half of that peak, or of the highest rate in
+    ``strike_decision`` where there is none.
 
-    Latency: the delay of the filter and ``decision``, for toe-off; a strike is told as soon as the
-    rate has fallen to three quarters of the peak, and without a peak put at the highest rate in
-    ``strike_decision`` after the zero crossing.
+    Latency: the delay of the filter and ``decision``, for toe-off, known at the zero crossing.
     Uncertainty: published errors are up to 25 ms for strikes and 75 ms for toe-offs (Catalfamo
     2010), taken as twice the standard deviation; no licensed record with a reference was found to
     measure it here.
-    Fails: where no forward peak precedes the swing within ``decision``, as with a stiff knee or in
-    very slow walking: no toe-off. So none on the simulated walker, whose knee does not bend.
+    Fails: where the fall begins more than ``decision`` before the swing, as with a stiff knee or
+    in very slow walking: no toe-off. So none on the simulated walker, whose knee does not bend.
     """
 
     name = "shank_gyroscope"
@@ -50,59 +51,58 @@ class ShankGyroscopeDetector(GyroscopeDetector):
     foot = False
 
     def __init__(self, side: Side, settings: Any = None) -> None:
-        self._latest: deque[tuple[float, float]] = deque()  # rates of the last moments, times
+        self._latest: deque[tuple[float, float]] = deque()  # forward rates, when: beside a swing
         super().__init__(side, settings)
 
-    def _restart(self) -> None:
-        super()._restart()
+    def _enter(self, *, swinging: bool, time: float) -> None:
+        super()._enter(swinging=swinging, time=time)
         self._latest.clear()
-        self._peak = 0.0  # of the swing, its magnitude [rad/s]
-        self._forward, self._at = 0.0, math.nan  # the peak after it [rad/s], [s]
-        self._crossed = math.nan  # when the rate crossed zero after the swing [s]
 
     def _stance(self, time: float, before: float, rate: float) -> list[Detection]:
+        latest = self._latest
         if rate < -self._swings.threshold:
             self._enter(swinging=True, time=time)
-            self._peak, self._crossed = 0.0, math.nan
             return []
-        if rate >= 0.0:
-            latest = self._latest
+        if rate >= 0.0 or before >= 0.0:
             latest.append((rate, time - self._delay))
-            if latest[0][1] < latest[-1][1] - self.settings.decision:
+            if latest[0][1] < latest[-1][1] - _PUSH_OFF:
                 latest.popleft()
-        elif before >= 0.0:
-            return self._leave(time)
-        return []
+        return self._leave(time) if rate < 0.0 <= before else []
 
     def _leave(self, time: float) -> list[Detection]:
-        """Look back at the zero crossing to swing: toe-off was the forward peak before it."""
-        latest = list(self._latest)
+        """Look back at the zero crossing to swing: where the rate fell for good was toe-off."""
+        latest = [*self._latest]
         self._latest.clear()
-        peak, at = max(latest, default=(0.0, math.nan))
+        peak, _ = max(latest)
         if peak < self.settings.least_peak or time - self._changed < self.settings.shortest_stance:
             return []
-        if at == latest[0][1]:  # higher before: no peak
-            self.counts.rejected += 1
+        fallen = max(i for i, (rate, _) in enumerate(latest, 1) if rate >= _PAST * peak)
+        toe_off = _when(latest[fallen - 1], latest[fallen], _PAST * peak)
+        if time - toe_off > self.latency:  # the knee did not bend
             return []
-        return self._found(EventKind.TOE_OFF, at, time)
+        return self._found(EventKind.TOE_OFF, toe_off, time)
 
     def _swing(self, time: float, before: float, rate: float) -> list[Detection]:
+        latest = self._latest
         if rate < 0.0:
             self._peak = max(self._peak, -rate)
-            self._crossed = math.nan
+            latest.clear()
             return []
-        if self._crossed != self._crossed:
-            self._crossed = self._crossing(time, before, rate, 0.0)
-            self._forward = 0.0
-        if rate > self._forward:
-            self._forward, self._at = rate, time - self._delay
-        past = self._forward >= self.settings.least_peak and rate < _PAST * self._forward
-        certain = past or time - self._crossed >= self.settings.strike_decision
+        if not latest:
+            latest.append((before, self._before - self._delay))
+        latest.append((rate, time - self._delay))
+        forward, _ = max(latest)
+        crossed = _when(latest[0], latest[1], 0.0)
+        past = forward >= self.settings.least_peak and rate < _PAST * forward
+        certain = past or time - crossed >= self.settings.strike_decision
         if not certain or time - self._changed < self.settings.shortest_swing:
             return []
-        peak, self._peak = self._peak, 0.0
-        self._enter(swinging=False, time=time)
-        if not self._swings.is_step(peak):
-            self.counts.rejected += 1
-            return []
-        return self._found(EventKind.HEEL_STRIKE, self._at, time)
+        risen = next(i for i, (reached, _) in enumerate(latest) if reached >= 0.5 * forward)
+        strike = _when(latest[risen - 1], latest[risen], 0.5 * forward)
+        return self._land(strike, time)
+
+
+def _when(before: tuple[float, float], after: tuple[float, float], level: float) -> float:
+    """Return when [s] the rate passed a level between two samples (rate, time)."""
+    share = (level - before[0]) / (after[0] - before[0])
+    return before[1] + share * (after[1] - before[1])

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from gait_entrainment.conventions import EventKind, Side
-from gait_entrainment.settings import SettingError, setting
+from gait_entrainment.settings import setting
 from gait_entrainment_sensors.detection import Detection, Detector, DetectorSettings, OwnMedian
 
 # Steps from which on the person's own stances and swings are known.
@@ -24,6 +24,7 @@ _UNLOADED, _PULLED = 150.0, -100.0
 class VerticalForceSettings(DetectorSettings):
     """What the detector can be told."""
 
+    hysteresis: ClassVar[tuple[str, ...]] = ("toe_off_force", "strike_force")
     sign: float = setting(1.0, "-1: the foot's force on the ground is measured", "1", (-1, 1))
     strike_force: float = setting(40.0, "force that a foot on the ground exceeds", "N", (1, 500))
     toe_off_force: float = setting(20.0, "force at both events", "N", (0.5, 500.0))
@@ -34,15 +35,6 @@ class VerticalForceSettings(DetectorSettings):
     longest_stance: float = setting(2.0, "longest stance in walking", "s", (0.2, 10.0))
     least_share: float = setting(0.5, "shortest stance or swing, of the own median", "1", (0, 1))
     most_share: float = setting(1.4, "longest stance, of the own median", "1", (1.0, 10.0))
-
-    def __post_init__(self) -> None:
-        """Check every field, and that there is hysteresis."""
-        super().__post_init__()
-        if self.strike_force <= self.toe_off_force:
-            raise SettingError(
-                f"toe_off_force: {self.toe_off_force:g} N; allowed: below strike_force, "
-                f"{self.strike_force:g} N"
-            )
 
 
 class VerticalForceDetector(Detector):
@@ -89,14 +81,9 @@ class VerticalForceDetector(Detector):
         self._restart()
 
     @classmethod
-    def calibrated(
-        cls,
-        settings: Any,
-        times: Sequence[float],  # noqa: ARG003
-        samples: Sequence[Sequence[float]],
-    ) -> Any:
+    def calibrated(cls, settings: Any, walk: Sequence[Any]) -> Any:
         """Return settings with the sign that a recording tells: feet press the ground down."""
-        force = np.array([values[0] for values in samples])
+        force = np.array([values[0] for _, values in walk])
         force = force[np.isfinite(force)]
         if not force.size:
             return settings
@@ -139,23 +126,23 @@ class VerticalForceDetector(Detector):
                 self._zero_anew(time, force)
             elif force < lower:
                 if self._changed != self._changed:
-                    self._changed = time
-                    self._fall = time - (time - self._before) * (lower - force) / (before - force)
+                    self._changed, self._fall = time, self._passed(lower, before, force)
                 if time - self._changed >= settings.debounce:
                     return self._leave(time)
             return []
+        pulled = max(force, force + self._zero) <= _PULLED  # however the sensor was zeroed
         if force < lower:
             self._on, self._rise, self._changed = False, math.nan, math.nan
             self._unloaded = True
-            self._downwards += force < _PULLED
+            self._downwards += pulled
         elif before < lower:
-            self._rise = time - (time - self._before) * (force - lower) / (force - before)
+            self._rise = self._passed(lower, before, force)
         if force >= upper:
             if self._changed != self._changed:
                 self._changed = time
             if time - self._changed >= settings.debounce:
                 return self._meet(time)
-        if _PULLED < force < upper:  # in the air, however the sensor was zeroed
+        if force < upper and not pulled:  # in the air
             interval = time - self._before
             self._zero += force * interval / (settings.zeroing_time + interval)
         return []

@@ -108,6 +108,16 @@ def test_a_constant_signal_is_told_once():
     assert detector.counts.constant == 1
 
 
+def test_a_signal_in_which_nothing_is_found_is_told():
+    contacts = sampled(lambda t: ((force(t) > 0) * 0.5, 0.0), UNTIL)  # neither closed nor open
+    detector = find_detector("foot_switch:open_below=0.1,closed_above=0.55").make(Side.RIGHT)
+    detector.reached = 0.0
+    assert fed(detector, contacts) == []
+    assert detector.troubles() == (
+        "right foot_switch: no event yet: does anybody walk? else see sensor and settings",
+    )
+
+
 SAMPLE = st.tuples(
     st.floats(-1.0, 1.0) | st.just(0.005) | st.floats(),
     st.lists(st.floats(), min_size=3, max_size=3),

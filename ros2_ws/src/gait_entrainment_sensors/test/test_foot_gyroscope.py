@@ -48,7 +48,7 @@ def test_a_walk_beside_motion_capture(text):
 @pytest.mark.parametrize("rate", [100.0, 200.0, 1000.0])
 def test_events_of_a_closed_form(rate):
     detector = FootGyroscopeDetector(Side.RIGHT, UPRIGHT)
-    found = fed(detector, sampled(lambda t: (0.0, foot_rate(t), 0.0), UNTIL, rate))
+    found = fed(detector, sampled(lambda t: (0.01, foot_rate(t), 0.0), UNTIL, rate))
     strikes, toe_offs = times(found, STRIKE), times(found, TOE_OFF)
     assert len(strikes) == 13  # of the first no swing comes before
     # The slap passes 0.25 rad/s 2 ms after the strike; the fall three quarters after 5 ms.
@@ -122,6 +122,38 @@ def test_a_sensor_that_turns_over_in_mid_trial_is_told():
     assert any("the other way round: set" in line for line in detector.troubles())
 
 
+def test_a_push_off_that_ends_between_two_samples_is_a_toe_off():
+    def abrupt(time):
+        phase = (time - OFFSET[Side.RIGHT]) % STRIDE
+        swings = time > OFFSET[Side.RIGHT] and phase > STANCE
+        return (0.0, -5.0 * (phase < STRIDE - 0.05) if swings else foot_rate(time), 0.0)
+
+    found = fed(FootGyroscopeDetector(Side.RIGHT, UPRIGHT), sampled(abrupt, UNTIL, 50.0))
+    ends = [OFFSET[Side.RIGHT] + n * STRIDE + STANCE for n in range(13)]
+    assert times(found, TOE_OFF) == pytest.approx(ends, abs=0.02)
+
+
+def test_a_first_step_without_a_push_off_does_not_hide_the_mounting():
+    starts, ends = OFFSET[Side.RIGHT] + STANCE + 0.02, OFFSET[Side.RIGHT] + 4 * STRIDE + 0.2
+
+    def short(time):
+        return (0.0, foot_rate(time) if starts < time < ends else 0.0, 0.0)
+
+    walk = sampled(short, ends + 1.0)
+    axes = FootGyroscopeDetector.Settings()
+    assert FootGyroscopeDetector.calibrated(axes, walk).axis == (0.0, 1.0, 0.0)
+
+
+def test_who_turns_round_for_longer_than_walks_has_the_axis_of_the_walk():
+    def turning(time):
+        rate = foot_rate(time)
+        return (0.0, rate, 0.0) if time < 8.0 else (1.5 * foot_rate(time), 0.2 * rate, 0.0)
+
+    walk = sampled(turning, 12.0)
+    axes = FootGyroscopeDetector.Settings()
+    assert FootGyroscopeDetector.calibrated(axes, walk).axis == (0.0, 1.0, 0.0)
+
+
 def test_the_slap_of_a_slow_first_step_is_no_push_off():
     found = fed(
         FootGyroscopeDetector(Side.RIGHT, UPRIGHT),
@@ -134,8 +166,21 @@ def test_the_slap_of_a_slow_first_step_is_no_push_off():
 def test_gaps_do_not_turn_the_mounting_over():
     for stream in foot_rates():
         kept = [(t, v) for t, v in zip(stream.times, stream.values, strict=True) if t % 9 < 6]
-        settings = FootGyroscopeDetector.calibrated(UPRIGHT.__class__(), *zip(*kept, strict=True))
+        settings = FootGyroscopeDetector.calibrated(UPRIGHT.__class__(), kept)
         assert settings.axis == (0.0, 1.0, 0.0)
+
+
+def test_single_samples_that_are_lost_as_zeros_are_no_events():
+    samples = sampled(lambda t: (0.0, foot_rate(t) + 0.01, 0.0), UNTIL)
+    whole = fed(FootGyroscopeDetector(Side.RIGHT, UPRIGHT), samples)
+    for first in range(25):
+        with_zeros = list(samples)
+        with_zeros[first::25] = [(t, (0.0, 0.0, 0.0)) for t, _ in samples[first::25]]
+        detector = FootGyroscopeDetector(Side.RIGHT, UPRIGHT)
+        found = fed(detector, with_zeros)
+        for kind in EventKind:
+            assert times(found, kind) == pytest.approx(times(whole, kind), abs=0.01)
+        assert any("zeros in mid-movement" in line for line in detector.troubles())
 
 
 def test_sensors_on_the_wrong_feet_are_told():

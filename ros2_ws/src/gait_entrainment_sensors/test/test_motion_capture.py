@@ -21,6 +21,7 @@ FORCE = find_detector("vertical_force")
 # Contacts on plates of 0.6 m, one behind the other: plate, foot, strike [s], toe-off [s].
 CONTACTS = [(0, Side.RIGHT, 1.0, 1.7), (1, Side.LEFT, 1.55, 2.25)]
 LABELS = ["LHEE", "LTOE", "RHEE", "RTOE", "SACR"]
+LABELS_IN_WORDS = ["Left_Heel", "Left Toe", "RightHeel", "Bob:right.toe", "Sacrum"]
 
 
 def feet(side, time):
@@ -93,6 +94,18 @@ def test_a_plate_without_a_contact_is_told(tmp_path):
     found, told = events_on_plates(read_c3d(write(tmp_path / "a.c3d", sign=-1e-3)), FORCE)
     assert found == []
     assert told[0] == "plate 1: no contact, by forces of -1 to 0 N"
+
+
+def test_plates_without_a_sample_are_none(tmp_path):
+    path = write(tmp_path / "a.c3d", labels=LABELS_IN_WORDS)
+    assert len(read_c3d(path).plates) == 2
+    file = ezc3d.c3d(str(path))
+    file["data"]["analogs"] = np.zeros((1, 0, 0))
+    file["parameters"]["ANALOG"]["LABELS"]["value"] = []
+    file["parameters"]["ANALOG"]["RATE"]["value"] = [0.0]
+    file.write(str(path))
+    capture = read_c3d(path)
+    assert (len(capture.plates), len(capture.markers)) == (0, 5)
 
 
 def test_a_contact_of_both_feet_is_nobody_s_and_told(tmp_path):

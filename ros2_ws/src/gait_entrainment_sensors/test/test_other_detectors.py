@@ -89,6 +89,26 @@ def test_peaks_of_the_shank_are_its_events():
     assert all(d.detected_at - d.time <= detector.latency + 0.005 for d in found)
 
 
+def test_toe_off_ends_the_plateau_of_push_off_and_a_jump_is_a_strike():
+    def plateau(time):
+        phase = phase_of(time)
+        if time < OFFSET[Side.RIGHT] or phase < STANCE - 0.16:
+            return (0.0, 1.2 if time > OFFSET[Side.RIGHT] else 0.0, 0.0)
+        if phase < STANCE:  # its peak is well before its end
+            return (0.0, 3.0 - 2.0 * (phase - STANCE + 0.16), 0.0)
+        return (0.0, -6.0 * math.sin(math.pi * (phase - STANCE) / (STRIDE - STANCE)) - 0.3, 0.0)
+
+    detector = ShankGyroscopeDetector(
+        Side.RIGHT, ShankGyroscopeDetector.Settings(axis_y=1.0, decision=0.05)
+    )
+    found = fed(detector, sampled(plateau, UNTIL))
+    for kind, late in ((STRIKE, 0.0), (TOE_OFF, STANCE)):
+        assert len(times(found, kind)) >= 9
+        for time in times(found, kind):
+            off = (time - OFFSET[Side.RIGHT] - late + STRIDE / 2) % STRIDE - STRIDE / 2
+            assert abs(off) < 0.008
+
+
 @pytest.mark.parametrize("sign", [1, -1])
 def test_the_mounting_of_the_shank_is_found(sign):
     detector = ShankGyroscopeDetector(Side.RIGHT)

@@ -125,6 +125,21 @@ def test_who_stops_or_walks_slowly_leaves_the_ground_when_he_does(factor):
     assert detector._zero == pytest.approx(0.0, abs=5.0)
 
 
+def test_who_stood_on_the_other_leg_is_not_taken_for_a_belt_that_is_not_zeroed():
+    """Of a foot that bears 120 N for three seconds, and then walks."""
+    stands = OFFSET[Side.RIGHT] + 2 * STRIDE + 0.3, OFFSET[Side.RIGHT] + 5 * STRIDE + 0.3
+
+    def signal(time):
+        standing = 120.0 + 5.0 * math.sin(9.0 * time)
+        return (standing if stands[0] < time < stands[1] else force(time),)
+
+    detector, found = detected(signal)
+    assert abs(detector._zero) < 5.0
+    assert detector.troubles() == ()
+    strikes = [OFFSET[Side.RIGHT] + n * STRIDE for n in (7, 8, 9, 10)]
+    assert times(found, STRIKE)[-4:] == pytest.approx(strikes, abs=0.02)
+
+
 @pytest.mark.parametrize(
     ("signal", "words"),
     [

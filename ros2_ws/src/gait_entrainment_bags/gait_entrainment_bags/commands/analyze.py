@@ -99,10 +99,8 @@ def _of_tables(options: argparse.Namespace) -> int:
     """Analyze a table of events and one of pulses, and print."""
     lacking = [f"--{name}" for name in (*TABLES, "side") if getattr(options, name) is None]
     if options.bag is not None or lacking:
-        raise UsageError(
-            "give BAG, or else --events, --pulses and --side; missing: "
-            f"{', '.join(lacking) or '-'}"
-        )
+        wrong = f"missing: {', '.join(lacking)}" if lacking else "not both"
+        raise UsageError(f"give BAG, or else --events, --pulses and --side; {wrong}")
     if options.figures is not None or options.onset is not None:
         raise UsageError("--figures and --onset need a BAG")
     told = told_of_record(options)

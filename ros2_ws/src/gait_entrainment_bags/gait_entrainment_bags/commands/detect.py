@@ -35,6 +35,7 @@ columns: docs/sensors.md
 """
 # Detectors in the order in which their signals are looked for.
 TRIED = ("vertical_force", "foot_switch", "foot_gyroscope", "shank_gyroscope", "ankle_encoder")
+Found = tuple[list[DetectedEvent], tuple[str, ...]]  # and what was wrong
 # What is no detector: it needs the whole recording.
 BY_MARKERS = "markers"
 Found = tuple[list[DetectedEvent], tuple[str, ...]]  # the events, and what is wrong with them
@@ -73,8 +74,13 @@ def run(options: argparse.Namespace) -> int:
     out = options.out or path.with_name(f"{path.stem}_events.tsv")
     if not path.exists():
         raise RecordingError(f"{path}: there is no such file")
-    read = {".c3d": _of_c3d, ".mcap": _of_bag}.get(path.suffix.lower(), _of_table)
-    events, troubles = (_of_bag if path.is_dir() else read)(path, options)
+    kind = ".mcap" if path.is_dir() else path.suffix.lower()
+    read = {".c3d": _of_c3d, ".mcap": _of_bag}.get(kind, _of_table)
+    taken = {_of_c3d: "marker plates", _of_table: "column rate"}.get(read, "")
+    for name in ("column", "rate", "marker", "plates"):
+        if getattr(options, name) and name not in taken:
+            raise UsageError(f"--{name}: {path} is of another kind, which has none")
+    events, troubles = read(path, options)
     if not events:
         reason = f": {'; '.join(troubles)}" if troubles else ""
         raise RecordingError(f"{path}: holds no gait event that could be detected{reason}")

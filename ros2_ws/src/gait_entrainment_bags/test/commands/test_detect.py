@@ -54,7 +54,7 @@ def test_a_run_from_tables_has_the_outcome_of_the_same_run(capsys, tables, simul
     [
         ([], "missing: --events, --pulses, --side"),
         (["--events", "e.tsv", "--pulses", "p.tsv"], "missing: --side"),
-        (["bag", "--events", "e.tsv", "--pulses", "p.tsv", "--side", "left"], "give BAG, or else"),
+        (["bag", "--events", "e.tsv", "--pulses", "p.tsv", "--side", "left"], "--side; not both"),
     ],
 )
 def test_a_bag_or_tables_and_the_leg(capsys, words, message):
@@ -107,7 +107,8 @@ def test_detect_writes_beside_the_file_and_prints(capsys, tmp_path):
         (["FILE", "--column", "x"], "--column: 'x'; allowed: NAME=NAME_IN_FILE"),
         (["FILE", "--column", "time=z"], "has no column z, which is to be time"),
         (["FILE", "--detector", "guess"], "detector: 'guess' is unknown"),
-        (["FILE"], "holds no gait event"),
+        (["FILE", "--plates", "left,right"], "--plates: "),
+        (["FILE"], "holds no gait event that could be detected: it lasts 0"),
     ],
 )
 def test_what_is_refused_is_one_line(capsys, tmp_path, words, message):
