@@ -35,7 +35,6 @@ columns: docs/sensors.md
 """
 # Detectors in the order in which their signals are looked for.
 TRIED = ("vertical_force", "foot_switch", "foot_gyroscope", "shank_gyroscope", "ankle_encoder")
-Found = tuple[list[DetectedEvent], tuple[str, ...]]  # and what was wrong
 # What is no detector: it needs the whole recording.
 BY_MARKERS = "markers"
 Found = tuple[list[DetectedEvent], tuple[str, ...]]  # the events, and what is wrong with them
@@ -76,7 +75,7 @@ def run(options: argparse.Namespace) -> int:
         raise RecordingError(f"{path}: there is no such file")
     kind = ".mcap" if path.is_dir() else path.suffix.lower()
     read = {".c3d": _of_c3d, ".mcap": _of_bag}.get(kind, _of_table)
-    taken = {_of_c3d: "marker plates", _of_table: "column rate"}.get(read, "")
+    taken = {_of_c3d: ("marker", "plates"), _of_table: ("column", "rate")}.get(read, ())
     for name in ("column", "rate", "marker", "plates"):
         if getattr(options, name) and name not in taken:
             raise UsageError(f"--{name}: {path} is of another kind, which has none")
