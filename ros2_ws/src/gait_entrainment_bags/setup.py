@@ -9,17 +9,12 @@ setup(
     name=NAME,
     version="0.1.0",
     description="Bags of gait entrainment experiments, without ROS",
-    author="The gait_entrainment authors",
-    license="Apache-2.0",
     packages=find_packages(include=[NAME, NAME + ".*"]),
     package_data={NAME: ["py.typed"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/" + NAME]),
         ("share/" + NAME, ["package.xml"]),
     ],
-    install_requires=["setuptools"],
-    extras_require={"test": ["pytest"]},  # so that colcon test runs pytest
-    zip_safe=False,
     entry_points={
         "gait_entrainment.commands": [f"bags = {NAME}.commands"],
     },

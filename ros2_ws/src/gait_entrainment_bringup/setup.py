@@ -11,8 +11,6 @@ setup(
     name=NAME,
     version="0.1.0",
     description="What runs together in gait entrainment experiments",
-    author="The gait_entrainment authors",
-    license="Apache-2.0",
     packages=find_packages(include=[NAME, NAME + ".*"]),
     package_data={NAME: ["py.typed"]},
     data_files=[
@@ -23,9 +21,6 @@ setup(
         ("share/" + NAME + "/rviz", glob("rviz/*")),
         ("share/" + NAME + "/layouts", glob("layouts/*")),
     ],
-    install_requires=["setuptools"],
-    extras_require={"test": ["pytest"]},  # so that colcon test runs pytest
-    zip_safe=False,
     entry_points={
         "gait_entrainment.commands": [f"bringup = {NAME}.commands"],
     },

@@ -22,8 +22,6 @@ setup(
     name=NAME,
     version="0.1.0",
     description="ROS 2 nodes of gait entrainment experiments",
-    author="The gait_entrainment authors",
-    license="Apache-2.0",
     packages=find_packages(include=[NAME, NAME + ".*"]),
     package_data={NAME: ["py.typed"]},
     data_files=[
@@ -32,9 +30,6 @@ setup(
         ("share/" + NAME + "/config", glob("config/*")),
         ("share/" + NAME + "/urdf", glob("urdf/*")),
     ],
-    install_requires=["setuptools"],
-    extras_require={"test": ["pytest"]},  # so that colcon test runs pytest
-    zip_safe=False,
     entry_points={
         "console_scripts": [f"{node} = {NAME}.executable:main" for node in NODES],
         "gait_entrainment.commands": [f"nodes = {NAME}.commands"],
