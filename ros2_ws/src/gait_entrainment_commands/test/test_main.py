@@ -3,6 +3,7 @@
 
 """In a workspace that lacks a Python package the command line says so."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -40,3 +41,24 @@ def test_what_drives_a_robot_heeds_signals_before_it_is_loaded(monkeypatch, comm
         for number, handler in before.items():
             signal.signal(number, handler)
     assert set(seen.values()) == {signal.default_int_handler if heeded else signal.SIG_IGN}
+
+
+@pytest.mark.parametrize(
+    ("stream", "arguments", "code"),
+    [
+        ("stdout", ["--help"], 1),
+        ("stdout", ["simulate", "--help"], 1),
+        ("stderr", ["simulate", "--baseline=-3"], 2),
+    ],
+)
+def test_where_nothing_can_be_written_the_exit_code_tells(monkeypatch, stream, arguments, code):
+    with open("/dev/full", "w", buffering=1) as full:
+        monkeypatch.setattr(sys, stream, full)
+        assert main(arguments) == code
+        os.dup2(os.open(os.devnull, os.O_WRONLY), full.fileno())
+
+
+def test_figures_ask_no_backend_of_windows(monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", "module://of.a.notebook")
+    assert main(["simulate", "--baseline=-3"]) == 2
+    assert "MPLBACKEND" not in os.environ
