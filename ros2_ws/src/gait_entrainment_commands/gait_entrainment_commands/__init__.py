@@ -59,9 +59,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(end="", flush=True)  # what was printed and cannot be written is an error, too
         return code
     except EntrainmentError as error:
-        # One line, whatever the names and texts in it hold.
-        told = (c if c.isprintable() else repr(c)[1:-1] for c in str(error))
-        _tell(f"{prog}: {''.join(told)}")
+        # One line, whatever names it holds, and behind it, indented, the end of a node's log.
+        reason, indented, log = str(error).partition("\n  ")
+        told = (c if c.isprintable() else repr(c)[1:-1] for c in reason)
+        _tell(f"{prog}: {''.join(told)}{indented}{log}")
         return error.exit_code
     except ModuleNotFoundError as error:
         package = (error.name or "").partition(".")[0]

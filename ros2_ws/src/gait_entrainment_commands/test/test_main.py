@@ -10,6 +10,7 @@ import sys
 
 import pytest
 
+from gait_entrainment.errors import EntrainmentError
 from gait_entrainment_commands import main
 from gait_entrainment_commands.signals import STOPPING
 
@@ -56,6 +57,16 @@ def test_where_nothing_can_be_written_the_exit_code_tells(monkeypatch, stream, a
         monkeypatch.setattr(sys, stream, full)
         assert main(arguments) == code
         os.dup2(os.open(os.devnull, os.O_WRONLY), full.fileno())
+
+
+def test_an_error_is_one_line_before_the_end_of_a_log(monkeypatch, capsys):
+    def fail(_):
+        raise EntrainmentError("no file a\nb\n  walker_sim| started\n  walker_sim| failed")
+
+    monkeypatch.setattr("gait_entrainment_commands.make_parser", fail)
+    assert main(["run_it"]) == 1
+    told = "entrain run_it: no file a\\nb\n  walker_sim| started\n  walker_sim| failed\n"
+    assert capsys.readouterr().err == told
 
 
 def test_figures_ask_no_backend_of_windows(monkeypatch):

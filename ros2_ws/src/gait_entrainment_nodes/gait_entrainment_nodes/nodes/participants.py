@@ -65,9 +65,8 @@ class Participants:
 
     async def check(self, longest_clock_offset: float) -> None:
         """
-        Raise ExperimentError if a participant is not ready: who, and what it waits for.
+        Raise ExperimentError if a participant is not ready, or who publishes has rivals: who.
 
-        Nor may anybody else publish what a run is built on.
         Raises ClockError if its clock is off by more than a limit [s]; 0 compares no clocks.
         """
         here = self._node.get_namespace()
