@@ -119,6 +119,7 @@ def test_second_protocol_second_train_and_reset_are_refused_in_mid_run(conducted
     answer = conducted.reset()
     assert not answer.success
     assert "run 1 is in progress" in answer.message
+    strays = []
     for topic, stray in (  # messages that cannot be: none of them ends the run either
         (TORQUE_PROFILE, TorqueProfile(run=1, side=Side.RIGHT)),
         (GAIT_EVENTS, GaitEvent(run=1, kind=7)),
@@ -127,11 +128,14 @@ def test_second_protocol_second_train_and_reset_are_refused_in_mid_run(conducted
         publisher = conducted.probe.node.create_publisher(topic.type, topic.name, topic.qos)
         conducted.probe.until(publisher.get_subscription_count, "the nodes")
         publisher.publish(stray)
+        strays.append(publisher)
     # Cancelling the protocol brings the torque to zero.
     future = handle.cancel_goal_async()
     conducted.probe.until(future.done, "an answer to the cancellation")
     result = conducted.assert_torque_ended(handle, 1, "cancelled by the client")
     assert result.outcome == RunProtocol.Result.CANCELLED
+    for publisher in strays:  # with them there would be no other run
+        conducted.probe.node.destroy_publisher(publisher)
 
 
 def test_walker_must_be_reset_between_runs(conducted):

@@ -286,7 +286,9 @@ def test_what_comes_before_ros_time_begins_is_logged_at_its_beginning(tmp_path: 
         size = size_of(process.bag)
         listener.until(lambda: size_of(process.bag) > size, "data in the file")
         left.publish(joints(2, 78 * SECOND + 3600 * SECOND))  # an hour ahead of ROS time
-        assert process.finish(listener, left=3, clock=1, empty=2, event=1) == 0
+        for tick in (3600 * SECOND, -2 * SECOND, 78 * SECOND):  # two that cannot be
+            clock.publish(CLOCK.type(clock=to_time(tick)))
+        assert process.finish(listener, left=3, clock=4, empty=2, event=1) == 0
     assert check(process.bag) == []
     with BagReader(process.bag) as bag:
         assert bag.start == 77 * SECOND

@@ -197,6 +197,7 @@ class _FileCheck:
                 self._report.add("intact", damage)
             with self._report.adding("intact"):
                 self._file.check_data()
+        self._record.announce(*self._stock.names.values())
         self._check_schemas()
         self._check_channels()
         recorded = bool(recorded_description(self._stock.metadata))

@@ -26,11 +26,15 @@ class RunRecord:
     """
 
     def __init__(self) -> None:
-        self._recorded: Counter[str] = Counter()  # messages by topic
+        self._recorded: Counter[str] = Counter()  # messages by topic, of all that are announced
         self._published: dict[str, int] = {}  # the same, as the nodes say
         # By topic, run, and ankle of a profile; from 0.
         self._numbers: dict[tuple[TopicInfo, int, int], set[int]] = {}
         self._ended: set[tuple[TopicInfo, int, int]] = set()
+
+    def announce(self, *topics: str) -> None:
+        """Take the names of topics that are in the bag, with or without a message."""
+        self._recorded.update(dict.fromkeys(topics, 0))
 
     def add(self, topic: TopicInfo, data: bytes) -> None:
         """Take a message; one that cannot be decoded is ignored."""
@@ -45,7 +49,7 @@ class RunRecord:
             place = topic, message.run, message.side if topic.type == _PROFILE else 0
             numbers = self._numbers.setdefault(place, set())
             if topic.type == _EVENT:  # heel strike n closes step n, toe-off n begins its swing
-                numbers.add(2 * message.step - message.kind)
+                numbers.add(max(2 * message.step - message.kind, 0))  # none is before strike 0
                 return
             numbers.add(message.revision)
             if message.last or message.stop:
@@ -58,7 +62,7 @@ class RunRecord:
         holes = [
             f"{topic}: {count - self._recorded[topic]} of {count} messages"
             for topic, count in self._published.items()
-            if 0 < self._recorded[topic] < count
+            if topic in self._recorded and self._recorded[topic] < count
         ]
         for place, numbers in self._numbers.items():
             topic, run, _ = place

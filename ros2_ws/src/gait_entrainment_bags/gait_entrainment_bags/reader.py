@@ -152,9 +152,9 @@ class BagReader(AbstractContextManager["BagReader"]):
         ]
         return min(names, key=len, default=None)
 
-    def messages_of(self, relative: str) -> Iterator[Any]:
-        """Give the decoded messages of the topic with this relative name; none without it."""
-        name = self.find_topic(relative)
+    def messages_of(self, relative: str, type_name: str = "") -> Iterator[Any]:
+        """Give the decoded messages of the topic that `find_topic` finds; none without it."""
+        name = self.find_topic(relative, type_name)
         for _, message in self.decoded([name] if name else []):
             yield message
 
@@ -220,7 +220,7 @@ def bag_files(path: Path) -> list[Path]:
     listed = description.get("relative_file_paths")
     if isinstance(listed, list) and listed:
         # Only the names count: what lies outside of its folder is no part of a bag.
-        files = [path / PurePath(str(name)).name for name in listed]
+        files = [path / name for name in dict.fromkeys(PurePath(str(n)).name for n in listed)]
         if compressed := [file.name for file in files if file.suffix == ".zstd"]:
             raise UnreadableBagError(
                 f"{path}: {compressed[0]} is compressed as a whole; decompress it first"

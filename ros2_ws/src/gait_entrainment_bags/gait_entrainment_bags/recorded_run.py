@@ -12,7 +12,6 @@ figure shows it.
 import json
 import math
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -25,11 +24,11 @@ from gait_entrainment.gait import Analysis, GaitEvent, Stride, VerdictSettings
 from gait_entrainment.protocol import Protocol, ProtocolError, read_protocol
 from gait_entrainment.run import Run, analyze_blocks, settings_for
 from gait_entrainment.settings import SettingError
-from gait_entrainment_bags import messages, topic_names
+from gait_entrainment_bags import topic_names
 from gait_entrainment_bags.errors import BagError
 from gait_entrainment_bags.reader import BagReader
 from gait_entrainment_bags.recovery import RECOVERY_KEY
-from gait_entrainment_bags.run_messages import AnkleTorques, RunMessages, fields_expected
+from gait_entrainment_bags.run_messages import AnkleTorques, RunMessages, side_in
 from gait_entrainment_bags.truth import TOE_OFF_BIAS, detector_errors, lag_shift, without_bias
 from gait_entrainment_bags.writer import ENDED_EARLY
 from gait_entrainment_commands.outcome import outcome_of, timing_outcome
@@ -86,7 +85,7 @@ def read_run(
         }
         if (live_onset := bag.custom_data.get("onset", "commanded")) not in onsets:
             raise BagError(f"{path}: its onset is {live_onset!r}; allowed: {', '.join(onsets)}")
-        recorded_side = _side_in(bag, topic_names.STRIDES)
+        recorded_side = side_in(bag, topic_names.STRIDES)
         live_sides: Sequence[Side] = [side if recorded_side is None else recorded_side]
         if protocol is not None and len(protocol.sides) > 1:
             live_sides = protocol.sides
@@ -101,7 +100,7 @@ def read_run(
         begun, unknown = onsets[onset or live_onset], record.unknown
         if side not in {leg for leg, _ in begun}:  # its strides, with pulses on the other ankle
             begun = [(side, at) for _, at in begun]
-            unknown = [(side, start, end) for _, start, end in unknown]
+            unknown = sorted({(side, start, end) for _, start, end in unknown})
         analysis, judged = analyze_blocks(blocks, events, begun, side, settings, unknown)
         measured_period, pulse_period = periods_of(blocks, analysis)
         run = RecordedRun(
@@ -153,22 +152,13 @@ def protocol_and_side(
     if protocol is not None:
         protocol = protocol if side is None else replace(protocol, side=side)
         return protocol, protocol.side
-    side = _side_in(bag, topic_names.TORQUE_PROFILE) if side is None else side
+    side = side_in(bag, topic_names.TORQUE_PROFILE) if side is None else side
     if side is None:
         raise BagError(
             f"{bag.path}: holds no run, or does not say which leg is perturbed: "
             "give --side or --protocol"
         )
     return None, side
-
-
-def _side_in(bag: BagReader, relative: str) -> Side | None:
-    """Return the side that the first message of a topic names; None if there is none."""
-    with fields_expected(relative):
-        for message in bag.messages_of(relative):
-            with suppress(messages.MessageError):
-                return messages.side_of(message)
-    return None
 
 
 def conducted(protocol: Protocol | None, events: Sequence[GaitEvent]) -> Sequence[BlockRun]:
@@ -221,14 +211,13 @@ def _lost(bag: BagReader) -> int | None:
 
 def drawn_strides(run: Run) -> list[Stride]:
     """Return the strides whose ankle torque is drawn: evenly spread, each while a lock forms."""
-    strides, analysis = run.strides, run.analysis
-    if not strides:
-        return []
-    forming: list[Stride] = []
-    since = analysis.entrainments[-1].entrained_since_stride if analysis.entrainments else None
-    if since is not None and analysis.pulses:
-        first = analysis.pulses[0].stride
-        forming = [s for s in strides if first <= s.number <= since + 1][-_FORMING_DRAWN:]
+    strides, forming = run.strides, list[Stride]()
+    for part in [block.analysis for block in run.blocks] or [run.analysis]:
+        since = part.entrainments[-1].entrained_since_stride if part.entrainments else None
+        if since is not None and part.pulses:
+            first = part.pulses[0].stride
+            forming += [s for s in strides if first <= s.number <= since + 1]
+    del forming[:-_FORMING_DRAWN]
     others = [stride for stride in strides if stride not in forming]
     count = min(max(STRIDES_DRAWN - len(forming), STRIDES_DRAWN // 3), len(others))
     spread = np.linspace(0, len(others) - 1, count).round().astype(int)

@@ -107,6 +107,7 @@ class _Rescue:
         if present == self._announced:
             return
         self._announced = present
+        self.record.announce(*contents.names.values())
         for topic in contents.topics:
             known = self._topics.setdefault(topic.name, topic)
             if difference := differing_types(known, topic):

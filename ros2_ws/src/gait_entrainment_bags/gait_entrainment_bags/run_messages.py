@@ -7,7 +7,7 @@ import math
 import struct
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -80,7 +80,7 @@ class RunMessages:
         self.real_time_factor = self._read()
         self.left_out = 0  # of another run, or what cannot be
         self._run: int | None = None  # its number
-        self._begun: set[int] = set()  # ankles with the first of its profiles
+        self._begun: dict[int, bytes] = {}  # the first of its profiles, by ankle
         # Ankle and span of which no torque profile is here [ns].
         self.unknown: list[tuple[Side, int, int]] = []
         measured = defaultdict[Side, MeasuredOnsets](MeasuredOnsets)
@@ -140,7 +140,7 @@ class RunMessages:
             decode = decoder_for(self._bag.topics[name])
             with fields_expected(name):
                 for stored in self._messages.pop(name):
-                    if self._is_of_run(message := decode(stored.data)):
+                    if self._is_of_run(message := decode(stored.data), stored.data):
                         try:
                             value = value_of(message)
                         except messages.MessageError:
@@ -148,19 +148,19 @@ class RunMessages:
                             continue
                         yield value
 
-    def _is_of_run(self, message: Any) -> bool:
+    def _is_of_run(self, message: Any, data: bytes) -> bool:
         """Whether a message is of the run of the first: of a torque profile, if there is one."""
         if self._run is None:
             self._run = message.run
-        # Profiles of a run are counted from 0, on each ankle.
+        # Profiles of a run are counted from 0, on each ankle; one may have been recorded twice.
         begins = not getattr(message, "revision", True)
-        if begins and (message.run != self._run or message.side in self._begun):
+        if begins and (
+            message.run != self._run or self._begun.setdefault(message.side, data) != data
+        ):
             raise BagError(
                 f"{self._bag.path}: more than one run is in it (run {self._run}, then run "
                 f"{message.run}): record each into a bag of its own"
             )
-        if begins:
-            self._begun.add(message.side)
         self.left_out += message.run != self._run
         return bool(message.run == self._run)
 
@@ -193,6 +193,15 @@ class RunMessages:
                     stamps.append(messages.nanoseconds_of(message.header.stamp))
                     rows.append(tuple(torque[side] for torque in torques))
         return AnkleTorques(np.array(stamps, np.int64), *np.array(rows).reshape(-1, 3).T)
+
+
+def side_in(bag: BagReader, relative: str) -> Side | None:
+    """Return the side that the first message of a topic names; None if there is none."""
+    with fields_expected(relative):
+        for message in bag.messages_of(relative, f"{_OWN}{_TYPES[relative]}"):
+            with suppress(messages.MessageError):
+                return side_of(message)
+    return None
 
 
 @contextmanager

@@ -89,9 +89,9 @@ def export(
             raise BagError(f"{path}: no messages on {', '.join(silent)}: leave it out of --topics")
         _import_pyarrow()
         make_folder(out)
-        files = {
-            name: out / f"{name.strip('/').replace('/', '.')}.{format_name}" for name in topics
-        }
+        # A dot, which no topic of ROS 2 has, is doubled: no table is written over another.
+        plain = {name: name.strip("/").replace(".", "..").replace("/", ".") for name in topics}
+        files = {name: out / f"{text}.{format_name}" for name, text in plain.items()}
         refused: dict[str, str] = {}
         try:
             for name, file in files.items():
@@ -115,7 +115,7 @@ def export(
 
 def _write_table(reader: BagReader, topic: TopicInfo, file: Path) -> None:
     arrow, csv, parquet = _import_pyarrow()
-    is_csv = file.suffix == ".csv"
+    is_csv = file.name.endswith(".csv")
     decode = decoder_for(topic)
     messages = reader.messages([topic.name])
     first = next(messages)

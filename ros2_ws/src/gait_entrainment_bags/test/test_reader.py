@@ -334,6 +334,14 @@ def test_a_definition_that_contains_itself_is_named(
     assert capfd.readouterr().err == ""
 
 
+def test_a_file_that_is_listed_twice_is_read_once(small_bag: Path, tmp_path: Path) -> None:
+    (tmp_path / "small_0.mcap").write_bytes((small_bag / "small_0.mcap").read_bytes())
+    listed = "{relative_file_paths: [small_0.mcap, small_0.mcap]}"
+    (tmp_path / "metadata.yaml").write_text(f"rosbag2_bagfile_information: {listed}\n")
+    with BagReader(tmp_path) as reader:
+        assert len([*reader.messages()]) == reader.message_count == 4
+
+
 def test_broken_metadata_file_does_not_keep_from_reading(small_bag: Path, tmp_path: Path) -> None:
     folder = tmp_path / "bag"
     folder.mkdir()

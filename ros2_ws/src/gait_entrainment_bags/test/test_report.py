@@ -13,7 +13,7 @@ import pytest
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.gait import Hole, analyze
-from gait_entrainment.protocol import Protocol, PulsePlan
+from gait_entrainment.protocol import Protocol, PulsePlan, read_protocol
 from gait_entrainment.robot import PulseTiming
 from gait_entrainment.simulation import Simulation, simulate
 from gait_entrainment_bags.figures import draw_figures, run_figures
@@ -86,8 +86,11 @@ def recorded(simulation, **changes):
 
 def test_the_figures_are_drawn(simulation, tmp_path):
     run = recorded(simulation)
+    others = tmp_path / "of_somebody_else"
+    (tmp_path / "phase_lag.svg").symlink_to(others)
     paths = [p for p in draw_figures(run, tmp_path) if p.suffix == ".png"]
     assert [p.stem for p in paths] == ["stride_period", "phase_lag", "ankle_torque"]
+    assert not others.exists()
     late = PulseTiming(run.onsets[0], run.onsets[0] + 10**7, run.onsets[0] + 2 * 10**7)
     late_run = dataclasses.replace(run, delivered=((Side.RIGHT, late),))
     paths = draw_figures(late_run, tmp_path)
@@ -130,6 +133,14 @@ def test_each_stride_is_drawn_while_a_lock_forms(simulation):
     numbers = [stride.number for stride in drawn_strides(drifting)]
     assert len(numbers) == STRIDES_DRAWN
     assert max(np.diff(numbers)) <= 4
+    # Of several blocks the first has locked.
+    plans = "{baseline: 15, pulses: {}, washout: 5}, {pulses: {period_offset: -0.2, count: 20}}"
+    walk = simulate(read_protocol(f"blocks: [{plans}]\n"))
+    assert [b.analysis.entrainments[-1].verdict.name for b in walk.blocks] == [
+        "ENTRAINED",
+        "DRIFTING",
+    ]
+    assert set(range(first, since + 2)) <= {stride.number for stride in drawn_strides(walk)}
 
 
 def test_a_run_without_pulses_or_strides_can_be_drawn_too(tmp_path):

@@ -163,6 +163,16 @@ def test_nothing_is_overwritten_and_nothing_half_written_stays(
     assert not (tmp_path / "out").exists()
 
 
+def test_each_topic_has_a_table_of_its_own(tmp_path: Path) -> None:
+    names = ("/a/b", "/a.b", "/")
+    with BagWriter(tmp_path / "walk", ros_distro="jazzy") as writer:
+        for number, name in enumerate(names):
+            writer.add_topic(TopicInfo(name, "p/msg/Byte", "uint8 data\n"))
+            writer.write(name, bytes([0, 1, 0, 0, number]), 1, 1)
+    files = export(tmp_path / "walk", tmp_path / "out", "csv")
+    assert [rows_of(files[name])[0]["data"] for name in names] == ["0", "1", "2"]
+
+
 def test_names_without_a_value_each_stay_in_the_table(
     tmp_path: Path,
 ) -> None:

@@ -19,9 +19,11 @@ Whatever a command raises as an EntrainmentError is printed here, in one line.
 import argparse
 import importlib
 import io
+import logging
 import os
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 from gait_entrainment.errors import EntrainmentError
@@ -43,6 +45,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return 0 if it is done, 1 if it failed, 2 for wrong usage."""
     if isinstance(sys.stdout, io.TextIOWrapper):  # None if it is closed
         sys.stdout.reconfigure(errors="backslashreplace")  # what a terminal has no character for
+    os.environ.pop("MPLBACKEND", None)  # of windows, perhaps one not known here: figures are files
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it does without a cache folder, too
     words = sys.argv[1:] if arguments is None else list(arguments)
     name = words[0] if words else ""
     prog = f"entrain {name}"
@@ -55,27 +59,33 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(end="", flush=True)  # what was printed and cannot be written is an error, too
         return code
     except EntrainmentError as error:
-        # One line, whatever the names and texts in it hold.
-        told = (c if c.isprintable() else repr(c)[1:-1] for c in str(error))
-        print(f"{prog}: {''.join(told)}", file=sys.stderr)
+        # One line, whatever names it holds, and behind it, indented, the end of a node's log.
+        reason, indented, log = str(error).partition("\n  ")
+        told = (c if c.isprintable() else repr(c)[1:-1] for c in reason)
+        _tell(f"{prog}: {''.join(told)}{indented}{log}")
         return error.exit_code
     except ModuleNotFoundError as error:
         package = (error.name or "").partition(".")[0]
-        print(
+        _tell(
             f"entrain: the Python package {package} is missing: run rosdep install, or "
-            f"pip install {package} (docs/installation.md)",
-            file=sys.stderr,
+            f"pip install {package} (docs/installation.md)"
         )
     except KeyboardInterrupt:
-        print(f"{prog}: interrupted", file=sys.stderr)
+        _tell(f"{prog}: interrupted")
     except BrokenPipeError:
         pass
     except OSError as error:  # such as a folder that cannot be written
         where = f"{error.filename}: " if error.filename else ""
-        print(f"{prog}: {where}{error.strerror or error}", file=sys.stderr)
+        _tell(f"{prog}: {where}{error.strerror or error}")
     finally:
         _forget_unwritable_output()
     return 1
+
+
+def _tell(line: str) -> None:
+    """Print a line on standard error; where that cannot be, the exit code alone tells."""
+    with suppress(OSError):
+        print(line, file=sys.stderr)
 
 
 def _forget_unwritable_output() -> None:
@@ -91,8 +101,11 @@ class _Parser(argparse.ArgumentParser):
     A parser whose actions refuse by themselves what they do not know, with their own usage.
 
     argparse hands it up to the first parser, whose usage helps nobody. ``prog`` of the options is
-    the innermost parser's.
+    the innermost parser's. Help that cannot be written is an error, which argparse passes over.
     """
+
+    def print_help(self, file: Any = None) -> None:
+        print(self.format_help(), end="", file=file, flush=True)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         options, unknown = super().parse_known_args(args, namespace)

@@ -70,6 +70,7 @@ def save_figure(figure: Any, folder: Path, name: str) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     paths = [folder / (name + ending) for ending in (".png", ".svg")]
     for path in paths:
+        path.unlink(missing_ok=True)  # what a link leads to is somebody else's
         figure.savefig(path, dpi=130 if given == "figure" else given)
     return paths
 

@@ -7,10 +7,12 @@ import math
 import statistics
 from collections.abc import Sequence
 from dataclasses import asdict
+from itertools import pairwise
 from typing import Any
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, EventKind
 from gait_entrainment.gait import Analysis, GaitEvent, Hole, PulsePhase, Reason, Verdict
+from gait_entrainment.gait.strides import PLACES
 from gait_entrainment.protocol import Protocol, content_of
 from gait_entrainment.robot import PulseTiming
 from gait_entrainment.run import Run
@@ -36,7 +38,7 @@ MEANINGS = {
 def outcome_of(run: Run) -> dict[str, Any]:
     """Return what ``--json`` prints; times in seconds, None for what is not known."""
     analysis, strides = run.analysis, run.strides
-    start = strides[0].start if strides else 0
+    start = (strides or analysis.strides)[0].start if analysis.strides else 0
 
     def seconds(stamp: int) -> float:
         return max(stamp - start, 0) / NANOSECONDS_PER_SECOND
@@ -130,7 +132,11 @@ def _parameters(protocol: Protocol) -> dict[str, Any]:
 
 
 def holes_of(run: Run) -> list[Hole]:
-    """Return what the record of a run lacks; its last strides too, whether walked or not."""
+    """
+    Return what the record of a run lacks; its last strides too, whether walked or not.
+
+    Between blocks, where nothing is analyzed, a stride of events or more that is missing.
+    """
     holes, strides = list(run.analysis.holes), run.analysis.strides
     if run.protocol is not None:
         end, number = (strides[-1].end, strides[-1].number) if strides else (0, 0)
@@ -139,6 +145,11 @@ def holes_of(run: Run) -> list[Hole]:
             ended = [block.last_stride for block in run.blocks]
             complete = len(ended) == len(run.protocol.sequence) and ended[-1] is not None
             missing = 0 if complete else max(missing, 1)
+        for a, b in pairwise(sorted(run.events, key=lambda event: event.place)):
+            told = any(hole.start < b.stamp and a.stamp < hole.end for hole in holes)
+            lost = b.place - a.place - 1
+            if lost >= PLACES and a.stamp < b.stamp and not told:
+                holes.append(Hole(a.stamp, b.stamp, f"{lost} gait events"))
         if missing > 0:
             holes.append(Hole(end, end, f"the last {missing} strides"))
     return holes

@@ -3,12 +3,14 @@
 
 """In a workspace that lacks a Python package the command line says so."""
 
+import os
 import signal
 import subprocess
 import sys
 
 import pytest
 
+from gait_entrainment.errors import EntrainmentError
 from gait_entrainment_commands import main
 from gait_entrainment_commands.signals import STOPPING
 
@@ -40,3 +42,34 @@ def test_what_drives_a_robot_heeds_signals_before_it_is_loaded(monkeypatch, comm
         for number, handler in before.items():
             signal.signal(number, handler)
     assert set(seen.values()) == {signal.default_int_handler if heeded else signal.SIG_IGN}
+
+
+@pytest.mark.parametrize(
+    ("stream", "arguments", "code"),
+    [
+        ("stdout", ["--help"], 1),
+        ("stdout", ["simulate", "--help"], 1),
+        ("stderr", ["simulate", "--baseline=-3"], 2),
+    ],
+)
+def test_where_nothing_can_be_written_the_exit_code_tells(monkeypatch, stream, arguments, code):
+    with open("/dev/full", "w", buffering=1) as full:
+        monkeypatch.setattr(sys, stream, full)
+        assert main(arguments) == code
+        os.dup2(os.open(os.devnull, os.O_WRONLY), full.fileno())
+
+
+def test_an_error_is_one_line_before_the_end_of_a_log(monkeypatch, capsys):
+    def fail(_):
+        raise EntrainmentError("no file a\nb\n  walker_sim| started\n  walker_sim| failed")
+
+    monkeypatch.setattr("gait_entrainment_commands.make_parser", fail)
+    assert main(["run_it"]) == 1
+    told = "entrain run_it: no file a\\nb\n  walker_sim| started\n  walker_sim| failed\n"
+    assert capsys.readouterr().err == told
+
+
+def test_figures_ask_no_backend_of_windows(monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", "module://of.a.notebook")
+    assert main(["simulate", "--baseline=-3"]) == 2
+    assert "MPLBACKEND" not in os.environ

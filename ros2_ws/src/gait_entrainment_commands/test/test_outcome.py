@@ -92,6 +92,18 @@ def test_a_single_block_is_told_with_its_pulses(text, begin, end):
     assert found.endswith(end)
 
 
+def test_what_is_lost_between_blocks_is_told():
+    blocks = "[{baseline: 3, pulses: {count: 0}, rest: 30}, {baseline: 3, pulses: {count: 3}}]"
+    simulated = simulate(read_protocol(f"blocks: {blocks}\n"))
+    assert outcome_of(simulated)["holes"] == []
+    ended = simulated.blocks[0].end
+    lost = range(ended + 4 * 10**9, ended + 12 * 10**9)
+    events = tuple(event for event in simulated.events if event.stamp not in lost)
+    (hole,) = outcome_of(replace(simulated, events=events))["holes"]
+    assert hole["missing"] == f"{len(simulated.events) - len(events)} gait events"
+    assert hole["end"] - hole["start"] == pytest.approx(8.0, abs=1.5)
+
+
 def test_an_open_baseline_is_told_as_walked():
     protocol = read_protocol("baseline: 3\nbaseline_time: 12\nwashout: 1\npulses: {count: 3}\n")
     outcome = outcome_of(simulate(protocol))

@@ -6,25 +6,41 @@
 from types import SimpleNamespace
 
 import pytest
+from builtin_interfaces.msg import Time as TimeMessage
+from rclpy.time import Time
 
 from gait_entrainment_nodes.nodes.loop import _serve_once
 
-NODE = SimpleNamespace(next_deadline=lambda: None, publish_state=lambda: None, late=())
+WARNINGS = []
+NODE = SimpleNamespace(
+    next_deadline=lambda: None,
+    publish_state=lambda: None,
+    late=(),
+    get_logger=lambda: SimpleNamespace(warning=WARNINGS.append),
+)
 
 
-def executor_that_raises(text):
+def executor_that_raises(error):
     def spin_once(timeout_sec):
         assert timeout_sec >= 0
-        raise RuntimeError(text)
+        raise error
 
     return SimpleNamespace(spin_once=spin_once)
 
 
 def test_an_answer_that_nobody_waits_for_any_more_ends_no_node():
     gone = "failed to send response (timeout): client will not receive response"
-    _serve_once(executor_that_raises(gone), NODE)
+    _serve_once(executor_that_raises(RuntimeError(gone)), NODE)
 
 
-def test_any_other_error_does():
-    with pytest.raises(RuntimeError, match="out of memory"):
-        _serve_once(executor_that_raises("out of memory"), NODE)
+def test_a_clock_before_1970_ends_no_node_and_is_told():
+    with pytest.raises(ValueError, match="negative") as refused:
+        Time.from_msg(TimeMessage(sec=-5))  # as rclpy reads /clock
+    _serve_once(executor_that_raises(refused.value), NODE)
+    assert "/clock" in WARNINGS.pop()
+
+
+@pytest.mark.parametrize("error", [RuntimeError("out of memory"), ValueError("no number")])
+def test_any_other_error_does(error):
+    with pytest.raises(type(error)):
+        _serve_once(executor_that_raises(error), NODE)

@@ -47,6 +47,17 @@ def test_topics_under_a_nodes_name_follow_its_name():
         assert not any("experiment" in name for name in names(made))
 
 
+def test_who_else_publishes_what_a_run_takes_from_one_is_named():
+    events = topics.GAIT_EVENTS
+    with node(WalkerSim) as made:
+        assert made.rivals(events) == ""
+        other = rclpy.create_node("other_walker")
+        other.create_publisher(events.type, events.name, events.qos)
+        told = "gait_events comes from other_walker and walker_sim, and a run takes one"
+        assert made.rivals(events) == told
+        other.destroy_node()
+
+
 def test_a_quality_is_taken_where_a_run_allows_it():
     chosen = "qos_overrides./diagnostics.publisher"
     with node(

@@ -166,7 +166,7 @@ class GaitAnalyzer:
             before = None
         if after is not None and after.number != stride.number + 1:
             after = None
-        paused = self._numbers.number > 0 and self._pause.count >= _PAUSE_STRIDES
+        paused = self._numbers.number > 0 and len(self._pause.periods) >= _PAUSE_STRIDES
         if onsets and (paused or self._numbers.number == 0):
             self._unperturbed = self._pause
             self._unperturbed.settle(_ANYBODY)
@@ -197,7 +197,7 @@ class GaitAnalyzer:
             self._pause = UnperturbedPeriod()
         # Once it is not known whether pulses have begun, no stride is an unperturbed one.
         elif self._numbers.number or not any(s < stride.end for s, _ in self._unknown):
-            self._pause.add(stride)
+            self._pause.periods.append(stride.end - stride.start)
         if unseen:
             self._begin_anew(None)
             return list(pulses)

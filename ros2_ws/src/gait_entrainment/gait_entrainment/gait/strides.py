@@ -84,6 +84,7 @@ class StrideTracker:
     two events contradict each other, the first to come is believed; and each only if the strides
     since those before can have taken so long. Three strides of events that fit together, but not
     what was believed, are believed from then on: no single wrong event silences all that follow.
+    None of them may lie before the end of a stride that was told, in place or in stamp.
     """
 
     def __init__(self, side: Side, limits: GaitLimits | None = None) -> None:
@@ -98,6 +99,7 @@ class StrideTracker:
         self._latest_place = -1
         self._strike_place = -1
         self._rival: StrideTracker | None = None  # of dropped events that fit together
+        self._closed = (0, -math.inf)  # place and stamp of the latest strike that closed a stride
 
     def add(self, event: GaitEvent, now: float = math.inf) -> Stride | None:
         """Take one event, none stamped after ``now`` [ns]; return the stride that it closes."""
@@ -152,9 +154,11 @@ class StrideTracker:
 
     def _doubt(self, event: GaitEvent) -> Stride | None:
         """Drop an event, unless three strides of such fit together: then go on with those."""
+        if event.place < self._closed[0] or event.stamp < self._closed[1]:
+            return None
         if self._rival is None or self._rival._fate(event) != "accepted":
             self._rival = StrideTracker(self.side, self.watch.limits)
-        stride = self._rival.add(event) if event.place >= 0 else None
+        stride = self._rival.add(event)
         if self._rival.counts.accepted <= CONVINCING_PLACES:
             return None
         self.__dict__.update(self._rival.__dict__, counts=self.counts)
@@ -177,6 +181,7 @@ class StrideTracker:
             self.watch.add(event.stamp, None)
             self.counts.missed_strides += max(closed - max(started - 1, 0), 0)
             return None
+        self._closed = event.place, event.stamp
         self.watch.add(event.stamp, (event.stamp - start) / NANOSECONDS_PER_SECOND)
         middle = self._stamps.get(event.place - 2, math.nan)
         first, second = middle - start, event.stamp - middle
@@ -190,24 +195,15 @@ class UnperturbedPeriod:
     """Mean period of the complete strides before the first pulse, in exact integer arithmetic."""
 
     def __init__(self) -> None:
-        self._periods: list[int] = []  # [ns]
+        self.periods: list[int] = []  # of the strides taken [ns]
         self.mean = math.nan  # [s]
         self.deviation = math.nan  # standard deviation of the strides [s]; NaN with one
         self.standard_error = math.nan  # of the mean [s]; NaN with one stride
 
-    @property
-    def count(self) -> int:
-        """Strides taken."""
-        return len(self._periods)
-
-    def add(self, stride: Stride) -> None:
-        """Take one stride."""
-        self._periods.append(stride.end - stride.start)
-
     def settle(self, limits: GaitLimits) -> None:
         """Set the figures, from the strides that their median allows: a pause is none of them."""
-        own = statistics.median(self._periods or [0]) * (1 - limits.stride_change)
-        kept = [p for p in self._periods if own <= p <= own / (1 - limits.stride_change) ** 2]
+        own = statistics.median(self.periods or [0]) * (1 - limits.stride_change)
+        kept = [p for p in self.periods if own <= p <= own / (1 - limits.stride_change) ** 2]
         n, total = len(kept), sum(kept)
         if n > 0:
             self.mean = total / (n * NANOSECONDS_PER_SECOND)

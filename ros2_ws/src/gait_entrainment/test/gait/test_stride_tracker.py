@@ -5,6 +5,7 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import pytest
 from hypothesis import given, settings
@@ -69,6 +70,18 @@ def test_what_is_stamped_ahead_of_now_changes_nothing(wrong: list[tuple[int, int
     regular, counts = track(walk(10))
     assert [stride for stride in strides if stride] == regular
     assert tracker.counts == replace(counts, implausible=len(wrong))
+
+
+@pytest.mark.parametrize(("later", "steps"), [(100 * SECOND, 0), (-7 * SECOND, 20)])
+def test_numbers_or_a_clock_that_begin_anew_leave_the_strides_that_were_told(
+    later: int, steps: int
+) -> None:
+    again = [replace(e, stamp=e.stamp + later, step=e.step + steps) for e in walk(40)]
+    strides, counts = track(walk(20) + again)
+    assert strides[:10] == track(walk(20))[0]
+    assert [s.number for s in strides] == sorted({s.number for s in strides})
+    assert all(a.end <= b.start for a, b in pairwise(strides))
+    assert counts.contradictory > 5
 
 
 def test_strides_of_the_leg_that_strikes_second() -> None:

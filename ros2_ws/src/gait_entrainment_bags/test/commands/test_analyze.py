@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 
-from gait_entrainment_bags import BagReader, BagWriter, check, recover
+from gait_entrainment_bags import BagReader, BagWriter, TopicInfo, check, recover
 from gait_entrainment_bags.recorded_run import read_run
 from gait_entrainment_commands import main
 
@@ -41,11 +41,11 @@ def test_the_outcome_is_that_of_the_simulation(capsys):
     assert "the same to the last bit" in entrain(capsys, "analyze", BAG)[1]
 
 
-def copy(out, keep, told=None, renamed=("", "")):
+def copy(out, keep, told=None, renamed=("", ""), again=()):
     """
     Copy the bag; `keep` may change the bytes of a message, or leave it out with None.
 
-    `told` replaces custom data; a field of a topic is `renamed`.
+    It may be there `again`. `told` replaces custom data; a field of a topic is `renamed`.
     """
     with (
         BagReader(BAG) as bag,
@@ -59,7 +59,7 @@ def copy(out, keep, told=None, renamed=("", "")):
         for message in sorted(bag.messages(), key=lambda message: message.place):
             data = keep(message.topic, number[message.topic], message.data)
             number[message.topic] += 1
-            if data is not None:
+            for _ in range(0 if data is None else 1 + (message.topic in again)):
                 writer.write(message.topic, data, message.log_time, message.publish_time)
     return out
 
@@ -148,6 +148,7 @@ def test_the_bag_follows_every_rule_and_opens_without_ros_and_message_packages()
         ("nowhere", 2, "no such file"),
         ("foreign", 1, "does not say which leg is perturbed"),
         ("text", 1, "not an MCAP"),
+        ("strangers", 1, "does not say which leg is perturbed"),
         ("protocol=\0", 1, "its protocol cannot be read"),
         ("onset=sideways", 1, "'sideways'; allowed: commanded, measured"),
         ("messages_lost=oops", 1, "'oops'; allowed: a JSON object"),
@@ -159,6 +160,10 @@ def test_what_cannot_be_analyzed_is_one_line(capsys, tmp_path, name, expected, w
     with BagWriter(tmp_path / "foreign", ros_distro="jazzy"):
         pass
     (tmp_path / "text").write_text("hello")
+    with BagWriter(tmp_path / "strangers", ros_distro="jazzy") as writer:
+        for topic in NEEDED:
+            writer.add_topic(TopicInfo(topic, "std_msgs/msg/Byte", "byte data"))
+            writer.write(topic, b"\0\1\0\0\7", 1, 1)
     key, told, value = name.partition("=")
     if told:  # what somebody else's tool has written into the custom data
         name = "told"
@@ -185,6 +190,25 @@ def test_a_second_run_in_a_bag_is_refused(capsys, tmp_path):
     code, out, err = entrain(capsys, "analyze", copy(tmp_path / "two", begun_again))
     assert (code, out) == (1, "")
     assert "more than one run is in it (run 1, then run 1)" in err
+
+
+def test_what_was_recorded_twice_counts_once(capsys, tmp_path):
+    twice = copy(tmp_path / "twice", lambda t, _, d: d if t in NEEDED else None, again=NEEDED)
+    code, out, _ = entrain(capsys, "analyze", twice, "--json")
+    told = json.loads(out)
+    assert (code, told["entrained_since_stride"], told["holes"]) == (0, 29, [])
+    assert told["gait_events"]["repeated"] == 324
+
+
+@pytest.mark.parametrize("lost", NEEDED)
+def test_of_a_topic_that_is_announced_all_may_be_lost(tmp_path, lost):
+    bag = copy(tmp_path / "bag", lambda topic, _, data: None if topic == lost else data)
+    (found,) = check(bag)
+    (hole,) = recover(bag, tmp_path / "rescued").losses
+    count = re.search(rf"{lost}: (\d+) of (\d+) messages", hole)
+    assert count[0] in found.detail
+    assert count[1] == count[2]
+    assert len({*read_run(bag).analysis.holes}) == len(read_run(bag).analysis.holes)
 
 
 def test_what_the_analyzer_does_not_take_is_left_out_and_counted(capsys, tmp_path):

@@ -102,7 +102,8 @@ class BagRecorder(Participant):
         self._own_topic = name(topics.RECORDER_PROGRESS.name)
         self._clock_topic = name(topics.CLOCK.name)
         self._simulated = bool(self.get_parameter("use_sim_time").value)
-        self._heard_clock = 0  # the latest time on that topic [ns]
+        # The latest time on that topic that is believed, and the latest there was [ns].
+        self._heard_clock = self._latest_tick = 0
         self._believed_until = 0  # no stamp up to here is too far ahead [ns]
         sampled = (topics.JOINT_STATES, topics.ANKLE_TORQUE, *topics.GROUND_REACTION)
         # What a progress message covers, and its field that says how much.
@@ -244,7 +245,7 @@ class BagRecorder(Participant):
                 sec, nanosec = unpack(data, 4)
                 logged = sec * NANOSECONDS_PER_SECOND + nanosec
             if name == self._clock_topic:
-                self._heard_clock = logged
+                logged = self._believed_tick(logged)
             elif logged <= 0 or logged > self._believed_until:
                 now = self._ros_time(received)
                 self._believed_until = now + LONGEST_OVERTAKING
@@ -265,6 +266,14 @@ class BagRecorder(Participant):
                 then(data)
 
         return record
+
+    def _believed_tick(self, tick: int) -> int:
+        """Return ROS time [ns] at a tick: one far off counts once the next is nearer to it."""
+        far = self._heard_clock and abs(tick - self._heard_clock) > LONGEST_OVERTAKING
+        if not far or abs(tick - self._latest_tick) < abs(tick - self._heard_clock):
+            self._heard_clock = tick
+        self._latest_tick = tick
+        return self._heard_clock
 
     def _ros_time(self, received: int) -> int:
         """Return the ROS time [ns] at which a message was received; it is taken later."""

@@ -114,6 +114,10 @@ def _serve_once(executor: Any, node: Any) -> None:
         # Whoever asked a service has gone, or is not matched yet and asks again.
         if "client will not receive response" not in str(error):
             raise
+    except ValueError as error:  # rclpy's own reading of /clock
+        if "value must not be negative" not in str(error):
+            raise
+        node.get_logger().warning(f"a message is dropped: /clock: {error}")
     for deliver in node.late:
         deliver()
     node.publish_state()

@@ -190,6 +190,14 @@ class Participant(Node):
         """Return the run that a message belongs to, None if that does not go on."""
         return self.run if self.run is not None and message.run == self.run.number else None
 
+    def rivals(self, topic: Topic) -> str:
+        """Say who publish a topic, if they are several where a run takes one; else nothing."""
+        name = self.name_of(topic)
+        if self.count_publishers(name) < 2:
+            return ""
+        names = sorted(info.node_name for info in self.get_publishers_info_by_topic(name))
+        return f"{topic.name} comes from {' and '.join(names)}, and a run takes one"
+
     def publish_counts(self, run: int, stamp: int) -> None:
         """Tell the recorder, at the end of a run, how many messages were published."""
         counted = [publisher for publisher in self._offered if publisher.counted]

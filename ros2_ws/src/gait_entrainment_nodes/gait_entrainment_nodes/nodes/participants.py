@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment_bags.messages import nanoseconds_of
 from gait_entrainment_msgs.srv import Ready
+from gait_entrainment_nodes.messaging.topics import GAIT_EVENTS, TORQUE_PROFILE, WALKER_PROGRESS
 from gait_entrainment_nodes.nodes.experiment_run import RECORDER, ExperimentError
 from gait_entrainment_nodes.nodes.participant import Participant
 from gait_entrainment_nodes.nodes.waiting import Waiting
@@ -64,7 +65,7 @@ class Participants:
 
     async def check(self, longest_clock_offset: float) -> None:
         """
-        Raise ExperimentError if a participant is not ready: who, and what it waits for.
+        Raise ExperimentError if a participant is not ready, or who publishes has rivals: who.
 
         Raises ClockError if its clock is off by more than a limit [s]; 0 compares no clocks.
         """
@@ -98,6 +99,9 @@ class Participants:
                 if matched < self._node.count_subscribers(topic):
                     raise ExperimentError(f"{name} waits for subscriptions of {topic}", name)
         self._require_recorded(self._node.get_name(), self._node.matched)
+        for spoken in (GAIT_EVENTS, WALKER_PROGRESS, TORQUE_PROFILE):
+            if rivals := self._node.rivals(spoken):
+                raise ExperimentError(rivals)
 
     def _require_recorded(self, name: str, topics: Iterable[str]) -> None:
         """Raise ExperimentError if there is a recorder and it does not hear a node's topics."""

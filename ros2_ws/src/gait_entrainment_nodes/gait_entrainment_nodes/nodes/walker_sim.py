@@ -165,7 +165,8 @@ class WalkerSim(Participant):
             self.diagnose(run.stamp, DiagnosticStatus.WARN, f"a message is dropped: {error}")
             return
         except ValueError as error:
-            self.failure = f"torque profile {message.revision} cannot be walked: {error}"
+            told = f"torque profile {message.revision} cannot be walked: {error}"
+            self.failure = "; ".join(filter(None, (told, self.rivals(topics.TORQUE_PROFILE))))
             return
         if late:
             what = "a torque profile came after its instant: that part of it was not walked"
