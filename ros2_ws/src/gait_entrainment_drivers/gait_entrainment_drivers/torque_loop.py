@@ -120,11 +120,9 @@ class TorqueLoop:
             self._end_torque(HOST_SILENT)
             torque = 0.0
         self._monitor.expect(torque, now)
-        reading = self._exchange(torque, late)
+        reading = self._exchange(torque, late, now)
         if reading is not None:
             self._answered_at, self._measured = now, reading.torque
-            for fault in (*reading.faults, *self._monitor.judge(reading, now)):
-                self._end_torque(fault)
         elif now - self._answered_at > self._settings.silence:
             self._end_torque(DEVICE_SILENT)
         self._samples.append(Sample(sent, torque, reading, late))
@@ -133,13 +131,17 @@ class TorqueLoop:
         # After a hiccup it goes on from now: commands that were missed are not made up for.
         self._due = max(self._due + self._period, time.monotonic() - self._settings.lateness)
 
-    def _exchange(self, torque: float, late: float) -> Reading | None:
-        """Exchange a torque for a reading; whatever the driver raises, zero is sent on and on."""
+    def _exchange(self, torque: float, late: float, now: float) -> Reading | None:
+        """Exchange a torque for a reading, judged; whatever else comes, zero is sent on and on."""
         try:
             if late > self._period:
                 self._device.forget()
             # Most of the period at most: an answer that comes later is read with the next one.
-            return self._device.exchange(torque, 0.8 * self._period)
+            reading = self._device.exchange(torque, 0.8 * self._period)
+            if reading is not None:
+                for fault in (*reading.faults, *self._monitor.judge(reading, now)):
+                    self._end_torque(fault)
+            return reading
         except Exception as error:
             text = f"{type(error).__name__}: {error}"
             self._end_torque(Fault(DRIVER_FAILED.name, f"The driver cannot send: {text}."))
@@ -280,11 +282,7 @@ def main() -> int:
     link = Link(socket.socket(fileno=int(sys.argv[1])))
     device_type, options = link.first()
     loop = TorqueLoop(link, device_type(options), options)
-
-    def end(*_: object) -> None:
-        loop._closing = True
-
-    signal.signal(signal.SIGTERM, end)
+    signal.signal(signal.SIGTERM, lambda *_: loop._close())
     link.send("scheduling", prefer_this_process())
     loop.serve()
     return 0

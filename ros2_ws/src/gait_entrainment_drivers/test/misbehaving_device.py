@@ -85,6 +85,9 @@ class MisbehavingDevice(TorqueDevice):
             "report an error": replace(reading, faults=(OVERHEATED,)),
             "measure NaN": replace(reading, torque=math.nan),
             "lose the angle": replace(reading, angle=math.nan),
+            "answer a number": reading.torque,
+            "measure None": replace(reading, torque=None),
+            "report a text": replace(reading, faults=("overheated",)),
         }.get(does, reading)
 
     def _follow(self, torque: float, now: float) -> float:

@@ -96,6 +96,9 @@ def bench(tmp_path):
         ("measure NaN", "reading_not_finite"),
         ("lose the angle", "reading_not_finite"),
         ("answer no more", "device_silent"),
+        ("answer a number", "driver_failed"),
+        ("measure None", "driver_failed"),
+        ("report a text", "driver_failed"),
         ("raise", "driver_failed"),
     ],
 )

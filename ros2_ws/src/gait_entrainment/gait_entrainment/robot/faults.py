@@ -43,6 +43,7 @@ IMPULSE_EXCEEDED = Fault(
     "impulse_exceeded", "More angular impulse was delivered per stride than the limit allows."
 )
 DRIVER_FAILED = Fault("driver_failed", "The driver raised an error or broke its contract.")
+DRIVER_BLOCKED = Fault("driver_blocked", "A call of the driver does not return: see to its bus.")
 NOT_STOPPED = Fault(
     "not_stopped",
     "The driver cannot bring the torque to zero: cut the power. The process ends, so that the "

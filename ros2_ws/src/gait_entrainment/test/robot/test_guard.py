@@ -28,7 +28,7 @@ from gait_entrainment.robot import (
     TorqueProfile,
     find_driver,
 )
-from gait_entrainment.robot.faults import EXPERIMENT_SILENT
+from gait_entrainment.robot.faults import DRIVER_BLOCKED, EXPERIMENT_SILENT
 
 from .recording_robot import RecordingRobot
 
@@ -285,7 +285,7 @@ STATE = RobotState(SECOND, 0.0, 0.0, math.nan)
         ([STATE, replace(STATE, stamp=SECOND - 1)], f"{SECOND - 1}.* after {SECOND}"),
         ([replace(STATE, commanded=math.inf)], "commanded=inf"),
         ([replace(STATE, measured=math.nan)], "measured=nan"),
-        ([replace(STATE, stamp=2 * time.time_ns())], r"broke its contract: .* by \d+ ns"),
+        ([replace(STATE, stamp=2 * time.time_ns())], r"driver failed: ValueError: .* by \d+ ns"),
         (None, "the driver failed: TypeError"),
     ],
 )
@@ -472,6 +472,23 @@ def test_a_silent_experiment_stops_a_real_device():
     guard.close()
 
 
+@pytest.mark.parametrize("call", ["schedule", "promise", "read"])
+def test_a_driver_that_does_not_return_is_stopped_and_named(call):
+    guard, driver = ready(DeviceLimits(silence=0.05), simulated=False)
+    guard.arm()
+    guard.schedule(train(first_onset=SECOND, count=1))
+    calls = {
+        "schedule": lambda: guard.schedule(train()),
+        "promise": lambda: guard.promise(1),
+        "read": guard.read,
+    }
+    setattr(driver, call, lambda *_: driver.stopped.wait(5.0))
+    with pytest.raises(DeviceError):
+        calls[call]()
+    assert guard.faults[0] == DRIVER_BLOCKED
+    guard.close()
+
+
 def test_what_stops_one_ankle_stops_both_and_the_dose_is_of_both():
     limits, dose = DeviceLimits(session_pulses=11), Dose()
     drivers = {side: RecordingRobot(side) for side in Side}
@@ -496,6 +513,6 @@ def test_what_stops_one_ankle_stops_both_and_the_dose_is_of_both():
 def test_a_broken_profile_stops_the_torque():
     guard, driver = ready()
     driver.promise = lambda until: TorqueProfile(Side.LEFT, (7,), (3.0,), (), until)
-    with pytest.raises(DeviceError, match=r"broke its contract.*adjoin"):
+    with pytest.raises(DeviceError, match=r"the driver failed: ProfileError: .*adjoin"):
         guard.promise(SECOND)
     assert driver.calls[-1] == "stop"
