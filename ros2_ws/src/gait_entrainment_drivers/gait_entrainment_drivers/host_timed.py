@@ -46,8 +46,8 @@ _LOOP_ENDED = Fault(
 )
 _LOOP_SILENT = Fault(
     "torque_loop_silent",
-    "The process that streams torque fell silent for longer than the limit: it, or a call of the "
-    "device's driver, is frozen. The device's own watchdog must bring zero. If torque is felt, cut "
+    "The process that streams torque fell silent for longer than the limit: it, or a call of its "
+    "driver, is frozen. The device's own watchdog must bring zero. If torque is felt, cut "
     "the power.",
 )
 

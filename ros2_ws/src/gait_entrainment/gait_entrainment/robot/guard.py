@@ -59,7 +59,7 @@ class GuardedRobot:
         self._configured = self._active = self._in_run = False
         self._begun = 0  # pulses scheduled since the latest pause
         self._past: tuple[Pulse, ...] = ()  # of trains that were cancelled, what had begun
-        self._read_until = self._asked_at = 0  # stamp of the latest state, with torque asked [ns]
+        self._read_until = self._asked_at = -math.inf  # stamp of the latest state, of torque [ns]
         # Measured torque must be below this, this long after the command has become zero.
         self._unasked = 0.12 * min(self.capabilities.peak_torque, self.limits.torque)
         self._fall_time = nanoseconds(0.15 + 0.5 / self.capabilities.torque_bandwidth)
@@ -145,7 +145,7 @@ class GuardedRobot:
         self._refuse_inactive()
         self._call(lambda: self._robot.begin(start))
         self.train, self.delivered, self.promised_until = None, 0, start
-        self._past, self._read_until = (), 0
+        self._past, self._read_until = (), -math.inf
         self._offset = time.time_ns() - time.monotonic_ns()
         self._delivered_torque = _DeliveredTorque(self.limits)
         self._in_run = True
@@ -339,7 +339,7 @@ class GuardedRobot:
             for fault in state.faults:
                 if fault not in self.faults:
                     self.stop(fault)
-            if not before or state.commanded or abs(measured) <= self._unasked:
+            if math.isinf(before) or state.commanded or abs(measured) <= self._unasked:
                 self._asked_at = state.stamp
             # In simulated time it is a sensor with flaws that shows more than there is.
             if abs(measured) > self._delivered_torque.most and not able.simulated:

@@ -77,6 +77,7 @@ def ready(limits=None, simulated=True):
         ({}, {"period": 2e-9, "duration": 1e-9}, "period: 2e-09 s"),
         ({"session_pulses": 3}, {}, "session_pulses: 4 with this train; allowed: at most 3"),
         ({"session_impulse": 5.0}, {}, "session_impulse: 5.2 N m s.*at most 5"),
+        ({}, {"count": 10_001}, "count: 10001; allowed: 1 to 10000 at a time"),
         ({}, {"first_onset": -1}, "already promised"),
         ({}, {"side": Side.RIGHT}, "other ankle"),
     ],
