@@ -47,8 +47,8 @@ class GuardedRobot:
         limits: DeviceLimits | None = None,
         dose: Dose | None = None,
     ) -> None:
-        self._robot = robot
-        self.side = side
+        self._robot, self.side = robot, side
+        self.capabilities: Capabilities = robot.capabilities  # what the device can do
         self.limits = limits or DeviceLimits()
         self.dose = dose or Dose()  # goes on from robot to robot, as the session does
         self.train: PulseTrain | None = None  # what was scheduled in the run, as the driver has it
@@ -69,11 +69,6 @@ class GuardedRobot:
         self._last_heard = math.inf  # steady time [s]
         self._called_at = math.inf  # the driver, if the call has not returned yet, steady time [s]
         self._watching = threading.Event()
-
-    @property
-    def capabilities(self) -> Capabilities:
-        """What the device can do."""
-        return self._robot.capabilities
 
     @property
     def identity(self) -> str:
