@@ -64,7 +64,7 @@ class LoopOptions(MonitorSettings):
     )
     bandwidth: float = setting(
         30.0,
-        "torque bandwidth (-3 dB) of the device: what its torque is held against",
+        "torque bandwidth (-3 dB) of the device, which it is held against",
         "Hz",
         (1.0, 500.0),
     )

@@ -42,6 +42,10 @@ HOST_LOOP_LATE = Fault(
     "The loop that times the torque woke up later than the limit: see to what else loads this"
     " computer.",
 )
+DRIVER_SLOW = Fault(
+    "driver_slow",
+    "The driver's exchange takes longer than its timeout: see to its bus, or to load.",
+)
 HOST_SILENT = Fault(
     "host_silent",
     "The process that holds the robot fell silent for longer than the limit: it is frozen, or "
@@ -82,6 +86,7 @@ class TorqueLoop:
         self._askers: list[str | bytes | None] = []  # of a stop, not answered yet
         self._ended_at = math.inf  # when torque was ended [s]
         self._measured = math.nan  # torque measured last [N m]
+        self._took = 0.0  # the latest exchange [s]
         self._heard_at = self._answered_at = self._due = time.monotonic()
 
     def serve(self) -> None:
@@ -109,7 +114,7 @@ class TorqueLoop:
         self._listen()
         late = time.monotonic() - self._due
         if late > self._settings.lateness:
-            self._end_torque(HOST_LOOP_LATE)
+            self._end_torque(DRIVER_SLOW if self._took > late / 2 else HOST_LOOP_LATE)
         if not self._enabled:
             return
         sent = time.monotonic_ns()
@@ -121,6 +126,7 @@ class TorqueLoop:
             torque = 0.0
         self._monitor.expect(torque, now)
         reading = self._exchange(torque, late, now)
+        self._took = time.monotonic() - now
         if reading is not None:
             self._answered_at, self._measured = now, reading.torque
         elif now - self._answered_at > self._settings.silence:

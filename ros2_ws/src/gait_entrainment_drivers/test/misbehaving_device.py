@@ -67,7 +67,7 @@ class MisbehavingDevice(TorqueDevice):
         self._note(torque)
         if does == "raise" and torque:
             raise OSError("bus gone")
-        if does == "hold up the loop":
+        if does == "take its time":
             self._first = math.inf
             time.sleep(0.2)
         reading = Reading(self._follow(torque, now), 0.1, 0.0, 30.0)

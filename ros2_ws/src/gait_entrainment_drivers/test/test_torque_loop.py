@@ -133,9 +133,18 @@ def test_a_device_that_does_what_it_is_asked_raises_no_fault(bench):
 
 
 def test_a_loop_that_is_held_up_is_a_fault(bench):
-    device = bench(does="hold up the loop", lateness=0.05)
+    device = bench(lateness=0.05)
     device.push()
+    with device.driver.frozen():
+        time.sleep(0.1)
     device.until(lambda: "host_loop_late" in device.faults())
+
+
+def test_an_exchange_that_holds_up_the_loop_is_the_drivers_fault(bench):
+    device = bench(does="take its time", lateness=0.05)
+    device.push()
+    device.until(device.faults)
+    assert device.faults()[0] == "driver_slow"
 
 
 def test_a_parent_that_is_silent_ends_the_torque(bench):
