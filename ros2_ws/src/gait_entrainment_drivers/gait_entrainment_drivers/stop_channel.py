@@ -29,6 +29,7 @@ _SOCKETS = Path("/proc/net/unix")
 # Variable with the descriptor of a socket that the script ``entrain`` has opened for a run.
 _OPENED = "GAIT_ENTRAINMENT_STOP_SOCKET"
 _LARGEST_ANSWER = 4096
+_AT_ONCE = 100  # requests: whoever floods the channel does not hold up the loop of torque
 # Of a name: a socket's is short, and what looks for it splits at blanks.
 _LONGEST_NAME = 60
 _UNFIT = re.compile(r"[^\w/.:+-]", re.ASCII)
@@ -80,11 +81,10 @@ class StopListener:
     def requests(self) -> list[str | bytes | None]:
         """Return the addresses of those who asked for a stop since the last call, None without."""
         found: list[str | bytes | None] = []
-        while True:
-            try:
+        with suppress(BlockingIOError):
+            while len(found) < _AT_ONCE:
                 found.append(self._socket.recvfrom(16)[1])
-            except BlockingIOError:
-                return found
+        return found
 
     def answer(self, addresses: Iterable[str | bytes | None], answer: StopAnswer) -> None:
         """Answer requests; whoever asked and is gone misses nothing."""
