@@ -29,7 +29,6 @@ _SOCKETS = Path("/proc/net/unix")
 # Variable with the descriptor of a socket that the script ``entrain`` has opened for a run.
 _OPENED = "GAIT_ENTRAINMENT_STOP_SOCKET"
 _LARGEST_ANSWER = 4096
-_AT_ONCE = 100  # requests: whoever floods the channel does not hold up the loop of torque
 # Of a name: a socket's is short, and what looks for it splits at blanks.
 _LONGEST_NAME = 60
 _UNFIT = re.compile(r"[^\w/.:+-]", re.ASCII)
@@ -82,7 +81,7 @@ class StopListener:
         """Return the addresses of those who asked for a stop since the last call, None without."""
         found: list[str | bytes | None] = []
         with suppress(BlockingIOError):
-            while len(found) < _AT_ONCE:
+            while len(found) < 100:  # who floods the channel does not hold up the listener
                 found.append(self._socket.recvfrom(16)[1])
         return found
 

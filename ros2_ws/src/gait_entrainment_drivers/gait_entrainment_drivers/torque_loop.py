@@ -132,6 +132,7 @@ class TorqueLoop:
         elif now - self._answered_at > self._settings.silence:
             self._end_torque(DEVICE_SILENT)
         self._samples.append(Sample(sent, torque, reading, late))
+        del self._samples[:-30_000]  # the parent may be frozen for hours
         self._answer_stops(now)
         self._link.send_samples(self._samples)
         # After a hiccup it goes on from now: commands that were missed are not made up for.

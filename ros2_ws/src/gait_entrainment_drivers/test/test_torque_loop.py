@@ -16,7 +16,7 @@ from gait_entrainment.conventions import Side
 from gait_entrainment.robot import DeviceError, PulseTrain
 from gait_entrainment.robot.guard import GuardedRobot
 from gait_entrainment_drivers.host_timed import LoopOptions
-from gait_entrainment_drivers.link import Link
+from gait_entrainment_drivers.link import Link, Sample
 from gait_entrainment_drivers.monitor import Monitor, MonitorSettings
 from gait_entrainment_drivers.stop_channel import NO_ANSWER, PREFIX, listening, stop_all
 from gait_entrainment_drivers.torque_loop import TorqueLoop
@@ -256,6 +256,18 @@ def test_who_asked_for_a_stop_is_answered_although_the_device_is_disabled_at_onc
         made._listen()
         asker.settimeout(5.0)
         assert b"torque is zero, latched" in asker.recv(1000)
+
+
+def test_a_parent_that_is_frozen_for_hours_does_not_fill_the_memory(loop):
+    made, parent = loop
+    for step in ("open", "enable"):
+        parent.send(step)
+    made._listen()
+    made._samples = 40_000 * [Sample(0, 0.0, None, 0.0)]
+    made._link.send_samples = lambda _: None
+    made._tick()
+    assert len(made._samples) == 30_000
+    assert made._samples[-1].reading is not None
 
 
 def test_a_closed_robot_listens_no_more(bench):
