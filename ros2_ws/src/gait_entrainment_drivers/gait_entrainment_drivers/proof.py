@@ -82,8 +82,7 @@ def keep_preflight(driver: str, failed: str) -> None:
 def _shown(kind: type[_T], name: str, driver: str) -> _T | None:
     """Return what a file holds of a driver; None if that is not what is written by this module."""
     told = _known(name).get(_key(driver))
-    types = get_type_hints(kind)
-    if not isinstance(told, dict) or {key: type(value) for key, value in told.items()} != types:
+    if not isinstance(told, dict) or {k: type(v) for k, v in told.items()} != get_type_hints(kind):
         return None
     return kind(**told)
 

@@ -9,8 +9,7 @@ every delivered torque afterwards, and every way out, an exception included, bri
 zero before the device is disabled. Any fault latches: torque stays at zero until ``close`` and
 ``configure``.
 
-What this cannot do, being software next to other software on a system that is not real time, is
-said in docs/safety.md.
+What this cannot do, being software on a system that is not real time, is said in docs/safety.md.
 """
 
 import atexit
@@ -56,7 +55,8 @@ class GuardedRobot:
         self.promised_until = 0  # everything before this instant is promised [ns]
         self.faults: tuple[Fault, ...] = ()  # what latched the torque at zero, in order
         self.partner: GuardedRobot | None = None  # on the other ankle: one stops with the other
-        self._configured = self._active = self._in_run = False
+        self.enabled = False  # whether the device has been activated, latched or not
+        self._configured = self._in_run = False
         self._begun = 0  # pulses scheduled since the latest pause
         self._past: tuple[Pulse, ...] = ()  # of trains that were cancelled, what had begun
         self._read_until = self._asked_at = -math.inf  # stamp of the latest state, of torque [ns]
@@ -66,7 +66,7 @@ class GuardedRobot:
         self._offset = time.time_ns() - time.monotonic_ns()  # from steady time to a real run's
         self._armed_until = -math.inf  # steady time [s]
         self._delivered_torque = _DeliveredTorque(self.limits)
-        self._last_heard = math.inf  # steady time [s]
+        self._last_heard = self._news_at = math.inf  # the experiment, a new state: steady time [s]
         self._called_at = math.inf  # the driver, if the call has not returned yet, steady time [s]
         self._watching = threading.Event()
 
@@ -79,11 +79,6 @@ class GuardedRobot:
     def timing(self) -> LoopTiming:
         """How the loop that streams torque is doing."""
         return self._robot.timing
-
-    @property
-    def enabled(self) -> bool:
-        """Whether the device has been activated, latched or not."""
-        return self._active
 
     @property
     def armed(self) -> bool:
@@ -109,10 +104,10 @@ class GuardedRobot:
         if not self._configured:
             raise DeviceError("the device is not configured; configure it first")
         self._refuse_latched()
-        if self._active:
+        if self.enabled:
             raise DeviceError("the device is active already; deactivate it first")
         self._call(self._robot.activate)
-        self._active = True
+        self.enabled = True
         self.disarm()
         if not self.capabilities.simulated:
             # The interpreter's end kills the threads of a driver: zero torque comes before it.
@@ -140,7 +135,7 @@ class GuardedRobot:
         self._refuse_inactive()
         self._call(lambda: self._robot.begin(start))
         self.train, self.delivered, self.promised_until = None, 0, start
-        self._past, self._read_until = (), -math.inf
+        self._past, self._read_until, self._news_at = (), -math.inf, time.monotonic()
         self._offset = time.time_ns() - time.monotonic_ns()
         self._delivered_torque = _DeliveredTorque(self.limits)
         self._in_run = True
@@ -154,8 +149,8 @@ class GuardedRobot:
         """
         self.train = None
         self._watching.clear()
-        if self._active:
-            self._active, self._armed_until = False, -math.inf
+        if self.enabled:
+            self.enabled, self._armed_until = False, -math.inf
             self._quietly(self._robot.deactivate)
 
     def close(self) -> None:
@@ -288,7 +283,7 @@ class GuardedRobot:
             raise DeviceError(f"torque is latched at zero ({names}): clean up and configure first")
 
     def _refuse_inactive(self) -> None:
-        if not self._active:
+        if not self.enabled:
             raise DeviceError("the device is not active; configure and activate it first")
 
     def _refuse_before_begin(self) -> None:
@@ -311,7 +306,7 @@ class GuardedRobot:
         except BaseException as error:
             if may_refuse and isinstance(error, LimitError):
                 raise  # nothing has changed
-            if self._active:
+            if self.enabled:
                 self.stop(faults.DRIVER_FAILED)
             if isinstance(error, DeviceError) or not isinstance(error, Exception):
                 raise
@@ -331,6 +326,8 @@ class GuardedRobot:
             known = all(isinstance(fault, Fault) for fault in state.faults)
             if not (known and finite and before <= state.stamp <= until):
                 raise ValueError(f"{state} after {before} and by {until} ns")
+            if state.stamp > max(before, until - nanoseconds(0.1 + self.limits.silence)):
+                self._news_at = time.monotonic()
             for fault in state.faults:
                 if fault not in self.faults:
                     self.stop(fault)
@@ -341,6 +338,9 @@ class GuardedRobot:
                 self.stop(faults.TORQUE_EXCEEDED)
             if state.stamp - self._asked_at > self._fall_time and not able.simulated:
                 self.stop(faults.TORQUE_UNASKED)
+        period = 3 / able.state_rate if able.state_rate and not able.simulated else math.inf
+        if self.train and time.monotonic() - self._news_at > max(period, self.limits.silence):
+            self.stop(faults.READINGS_OLD)
 
     def _quietly(self, function: Callable[[], None]) -> None:
         """Call the driver on the way out: an error becomes a fault, and the way goes on."""

@@ -28,7 +28,7 @@ from gait_entrainment.robot import (
     TorqueProfile,
     find_driver,
 )
-from gait_entrainment.robot.faults import DRIVER_BLOCKED, EXPERIMENT_SILENT
+from gait_entrainment.robot.faults import DRIVER_BLOCKED, EXPERIMENT_SILENT, READINGS_OLD
 
 from .recording_robot import RecordingRobot
 
@@ -462,6 +462,25 @@ def test_a_stop_that_meets_a_schedule_wins():
         guard.schedule(train())
     assert driver.calls[-1] == "stop"
     assert guard.train is None
+
+
+@pytest.mark.parametrize("told", ["nothing", "one state", "old states", "states"])
+def test_a_device_that_reports_nothing_new_is_a_fault(monkeypatch, told):
+    guard, driver = ready(DeviceLimits(silence=0.5), simulated=False)
+    guard.arm()
+    guard.begin(time.time_ns())
+    guard.schedule(train(first_onset=guard.promised_until + 60 * SECOND))
+    steady, begun = time.monotonic(), time.time_ns()
+    for tenth in range(8):
+        now = begun + tenth * SECOND // 10
+        stamps = {"nothing": [], "one state": [begun], "old states": [now // 2]}.get(told, [now])
+        monkeypatch.setattr(driver, "read", lambda s=stamps: [replace(STATE, stamp=i) for i in s])
+        monkeypatch.setattr("time.monotonic", lambda t=tenth: steady + t / 10)
+        monkeypatch.setattr("time.monotonic_ns", lambda n=now: n - guard._offset)
+        guard.heard()
+        guard.read()
+    assert guard.faults == (() if told == "states" else (READINGS_OLD,))
+    guard.close()
 
 
 def test_a_silent_experiment_stops_a_real_device():
