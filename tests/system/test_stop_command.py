@@ -13,6 +13,7 @@ import sys
 import threading
 import time
 from contextlib import contextmanager
+from types import SimpleNamespace
 
 import pytest
 from harness import entrain_run
@@ -134,6 +135,13 @@ def test_strangers_on_this_machine_are_in_nobodys_way(strange):
         while None not in came:
             time.sleep(0.01)
         assert stop_all()[f"some_body/{os.getpid()}"].done
+
+
+def test_whoever_floods_the_channel_holds_up_nobody(monkeypatch):
+    listener = StopListener("robot")
+    with listener._socket:
+        monkeypatch.setattr(listener, "_socket", SimpleNamespace(recvfrom=lambda _: (b"", None)))
+        assert set(listener.requests()) == {None}
 
 
 def test_any_name_of_a_robot_is_found():

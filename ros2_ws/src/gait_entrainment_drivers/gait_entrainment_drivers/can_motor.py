@@ -40,10 +40,7 @@ class CanMotorOptions(LoopOptions):
     port: int = setting(0, "UDP port of udp_multicast; 0 is python-can's own", "", (0, 65535))
     bitrate: int = setting(1_000_000, "of the bus", "bit/s", (10_000, 1_000_000))
     ratio: float = setting(
-        1.0,
-        "ankle torque per motor torque; negative if the motor turns against it",
-        "1",
-        (-20.0, 20.0),
+        1.0, "ankle torque per motor torque; negative if it turns against it", "1", (-20.0, 20.0)
     )
 
     def __post_init__(self) -> None:

@@ -51,14 +51,8 @@ def _holder(name: str) -> str:
         data = asker.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
         process = Path(f"/proc/{_CREDENTIALS.unpack(data)[0]}")
         # The torque loop itself says nothing to a person: its parent is what was started.
-        (parent,) = (
-            line.split()[1]
-            for line in (process / "status").read_text().splitlines()
-            if line.startswith("PPid:")
-        )
-        command = (
-            Path(f"/proc/{parent}/cmdline").read_bytes().replace(b"\0", b" ").decode().strip()
-        )
-        told = command[:_LONGEST_COMMAND] + "..." * (len(command) > _LONGEST_COMMAND)
+        parent = (process / "status").read_text().partition("PPid:")[2].split()[0]
+        command = Path(f"/proc/{parent}/cmdline").read_text(errors="replace").replace("\0", " ")
+        told = command.strip()[:_LONGEST_COMMAND] + "..." * (len(command) > _LONGEST_COMMAND)
         return f"process {parent} ({told})"
     return "another process"

@@ -33,6 +33,7 @@ from gait_entrainment_drivers.device import TorqueDevice
 from gait_entrainment_drivers.link import Link, Sample
 from gait_entrainment_drivers.monitor import MonitorSettings
 
+_LOOP = "gait_entrainment_drivers.torque_loop"
 # The loop has this long to start, and to open, enable, disable or close its device [s].
 _START_TIMEOUT = 10.0
 _ANSWER_TIMEOUT = 2.0
@@ -45,8 +46,9 @@ _LOOP_ENDED = Fault(
 )
 _LOOP_SILENT = Fault(
     "torque_loop_silent",
-    "The process that streams torque fell silent for longer than the limit: it is frozen. The "
-    "device's own watchdog must bring zero. If torque is felt, cut the power.",
+    "The process that streams torque fell silent for longer than the limit: it, or a call of its "
+    "driver, is frozen. The device's own watchdog must bring zero. If torque is felt, cut "
+    "the power.",
 )
 
 
@@ -62,7 +64,7 @@ class LoopOptions(MonitorSettings):
     )
     bandwidth: float = setting(
         30.0,
-        "torque bandwidth (-3 dB) of the device: what its torque is held against",
+        "torque bandwidth (-3 dB) of the device, which it is held against",
         "Hz",
         (1.0, 500.0),
     )
@@ -118,12 +120,7 @@ class HostTimedRobot(AnkleRobot):
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
             self._process = subprocess.Popen(
-                [
-                    sys.executable,
-                    "-m",
-                    "gait_entrainment_drivers.torque_loop",
-                    str(theirs.fileno()),
-                ],
+                [sys.executable, "-m", _LOOP, str(theirs.fileno())],
                 pass_fds=[theirs.fileno()],
                 stdin=subprocess.DEVNULL,
                 env={**os.environ, "PYTHONSAFEPATH": "1"},  # of modules in the working folder

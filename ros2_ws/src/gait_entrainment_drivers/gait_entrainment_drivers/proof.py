@@ -14,12 +14,11 @@ motor is another robot. The files are in ``gait_entrainment`` in the user's stat
 import json
 import os
 import socket
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from datetime import datetime, timezone
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_type_hints
 
 from gait_entrainment.robot.drivers import join_options, split_options
 from gait_entrainment.robot.faults import DeviceError
@@ -47,16 +46,17 @@ class Preflight:
 
 
 def proof_of(driver: str) -> Proof | None:
-    """Return what was proved of the driver that a text names; None if nothing can be read."""
-    return _shown(Proof, _PROOFS, driver)
+    """Return what this version proved of the driver that a text names; None if nothing."""
+    proof = _shown(Proof, _PROOFS, driver)
+    return proof if proof is not None and proof.version == _version() else None
 
 
 def require_proof(driver: str, *, unproved: bool) -> None:
     """Raise DeviceError if nothing was proved of a driver, and none is ready to do without."""
     if proof_of(driver) is None and not unproved:
         raise DeviceError(
-            f"driver: the device's own watchdog was not proved on this computer: entrain driver "
-            f"prove '{driver}' --arm (nobody may wear it), or allow it unproved"
+            "driver: the device's own watchdog was not proved on this computer by this version: "
+            f"entrain driver prove '{driver}' --arm (nobody may wear it), or allow it unproved"
         )
 
 
@@ -79,11 +79,12 @@ def keep_preflight(driver: str, failed: str) -> None:
     _keep(_PREFLIGHTS, driver, Preflight(failed, _now()))
 
 
-def _shown(kind: Callable[..., _T], name: str, driver: str) -> _T | None:
-    try:
-        return kind(**_known(name)[_key(driver)])
-    except (LookupError, TypeError):
+def _shown(kind: type[_T], name: str, driver: str) -> _T | None:
+    """Return what a file holds of a driver; None if that is not what is written by this module."""
+    told = _known(name).get(_key(driver))
+    if not isinstance(told, dict) or {k: type(v) for k, v in told.items()} != get_type_hints(kind):
         return None
+    return kind(**told)
 
 
 def _keep(name: str, driver: str, shown: Proof | Preflight | None) -> None:

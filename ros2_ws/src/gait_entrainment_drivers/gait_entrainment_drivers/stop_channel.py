@@ -26,6 +26,8 @@ from pathlib import Path
 
 PREFIX = "gait_entrainment/stop/"
 _SOCKETS = Path("/proc/net/unix")
+# Variable with the descriptor of a socket that the script ``entrain`` has opened for a run.
+_OPENED = "GAIT_ENTRAINMENT_STOP_SOCKET"
 _LARGEST_ANSWER = 4096
 # Of a name: a socket's is short, and what looks for it splits at blanks.
 _LONGEST_NAME = 60
@@ -47,15 +49,19 @@ class StopListener:
     """
     The end of the channel at the robot: requests are polled, or waited for by ``select``.
 
-    ``name`` is what the robot is called in answers, such as the driver's name.
+    ``name`` is what the robot is called in answers, such as the driver's name. The first listener
+    of a run has the name and the socket that the script ``entrain`` has opened.
     """
 
     def __init__(self, name: str) -> None:
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        opened = int(os.environ.pop(_OPENED, 0)) or None
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM, fileno=opened)
         self._socket.setblocking(False)
-        os.register_at_fork(
-            after_in_child=self.close
-        )  # what it held open would be stopped in vain
+        self._socket.set_inheritable(False)
+        # What a child held open would be stopped in vain.
+        os.register_at_fork(after_in_child=self.close)
+        if opened:
+            return
         short = _UNFIT.sub("_", name)[-_LONGEST_NAME:]
         # A process may hold several robots of one name.
         for number in itertools.count(1):
@@ -74,11 +80,10 @@ class StopListener:
     def requests(self) -> list[str | bytes | None]:
         """Return the addresses of those who asked for a stop since the last call, None without."""
         found: list[str | bytes | None] = []
-        while True:
-            try:
+        with suppress(BlockingIOError):
+            while len(found) < 100:  # who floods the channel does not hold up the listener
                 found.append(self._socket.recvfrom(16)[1])
-            except BlockingIOError:
-                return found
+        return found
 
     def answer(self, addresses: Iterable[str | bytes | None], answer: StopAnswer) -> None:
         """Answer requests; whoever asked and is gone misses nothing."""

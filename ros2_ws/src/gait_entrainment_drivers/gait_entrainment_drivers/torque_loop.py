@@ -42,6 +42,10 @@ HOST_LOOP_LATE = Fault(
     "The loop that times the torque woke up later than the limit: see to what else loads this"
     " computer.",
 )
+DRIVER_SLOW = Fault(
+    "driver_slow",
+    "The driver's exchange takes longer than its timeout: see to its bus, or to load.",
+)
 HOST_SILENT = Fault(
     "host_silent",
     "The process that holds the robot fell silent for longer than the limit: it is frozen, or "
@@ -82,6 +86,7 @@ class TorqueLoop:
         self._askers: list[str | bytes | None] = []  # of a stop, not answered yet
         self._ended_at = math.inf  # when torque was ended [s]
         self._measured = math.nan  # torque measured last [N m]
+        self._took = 0.0  # the latest exchange [s]
         self._heard_at = self._answered_at = self._due = time.monotonic()
 
     def serve(self) -> None:
@@ -109,7 +114,7 @@ class TorqueLoop:
         self._listen()
         late = time.monotonic() - self._due
         if late > self._settings.lateness:
-            self._end_torque(HOST_LOOP_LATE)
+            self._end_torque(DRIVER_SLOW if self._took > late / 2 else HOST_LOOP_LATE)
         if not self._enabled:
             return
         sent = time.monotonic_ns()
@@ -120,27 +125,31 @@ class TorqueLoop:
             self._end_torque(HOST_SILENT)
             torque = 0.0
         self._monitor.expect(torque, now)
-        reading = self._exchange(torque, late)
+        reading = self._exchange(torque, late, now)
+        self._took = time.monotonic() - now
         if reading is not None:
             self._answered_at, self._measured = now, reading.torque
-            for fault in (*reading.faults, *self._monitor.judge(reading, now)):
-                self._end_torque(fault)
         elif now - self._answered_at > self._settings.silence:
             self._end_torque(DEVICE_SILENT)
         self._samples.append(Sample(sent, torque, reading, late))
+        del self._samples[:-30_000]  # the parent may be frozen for hours
         self._answer_stops(now)
         self._link.send_samples(self._samples)
         # After a hiccup it goes on from now: commands that were missed are not made up for, and
         # several short hiccups are not one long one.
         self._due = max(self._due + self._period, now)
 
-    def _exchange(self, torque: float, late: float) -> Reading | None:
-        """Exchange a torque for a reading; whatever the driver raises, zero is sent on and on."""
+    def _exchange(self, torque: float, late: float, now: float) -> Reading | None:
+        """Exchange a torque for a reading, judged; whatever else comes, zero is sent on and on."""
         try:
             if late > self._period:
                 self._device.forget()
             # Most of the period at most: an answer that comes later is read with the next one.
-            return self._device.exchange(torque, 0.8 * self._period)
+            reading = self._device.exchange(torque, 0.8 * self._period)
+            if reading is not None:
+                for fault in (*reading.faults, *self._monitor.judge(reading, now)):
+                    self._end_torque(fault)
+            return reading
         except Exception as error:
             text = f"{type(error).__name__}: {error}"
             self._end_torque(Fault(DRIVER_FAILED.name, f"The driver cannot send: {text}."))
@@ -281,11 +290,7 @@ def main() -> int:
     link = Link(socket.socket(fileno=int(sys.argv[1])))
     device_type, options = link.first()
     loop = TorqueLoop(link, device_type(options), options)
-
-    def end(*_: object) -> None:
-        loop._closing = True
-
-    signal.signal(signal.SIGTERM, end)
+    signal.signal(signal.SIGTERM, lambda *_: loop._close())
     link.send("scheduling", prefer_this_process())
     loop.serve()
     return 0

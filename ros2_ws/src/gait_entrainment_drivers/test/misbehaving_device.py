@@ -67,7 +67,7 @@ class MisbehavingDevice(TorqueDevice):
         self._note(torque)
         if does == "raise" and torque:
             raise OSError("bus gone")
-        if does == "hold up the loop":
+        if does == "take its time":
             self._first = math.inf
             time.sleep(0.2)
         if does == "stutter":
@@ -87,6 +87,9 @@ class MisbehavingDevice(TorqueDevice):
             "report an error": replace(reading, faults=(OVERHEATED,)),
             "measure NaN": replace(reading, torque=math.nan),
             "lose the angle": replace(reading, angle=math.nan),
+            "answer a number": reading.torque,
+            "measure None": replace(reading, torque=None),
+            "report a text": replace(reading, faults=("overheated",)),
         }.get(does, reading)
 
     def _follow(self, torque: float, now: float) -> float:

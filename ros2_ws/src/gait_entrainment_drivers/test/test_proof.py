@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from gait_entrainment.robot import DeviceError
-from gait_entrainment_drivers.proof import keep_proof, proof_of
+from gait_entrainment_drivers.proof import keep_proof, proof_of, require_proof
 
 KEY = f"{socket.gethostname()}/x:"  # of the driver x
 ROBOT = r"ak_mit_can:channel=can0,note=a\,b"
@@ -50,15 +50,25 @@ def test_what_was_proved_on_another_computer_with_the_same_home_proves_nothing(s
     assert proof_of(ROBOT) is None
 
 
+TYPES = '{"KEY": {"within": "1", "at": 2, "version": "VERSION"}}'
+
+
 @pytest.mark.parametrize(
-    "text", ["", "{", "[]", "3", '{"KEY": 3}', '{"KEY": {"within": 1}}', "\0"]
+    "text", ["", "{", "[]", "3", '{"KEY": 3}', '{"KEY": {"within": 1}}', TYPES, "\0"]
 )
 def test_a_file_that_cannot_be_read_proves_nothing_and_is_replaced(state, text):
     state.parent.mkdir()
-    state.write_text(text.replace("KEY", KEY))
+    state.write_text(text.replace("KEY", KEY).replace("VERSION", version("gait_entrainment")))
     assert proof_of("x") is None
     keep_proof("x", 0.05)
     assert proof_of("x").within == 0.05
+
+
+def test_what_another_version_proved_is_to_be_proved_again(state):
+    keep_proof("x", 0.05)
+    state.write_text(state.read_text().replace(version("gait_entrainment"), "0.0.1"))
+    with pytest.raises(DeviceError, match="not proved on this computer by this version"):
+        require_proof("x", unproved=False)
 
 
 def test_bytes_that_are_no_text_prove_nothing(state):

@@ -16,7 +16,7 @@ from gait_entrainment.conventions import Side
 from gait_entrainment.robot import DeviceError, PulseTrain
 from gait_entrainment.robot.guard import GuardedRobot
 from gait_entrainment_drivers.host_timed import LoopOptions
-from gait_entrainment_drivers.link import Link
+from gait_entrainment_drivers.link import Link, Sample
 from gait_entrainment_drivers.monitor import Monitor, MonitorSettings
 from gait_entrainment_drivers.stop_channel import NO_ANSWER, PREFIX, listening, stop_all
 from gait_entrainment_drivers.torque_loop import TorqueLoop
@@ -96,6 +96,9 @@ def bench(tmp_path):
         ("measure NaN", "reading_not_finite"),
         ("lose the angle", "reading_not_finite"),
         ("answer no more", "device_silent"),
+        ("answer a number", "driver_failed"),
+        ("measure None", "driver_failed"),
+        ("report a text", "driver_failed"),
         ("raise", "driver_failed"),
     ],
 )
@@ -130,8 +133,10 @@ def test_a_device_that_does_what_it_is_asked_raises_no_fault(bench):
 
 
 def test_a_loop_that_is_held_up_is_a_fault(bench):
-    device = bench(does="hold up the loop", lateness=0.05)
+    device = bench(lateness=0.05)
     device.push()
+    with device.driver.frozen():
+        time.sleep(0.1)
     device.until(lambda: "host_loop_late" in device.faults())
 
 
@@ -142,6 +147,13 @@ def test_short_hiccups_do_not_add_up_to_a_long_one(bench):
     commands = len(device.commands())
     device.until(lambda: len(device.commands()) > commands + 10)
     assert "host_loop_late" not in device.faults()
+
+
+def test_an_exchange_that_holds_up_the_loop_is_the_drivers_fault(bench):
+    device = bench(does="take its time", lateness=0.05)
+    device.push()
+    device.until(device.faults)
+    assert device.faults()[0] == "driver_slow"
 
 
 def test_a_parent_that_is_silent_ends_the_torque(bench):
@@ -253,6 +265,18 @@ def test_who_asked_for_a_stop_is_answered_although_the_device_is_disabled_at_onc
         made._listen()
         asker.settimeout(5.0)
         assert b"torque is zero, latched" in asker.recv(1000)
+
+
+def test_a_parent_that_is_frozen_for_hours_does_not_fill_the_memory(loop):
+    made, parent = loop
+    for step in ("open", "enable"):
+        parent.send(step)
+    made._listen()
+    made._samples = 40_000 * [Sample(0, 0.0, None, 0.0)]
+    made._link.send_samples = lambda _: None
+    made._tick()
+    assert len(made._samples) == 30_000
+    assert made._samples[-1].reading is not None
 
 
 def test_a_closed_robot_listens_no_more(bench):

@@ -25,7 +25,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
-from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
+from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, nanoseconds_of
 from gait_entrainment.robot.faults import DeviceError, Fault, LimitError
 from gait_entrainment.settings import setting
 from gait_entrainment_drivers.device import Reading, TorqueDevice
@@ -44,6 +44,7 @@ _DISCOVERY_TIMEOUT = 5.0
 _SERVICE_TIMEOUT = 0.8
 # After the loop was held up, for so long a state is waited for before the next command [s].
 _FRESH_STATE_TIMEOUT = 0.02
+_CONTROLLER_GONE = Fault("controller_gone", "Nobody takes commands: the controller has ended.")
 # Only the latest state counts.
 _STATES = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 # What ros2_control's controllers subscribe with is reliable. One command is kept: never a queue.
@@ -142,7 +143,7 @@ class EffortJoint(TorqueDevice):
 
     def enable(self) -> None:
         """Send zero and activate the controller."""
-        if self._masters():
+        if SECOND_MASTER in self._watched():
             raise DeviceError(
                 f"{self.name}: somebody else publishes {self._commands.topic_name}: find and stop"
                 " that"
@@ -163,7 +164,8 @@ class EffortJoint(TorqueDevice):
         now = time.time_ns()
         self._state = None
         self._spin(
-            lambda: self._state is not None and _stamp(self._state) >= now, _FRESH_STATE_TIMEOUT
+            lambda: self._state is not None and nanoseconds_of(self._state.header.stamp) >= now,
+            _FRESH_STATE_TIMEOUT,
         )
 
     def disable(self) -> None:
@@ -178,10 +180,12 @@ class EffortJoint(TorqueDevice):
             client.close()
 
     def _on_state(self, message: JointState) -> None:
-        """Take a fresh state that has the joint in it; others are nobody's business."""
-        if self._options.joint not in message.name:
+        """Take a fresh state that has the joint in it, once; others are nobody's business."""
+        if list(message.name).count(self._options.joint) != 1:
             return
-        self._age = (time.time_ns() - _stamp(message)) / NANOSECONDS_PER_SECOND
+        self._age = (
+            time.time_ns() - nanoseconds_of(message.header.stamp)
+        ) / NANOSECONDS_PER_SECOND
         if abs(self._age) < self._options.silence:
             self._place = list(message.name).index(self._options.joint)
             self._state = message
@@ -192,13 +196,13 @@ class EffortJoint(TorqueDevice):
             for values in (state.effort, state.position, state.velocity)
         )
         ratio = self._options.ratio
-        return Reading(effort * ratio, position / ratio, velocity / ratio, faults=self._masters())
+        return Reading(effort * ratio, position / ratio, velocity / ratio, faults=self._watched())
 
-    def _masters(self) -> tuple[Fault, ...]:
-        """The fault of a second master, if there is one."""
-        return (
-            (SECOND_MASTER,) if self._node.count_publishers(self._commands.topic_name) > 1 else ()
-        )
+    def _watched(self) -> tuple[Fault, ...]:
+        """The fault of a second master, or of no controller, if there is one."""
+        if self._node.count_publishers(self._commands.topic_name) > 1:
+            return (SECOND_MASTER,)
+        return () if self._commands.get_subscription_count() else (_CONTROLLER_GONE,)
 
     def _publish(self, effort: float) -> None:
         command = [0.0] * self._options.joint_count
@@ -246,10 +250,6 @@ class EffortJoint(TorqueDevice):
         if not self._spin(future.done, _SERVICE_TIMEOUT):
             raise DeviceError("controller_manager does not answer: see whether it runs")
         return future.result()
-
-
-def _stamp(message: JointState) -> int:
-    return message.header.stamp.sec * NANOSECONDS_PER_SECOND + message.header.stamp.nanosec
 
 
 class Ros2ControlRobot(HostTimedRobot):

@@ -138,6 +138,15 @@ def test_perturbator_that_does_not_answer_is_named(bench):
     assert blamed(bench.after(0.1)) == ("perturbator has been silent for 3 s", "perturbator")
 
 
+def test_a_profile_from_nowhere_hides_no_silence(bench):
+    bench.promise(valid_until=to_time(1000 * SECOND))
+    assert bench.after(TIMEOUT - 0.1) is None
+    bench.strike(10 * SECOND)
+    bench.report(10 * SECOND + HALF)
+    failure = bench.after(TIMEOUT + 0.1)
+    assert blamed(failure) == ("perturbator has been silent for 3 s", "perturbator")
+
+
 def test_perturbator_that_does_not_answer_a_request_is_named(bench):
     bench.walk_to_planning()
     assert bench.after(TIMEOUT) is None
@@ -169,7 +178,8 @@ def test_recorder_is_named_if_it_is_what_the_walker_waits_for():
     bench.report(10 * SECOND + HALF)
     bench.promise()
     bench.after(2.0)
-    bench.run.take_recorder_progress(Progress(run=7, header=header(10 * SECOND + HALF)))
+    for recorded in (10 * SECOND + HALF, 1000 * SECOND):  # the latter is not of who records
+        bench.run.take_recorder_progress(Progress(run=7, header=header(recorded)))
     bench.report(11 * SECOND)
     bench.promise()
     assert bench.after(TIMEOUT) is None

@@ -17,6 +17,7 @@ from gait_entrainment.robot import (
     Pulse,
     PulseTrain,
     Shape,
+    TorqueProfile,
     find_driver,
     make_robots,
 )
@@ -76,6 +77,19 @@ def test_horizons_are_answered_with_adjoining_promises(bench):
     (announced,) = bench.pulses
     assert (announced.number, announced.torque, announced.duration) == (1, 5.0, 0.1)
     assert bench.ended == []
+
+
+def test_a_horizon_years_ahead_is_refused_and_promises_nothing(bench):
+    with pytest.raises(LimitError, match=r"until: .* s ahead; allowed: at most 60 s"):
+        bench.run.take_horizon(SECOND, 10**9 * SECOND, last=False)
+    assert (bench.profiles, bench.robot.promised_until) == ([], SECOND)
+
+
+def test_an_onset_of_no_train_is_not_announced(bench):
+    profile = TorqueProfile(Side.RIGHT, (SECOND,), (0.0,), (SECOND,), 2 * SECOND)
+    bench.robot._robot.promise = lambda _: profile
+    bench.run.take_horizon(SECOND, 2 * SECOND, last=False)
+    assert (len(bench.profiles), bench.pulses) == (1, [])
 
 
 def test_train_is_delivered_once_its_last_pulse_is_promised(bench):

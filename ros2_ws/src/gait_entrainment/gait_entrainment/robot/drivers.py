@@ -18,6 +18,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from gait_entrainment.conventions import Side
+from gait_entrainment.errors import EntrainmentError
 from gait_entrainment.robot.contract import AnkleRobot
 from gait_entrainment.robot.faults import DeviceError, LimitError
 from gait_entrainment.robot.guard import GuardedRobot
@@ -105,17 +106,20 @@ def find_driver(text: str, side: Side = Side.RIGHT) -> Driver:
     if target is None:
         known = ", ".join(driver_names())
         raise LimitError(f"driver: {name!r} is unknown; allowed: {known}")
+    whose = f"driver: {name} ({target})"
     try:
         robot = EntryPoint(name, target, ENTRY_POINTS).load()
-    except (ImportError, AttributeError) as error:
-        raise DeviceError(
-            f"driver: {name} ({target}) cannot be loaded: {error}; install what it needs"
-        ) from None
-    if not (isinstance(robot, type) and issubclass(robot, AnkleRobot)):
-        raise LimitError(f"driver: {name} ({target}) is no AnkleRobot: derive it from that class")
-    texts = (driver_on(text, leg).partition(":")[2] for leg in Side)
-    options = [read_options(f"driver: {name}", robot.Options, words) for words in texts]
-    return Driver(name, robot, options[side])
+        if not (isinstance(robot, type) and issubclass(robot, AnkleRobot)):
+            raise LimitError(f"{whose} is no AnkleRobot: derive it from that class")
+        texts = (driver_on(text, leg).partition(":")[2] for leg in Side)
+        options = [read_options(f"driver: {name}", robot.Options, words) for words in texts]
+        driver = Driver(name, robot, options[side])
+        _ = driver.simulated  # what cannot be made is told here, too
+    except EntrainmentError:
+        raise
+    except (Exception, SystemExit) as error:  # it is somebody else's package
+        raise DeviceError(f"{whose} cannot be loaded: {error!r}; install what it needs") from error
+    return driver
 
 
 def split_options(text: str) -> list[str]:

@@ -36,6 +36,7 @@ EXPERIMENT_SILENT = Fault(
 TORQUE_UNASKED = Fault(
     "torque_unasked", "Torque is measured that nobody asked for. If it is felt, cut the power."
 )
+READINGS_OLD = Fault("readings_old", "The device reports nothing new: see to it and to its bus.")
 TORQUE_EXCEEDED = Fault(
     "torque_exceeded", "More torque was delivered than the limit and its margin allow."
 )
@@ -43,6 +44,7 @@ IMPULSE_EXCEEDED = Fault(
     "impulse_exceeded", "More angular impulse was delivered per stride than the limit allows."
 )
 DRIVER_FAILED = Fault("driver_failed", "The driver raised an error or broke its contract.")
+DRIVER_BLOCKED = Fault("driver_blocked", "A call of the driver does not return: see to its bus.")
 NOT_STOPPED = Fault(
     "not_stopped",
     "The driver cannot bring the torque to zero: cut the power. The process ends, so that the "

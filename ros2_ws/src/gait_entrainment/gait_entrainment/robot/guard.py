@@ -9,12 +9,10 @@ every delivered torque afterwards, and every way out, an exception included, bri
 zero before the device is disabled. Any fault latches: torque stays at zero until ``close`` and
 ``configure``.
 
-What this cannot do, being software next to other software on a system that is not real time, is
-said in docs/safety.md.
+What this cannot do, being software on a system that is not real time, is said in docs/safety.md.
 """
 
 import atexit
-import contextlib
 import math
 import threading
 import time
@@ -23,21 +21,11 @@ from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side, nanoseconds
+from gait_entrainment.robot import faults
 from gait_entrainment.robot.contract import AnkleRobot, Capabilities, LoopTiming, RobotState
-from gait_entrainment.robot.faults import (
-    DRIVER_FAILED,
-    EXPERIMENT_SILENT,
-    IMPULSE_EXCEEDED,
-    NOT_STOPPED,
-    STOPPED,
-    TORQUE_EXCEEDED,
-    TORQUE_UNASKED,
-    DeviceError,
-    Fault,
-    LimitError,
-)
+from gait_entrainment.robot.faults import DeviceError, Fault, LimitError
 from gait_entrainment.robot.limits import DeviceLimits, Dose
-from gait_entrainment.robot.profile import ProfileError, TorqueProfile
+from gait_entrainment.robot.profile import TorqueProfile
 from gait_entrainment.robot.pulse_train import Pulse, PulseTrain
 
 # How often the watchdog looks whether the experiment has fallen silent [s].
@@ -58,8 +46,8 @@ class GuardedRobot:
         limits: DeviceLimits | None = None,
         dose: Dose | None = None,
     ) -> None:
-        self._robot = robot
-        self.side = side
+        self._robot, self.side = robot, side
+        self.capabilities: Capabilities = robot.capabilities  # what the device can do
         self.limits = limits or DeviceLimits()
         self.dose = dose or Dose()  # goes on from robot to robot, as the session does
         self.train: PulseTrain | None = None  # what was scheduled in the run, as the driver has it
@@ -67,38 +55,30 @@ class GuardedRobot:
         self.promised_until = 0  # everything before this instant is promised [ns]
         self.faults: tuple[Fault, ...] = ()  # what latched the torque at zero, in order
         self.partner: GuardedRobot | None = None  # on the other ankle: one stops with the other
-        self._configured = self._active = self._in_run = False
+        self.enabled = False  # whether the device has been activated, latched or not
+        self._configured = self._in_run = False
         self._begun = 0  # pulses scheduled since the latest pause
         self._past: tuple[Pulse, ...] = ()  # of trains that were cancelled, what had begun
-        self._read_until = self._asked_at = 0  # stamp of the latest state, with torque asked [ns]
+        self._read_until = self._asked_at = -math.inf  # stamp of the latest state, of torque [ns]
         # Measured torque must be below this, this long after the command has become zero.
         self._unasked = 0.12 * min(self.capabilities.peak_torque, self.limits.torque)
         self._fall_time = nanoseconds(0.15 + 0.5 / self.capabilities.torque_bandwidth)
         self._offset = time.time_ns() - time.monotonic_ns()  # from steady time to a real run's
         self._armed_until = -math.inf  # steady time [s]
         self._delivered_torque = _DeliveredTorque(self.limits)
-        self._last_heard = math.inf  # steady time [s]
+        self._last_heard = self._news_at = math.inf  # the experiment, a new state: steady time [s]
+        self._called_at = math.inf  # the driver, if the call has not returned yet, steady time [s]
         self._watching = threading.Event()
-
-    @property
-    def capabilities(self) -> Capabilities:
-        """What the device can do."""
-        return self._robot.capabilities
 
     @property
     def identity(self) -> str:
         """What the device says of itself, such as its firmware; empty if it says nothing."""
-        return self._robot.identity
+        return str(self._robot.identity or "")
 
     @property
     def timing(self) -> LoopTiming:
         """How the loop that streams torque is doing."""
         return self._robot.timing
-
-    @property
-    def enabled(self) -> bool:
-        """Whether the device has been activated, latched or not."""
-        return self._active
 
     @property
     def armed(self) -> bool:
@@ -115,8 +95,7 @@ class GuardedRobot:
         try:
             self._call(self._robot.configure)
         except DeviceError:
-            with contextlib.suppress(Exception):
-                self._robot.close()
+            self._quietly(self._robot.close)
             raise
         self._configured = True
 
@@ -125,10 +104,10 @@ class GuardedRobot:
         if not self._configured:
             raise DeviceError("the device is not configured; configure it first")
         self._refuse_latched()
-        if self._active:
+        if self.enabled:
             raise DeviceError("the device is active already; deactivate it first")
         self._call(self._robot.activate)
-        self._active = True
+        self.enabled = True
         self.disarm()
         if not self.capabilities.simulated:
             # The interpreter's end kills the threads of a driver: zero torque comes before it.
@@ -156,7 +135,7 @@ class GuardedRobot:
         self._refuse_inactive()
         self._call(lambda: self._robot.begin(start))
         self.train, self.delivered, self.promised_until = None, 0, start
-        self._past, self._read_until = (), 0
+        self._past, self._read_until, self._news_at = (), -math.inf, time.monotonic()
         self._offset = time.time_ns() - time.monotonic_ns()
         self._delivered_torque = _DeliveredTorque(self.limits)
         self._in_run = True
@@ -170,8 +149,8 @@ class GuardedRobot:
         """
         self.train = None
         self._watching.clear()
-        if self._active:
-            self._active, self._armed_until = False, -math.inf
+        if self.enabled:
+            self.enabled, self._armed_until = False, -math.inf
             self._quietly(self._robot.deactivate)
 
     def close(self) -> None:
@@ -231,7 +210,7 @@ class GuardedRobot:
         if before is None or first - before.end > _PAUSE:
             self._begun = 0
         train = self.limits.softened(train, self._begun)
-        self._call(lambda: self._robot.schedule(train))
+        self._call(lambda: self._robot.schedule(train), may_refuse=True)
         self._begun += len(train.pulses)
         self.train = before.followed_by(train) if before else train
         self.heard()
@@ -246,7 +225,7 @@ class GuardedRobot:
             self.train = None
             self._call(self._robot.cancel)
 
-    def stop(self, fault: Fault = STOPPED) -> None:
+    def stop(self, fault: Fault = faults.STOPPED) -> None:
         """
         Bring the torque to zero and keep it there; from any thread and state, never raises.
 
@@ -257,8 +236,8 @@ class GuardedRobot:
         self.train = None
         try:
             self._robot.stop()
-        except Exception:
-            self._latch(NOT_STOPPED)
+        except (Exception, SystemExit):
+            self._latch(faults.NOT_STOPPED)
         if new and self.partner is not None:
             self.partner.stop(fault)
 
@@ -276,11 +255,9 @@ class GuardedRobot:
         if until < begin:
             raise ValueError(f"a promise up to {until} ns would take back one up to {begin} ns")
         self._refuse_before_begin()
-        profile = self._call(lambda: self._robot.promise(until))
-        try:
-            profile.check(begin, until)
-        except ProfileError as error:
-            raise self._breach(str(error)) from None
+        profile = self._call(
+            lambda: self._robot.promise(until), lambda told: told.check(begin, until)
+        )
         self.delivered += len(profile.onsets)
         self.dose.pulses += len(profile.onsets)
         self.dose.impulse += sum(_impulse(*piece) for piece in profile.pieces)
@@ -292,27 +269,7 @@ class GuardedRobot:
 
     def read(self) -> Sequence[RobotState]:
         """Return the states since the last call; a fault latches; DeviceError if one cannot be."""
-        states = self._call(lambda: tuple(self._robot.read()))
-        able, until = self.capabilities, self.promised_until
-        if not able.simulated:  # a device's clock may be a little ahead
-            until = time.monotonic_ns() + self._offset + NANOSECONDS_PER_SECOND // 10
-        for state in states:
-            for fault in state.faults:
-                if fault not in self.faults:
-                    self.stop(fault)
-            measured = state.measured if able.measures_torque and not state.faults else 0.0
-            before, self._read_until = self._read_until, state.stamp
-            if not before or state.commanded or abs(measured) <= self._unasked:
-                self._asked_at = state.stamp
-            finite = math.isfinite(state.commanded + measured)
-            if not (finite and before <= state.stamp <= until):
-                raise self._breach(f"{state} after {before} and by {until} ns")
-            # In simulated time it is a sensor with flaws that shows more than there is.
-            if abs(measured) > self._delivered_torque.most and not able.simulated:
-                self.stop(TORQUE_EXCEEDED)
-            if state.stamp - self._asked_at > self._fall_time and not able.simulated:
-                self.stop(TORQUE_UNASKED)
-        return states
+        return self._call(lambda: tuple(self._robot.read()), self._watch_states)
 
     # Guarding
 
@@ -326,44 +283,81 @@ class GuardedRobot:
             raise DeviceError(f"torque is latched at zero ({names}): clean up and configure first")
 
     def _refuse_inactive(self) -> None:
-        if not self._active:
+        if not self.enabled:
             raise DeviceError("the device is not active; configure and activate it first")
 
     def _refuse_before_begin(self) -> None:
         if not self._in_run:
             raise DeviceError("no run is under way; begin one first")
 
-    def _call(self, function: Callable[[], _T]) -> _T:
-        """Call the driver; whatever it raises, the torque goes to zero first."""
+    def _call(
+        self,
+        function: Callable[[], _T],
+        check: Callable[[_T], object] = lambda _: None,
+        *,
+        may_refuse: bool = False,
+    ) -> _T:
+        """Call the driver, check what it returns; whatever is raised, the torque ends first."""
+        self._called_at = time.monotonic()
         try:
-            return function()
-        except LimitError:
-            raise  # refused, nothing has changed
+            result = function()
+            check(result)
+            return result
         except BaseException as error:
-            if self._active:
-                self.stop(DRIVER_FAILED)
+            if may_refuse and isinstance(error, LimitError):
+                raise  # nothing has changed
+            if self.enabled:
+                self.stop(faults.DRIVER_FAILED)
             if isinstance(error, DeviceError) or not isinstance(error, Exception):
                 raise
             raise DeviceError(f"the driver failed: {type(error).__name__}: {error}") from error
+        finally:
+            self._called_at = math.inf
 
-    def _breach(self, how: str) -> DeviceError:
-        """Bring the torque to zero; return the error that says how the driver broke its word."""
-        self.stop(DRIVER_FAILED)
-        return DeviceError(f"the driver broke its contract: {how}")
+    def _watch_states(self, states: Sequence[RobotState]) -> None:
+        """Latch what states tell; raises ValueError or what comes of it if one cannot be."""
+        able, until = self.capabilities, self.promised_until
+        if not able.simulated:  # a device's clock may be a little ahead
+            until = time.monotonic_ns() + self._offset + NANOSECONDS_PER_SECOND // 10
+        for state in states:
+            measured = state.measured if able.measures_torque and not state.faults else 0.0
+            before, self._read_until = self._read_until, state.stamp
+            finite = math.isfinite(state.commanded + measured) and not math.isinf(state.angle)
+            known = all(isinstance(fault, Fault) for fault in state.faults)
+            if not (known and finite and before <= state.stamp <= until):
+                raise ValueError(f"{state} after {before} and by {until} ns")
+            if state.stamp > max(before, until - nanoseconds(0.1 + self.limits.silence)):
+                self._news_at = time.monotonic()
+            for fault in state.faults:
+                if fault not in self.faults:
+                    self.stop(fault)
+            if math.isinf(before) or state.commanded or abs(measured) <= self._unasked:
+                self._asked_at = state.stamp
+            # In simulated time it is a sensor with flaws that shows more than there is.
+            if abs(measured) > self._delivered_torque.most and not able.simulated:
+                self.stop(faults.TORQUE_EXCEEDED)
+            if state.stamp - self._asked_at > self._fall_time and not able.simulated:
+                self.stop(faults.TORQUE_UNASKED)
+        period = 3 / able.state_rate if able.state_rate and not able.simulated else math.inf
+        if self.train and time.monotonic() - self._news_at > max(period, self.limits.silence):
+            self.stop(faults.READINGS_OLD)
 
     def _quietly(self, function: Callable[[], None]) -> None:
         """Call the driver on the way out: an error becomes a fault, and the way goes on."""
         try:
             function()
         except Exception:
-            self.stop(DRIVER_FAILED)
+            self.stop(faults.DRIVER_FAILED)
 
     def _watch(self) -> None:
-        """Stop the torque if the experiment falls silent while torque may come."""
+        """Stop the torque if the experiment or a driver falls silent while torque may come."""
         while self._watching.is_set():
-            silence = time.monotonic() - self._last_heard
-            if self.train is not None and silence > self.limits.silence:
-                self.stop(EXPERIMENT_SILENT)
+            now, longest = time.monotonic(), self.limits.silence
+            silent = self.train is not None and now - self._last_heard > longest
+            if silent or now - self._called_at > longest:  # a train may be the driver's already
+                calls = (robot._called_at for robot in (self, self.partner) if robot)
+                blocked = now - min(calls) > longest / 2
+                self.stop(faults.DRIVER_BLOCKED if blocked else faults.EXPERIMENT_SILENT)
                 return
             time.sleep(_WATCH_PERIOD)
 
@@ -386,7 +380,7 @@ class _DeliveredTorque:
             if torque == 0:
                 continue
             if abs(torque) > self.most:
-                found = found or TORQUE_EXCEEDED
+                found = found or faults.TORQUE_EXCEEDED
             self._pieces.append((begin, end, abs(torque)))
             self._sum += _impulse(begin, end, torque)
             while self._pieces[0][1] <= end - self._window:
@@ -394,7 +388,7 @@ class _DeliveredTorque:
             first, _, height = self._pieces[0]
             before = _impulse(first, max(first, end - self._window), height)
             if self._sum - before > self._impulse:
-                found = found or IMPULSE_EXCEEDED
+                found = found or faults.IMPULSE_EXCEEDED
         return found
 
 

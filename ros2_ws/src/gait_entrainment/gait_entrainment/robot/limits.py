@@ -6,7 +6,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import islice, pairwise
+from itertools import pairwise
 from typing import Any
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, nanoseconds
@@ -123,8 +123,8 @@ class DeviceLimits(Checked):
 
     def check(self, train: PulseTrain, before: Sequence[Pulse] = ()) -> None:
         """Raise LimitError if a train must not be delivered after the pulses ``before`` it."""
-        if not train.pulses:
-            raise LimitError("count: 0; allowed: at least 1")
+        if not 0 < (count := len(train.pulses)) <= 10_000:  # of more, checking would take long
+            raise LimitError(f"count: {count}; allowed: 1 to 10000 at a time")
         for shape in {replace(pulse, onset=0) for pulse in train.pulses}:
             self.check_pulse(shape)
         for pulse, later in pairwise([*before[-1:], *train.pulses]):
@@ -203,7 +203,7 @@ def _largest(spans: Sequence[Any], window: int) -> float:
     largest = 0.0
     for number, (begin, *_) in enumerate(spans):
         inside = 0.0
-        for onset, _, torque, impulse in islice(spans, number, None):
+        for onset, _, torque, impulse in spans[number:]:
             left = (begin + window - onset) / NANOSECONDS_PER_SECOND
             if left <= 0:
                 break

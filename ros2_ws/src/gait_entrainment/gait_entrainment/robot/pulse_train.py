@@ -66,9 +66,9 @@ class Pulse:
                 f"rise: {self.rise:g} s, and fall {self.fall:g} s; allowed: together at most the "
                 f"width of {self.duration:g} s"
             )
-        shares = len(self.samples) > 1 and all(-1 <= share <= 1 for share in self.samples)
+        shares = 1 < len(self.samples) <= 10_000 and all(-1 <= s <= 1 for s in self.samples)
         if self.shape is Shape.SAMPLES and not shares:
-            raise LimitError("samples: allowed: at least two shares of the torque, from -1 to 1")
+            raise LimitError("samples: allowed: 2 to 10000 shares of the torque, from -1 to 1")
 
     @property
     def impulse(self) -> float:

@@ -5,6 +5,7 @@
 
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given, settings
@@ -21,6 +22,7 @@ from gait_entrainment.robot import (
     make_robots,
 )
 from gait_entrainment.robot.drivers import join_options, split_options
+from gait_entrainment.robot.ideal import IdealAnkleRobot
 
 
 def test_the_drivers_of_this_package_are_there():
@@ -99,6 +101,39 @@ def test_a_driver_that_cannot_be_loaded_says_what_is_missing(monkeypatch):
     monkeypatch.setitem(drivers.OWN_DRIVERS, "absent", "no_such_package:Robot")
     with pytest.raises(DeviceError, match=r"absent .*cannot be loaded: .*no_such_package"):
         find_driver("absent")
+
+
+class Odd(IdealAnkleRobot):
+    capabilities = None
+
+
+class Optionless(IdealAnkleRobot):
+    Options = None
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("1 / 0", "ZeroDivisionError"),
+        ("raise SystemExit(3)", r"SystemExit\(3\)"),
+        ("Robot = (", "SyntaxError"),
+        (Odd, "AttributeError.*'simulated'"),
+        (Optionless, "TypeError.*dataclass"),
+    ],
+)
+def test_whatever_somebody_elses_driver_does_when_loaded_is_told(
+    monkeypatch, tmp_path, text, words
+):
+    from gait_entrainment.robot import drivers
+
+    if isinstance(text, str):
+        (tmp_path / "of_somebody.py").write_text(text)
+        monkeypatch.syspath_prepend(tmp_path)
+    else:
+        monkeypatch.setitem(sys.modules, "of_somebody", SimpleNamespace(Robot=text))
+    monkeypatch.setitem(drivers.OWN_DRIVERS, "odd", "of_somebody:Robot")
+    with pytest.raises(DeviceError, match=rf"odd .*cannot be loaded: .*{words}"):
+        find_driver("odd")
 
 
 def test_what_is_no_driver_is_refused(monkeypatch):

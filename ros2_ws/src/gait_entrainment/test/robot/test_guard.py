@@ -28,7 +28,7 @@ from gait_entrainment.robot import (
     TorqueProfile,
     find_driver,
 )
-from gait_entrainment.robot.faults import EXPERIMENT_SILENT
+from gait_entrainment.robot.faults import DRIVER_BLOCKED, EXPERIMENT_SILENT, READINGS_OLD
 
 from .recording_robot import RecordingRobot
 
@@ -77,6 +77,7 @@ def ready(limits=None, simulated=True):
         ({}, {"period": 2e-9, "duration": 1e-9}, "period: 2e-09 s"),
         ({"session_pulses": 3}, {}, "session_pulses: 4 with this train; allowed: at most 3"),
         ({"session_impulse": 5.0}, {}, "session_impulse: 5.2 N m s.*at most 5"),
+        ({}, {"count": 10_001}, "count: 10001; allowed: 1 to 10000 at a time"),
         ({}, {"first_onset": -1}, "already promised"),
         ({}, {"side": Side.RIGHT}, "other ankle"),
     ],
@@ -285,7 +286,7 @@ STATE = RobotState(SECOND, 0.0, 0.0, math.nan)
         ([STATE, replace(STATE, stamp=SECOND - 1)], f"{SECOND - 1}.* after {SECOND}"),
         ([replace(STATE, commanded=math.inf)], "commanded=inf"),
         ([replace(STATE, measured=math.nan)], "measured=nan"),
-        ([replace(STATE, stamp=2 * time.time_ns())], r"broke its contract: .* by \d+ ns"),
+        ([replace(STATE, stamp=2 * time.time_ns())], r"driver failed: ValueError: .* by \d+ ns"),
         (None, "the driver failed: TypeError"),
     ],
 )
@@ -463,12 +464,48 @@ def test_a_stop_that_meets_a_schedule_wins():
     assert guard.train is None
 
 
+@pytest.mark.parametrize("told", ["nothing", "one state", "old states", "states"])
+def test_a_device_that_reports_nothing_new_is_a_fault(monkeypatch, told):
+    guard, driver = ready(DeviceLimits(silence=0.5), simulated=False)
+    guard.arm()
+    guard.begin(time.time_ns())
+    guard.schedule(train(first_onset=guard.promised_until + 60 * SECOND))
+    steady, begun = time.monotonic(), time.time_ns()
+    for tenth in range(8):
+        now = begun + tenth * SECOND // 10
+        stamps = {"nothing": [], "one state": [begun], "old states": [now // 2]}.get(told, [now])
+        monkeypatch.setattr(driver, "read", lambda s=stamps: [replace(STATE, stamp=i) for i in s])
+        monkeypatch.setattr("time.monotonic", lambda t=tenth: steady + t / 10)
+        monkeypatch.setattr("time.monotonic_ns", lambda n=now: n - guard._offset)
+        guard.heard()
+        guard.read()
+    assert guard.faults == (() if told == "states" else (READINGS_OLD,))
+    guard.close()
+
+
 def test_a_silent_experiment_stops_a_real_device():
     guard, driver = ready(DeviceLimits(silence=0.05), simulated=False)
     guard.arm()
     guard.schedule(train())
     assert driver.stopped.wait(5.0)
     assert guard.faults == (EXPERIMENT_SILENT,)
+    guard.close()
+
+
+@pytest.mark.parametrize("call", ["schedule", "promise", "read"])
+def test_a_driver_that_does_not_return_is_stopped_and_named(call):
+    guard, driver = ready(DeviceLimits(silence=0.05), simulated=False)
+    guard.arm()
+    guard.schedule(train(first_onset=SECOND, count=1))
+    calls = {
+        "schedule": lambda: guard.schedule(train()),
+        "promise": lambda: guard.promise(1),
+        "read": guard.read,
+    }
+    setattr(driver, call, lambda *_: driver.stopped.wait(5.0))
+    with pytest.raises(DeviceError):
+        calls[call]()
+    assert guard.faults[0] == DRIVER_BLOCKED
     guard.close()
 
 
@@ -496,6 +533,6 @@ def test_what_stops_one_ankle_stops_both_and_the_dose_is_of_both():
 def test_a_broken_profile_stops_the_torque():
     guard, driver = ready()
     driver.promise = lambda until: TorqueProfile(Side.LEFT, (7,), (3.0,), (), until)
-    with pytest.raises(DeviceError, match=r"broke its contract.*adjoin"):
+    with pytest.raises(DeviceError, match=r"the driver failed: ProfileError: .*adjoin"):
         guard.promise(SECOND)
     assert driver.calls[-1] == "stop"

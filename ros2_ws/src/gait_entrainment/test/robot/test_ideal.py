@@ -96,7 +96,7 @@ def test_onsets_are_rounded_from_the_first_one():
         ({"duration": 0.51}, "width"),
         ({"duration": math.nan, "count": 1}, "width"),
         ({"period": 0.1}, "period.*overlap"),
-        ({"count": 0}, "count: 0; allowed: at least 1"),
+        ({"count": 0}, "count: 0; allowed: 1 to 10000 at a time"),
         ({"side": Side.RIGHT}, "side"),
         ({"first_onset": 1}, "already promised"),
     ],

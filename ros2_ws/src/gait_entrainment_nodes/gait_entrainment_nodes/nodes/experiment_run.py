@@ -193,16 +193,16 @@ class Run:
 
     def take_recorder_progress(self, progress: msg.Progress) -> None:
         """Note how far the recorder is, to name it if it is what the walker waits for."""
-        self._recorded_at = self._clock()
-        self._recorded_until = nanoseconds_of(progress.header.stamp)
+        if (stamp := nanoseconds_of(progress.header.stamp)) <= self._latest_stamp():
+            self._recorded_at, self._recorded_until = self._clock(), stamp
 
     def take_profile(self, profile: msg.TorqueProfile) -> None:
         """Note that the perturbator has answered a horizon, or has ended the torque."""
         if profile.stop:
             self._note_stop()
         else:
-            self._covered[profile.side] = nanoseconds_of(profile.valid_until)
-            self._profile_at = self._clock()
+            until, self._profile_at = nanoseconds_of(profile.valid_until), self._clock()
+            self._covered[profile.side] = min(until, self.promised_until)  # no more was asked for
             if self.closing and self.conductor is not None:
                 self._closed.add(profile.side)
                 self.closed = self._closed.issuperset(self.conductor.protocol.sides)

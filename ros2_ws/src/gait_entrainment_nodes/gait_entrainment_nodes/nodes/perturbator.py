@@ -87,15 +87,6 @@ class Settings:
         find_driver(self.driver)  # raises DeviceError if there is none
 
 
-_OFFERED = (
-    topics.TORQUE_PROFILE,
-    topics.PULSES,
-    topics.ROBOT_STATE,
-    topics.ROBOT_SETUP,
-    topics.TROUBLE,
-)
-
-
 class Perturbator(Participant, TolerantLifecycleNode):
     """ROS side of the ankle robot: lifecycle, action, services."""
 
@@ -116,8 +107,10 @@ class Perturbator(Participant, TolerantLifecycleNode):
         self._armed_by = ""
         self._stop_latched = False  # somebody stopped while there was no robot
         self._reported: tuple[Fault, ...] = ()  # faults that have been published
-        for topic in _OFFERED:
+        for topic in (topics.TORQUE_PROFILE, topics.PULSES, topics.ROBOT_STATE):
             self.offer(topic)
+        self.offer(topics.ROBOT_SETUP)
+        self.offer(topics.TROUBLE)
         self._now = 0  # latest instant that is known to be over [ns since 1970]
         self._latest_run = 0  # number of the latest run
         self._foreign_seal = ""  # of the latest horizon that was not of who conducts the run
@@ -216,9 +209,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
         self._release()
         return result
 
-    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Bring the torque to zero and release the robot."""
-        return self.on_shutdown(state)
+    on_error = on_shutdown
 
     def on_stop(self) -> None:
         """End of the process: bring the torque to zero and release the robot."""
@@ -416,6 +407,8 @@ class Perturbator(Participant, TolerantLifecycleNode):
         until = nanoseconds_of(message.until)
         try:
             self.run.take_horizon(self._now, until, last=message.last)
+        except LimitError as error:
+            self._report(DiagnosticStatus.WARN, f"horizon ignored: {error}")
         except DeviceError as error:
             self.failure = str(error)
         if self.run.closed:

@@ -37,6 +37,8 @@ from gait_entrainment_nodes.messaging.stamps import header, to_time
 
 Result = DeliverPulseTrain.Result
 _ANY = "every operator"
+# An experiment decides 10 s ahead at most; a robot in simulated time computes what it is asked.
+_FARTHEST = 60.0
 _OPERATOR_SILENT = Fault(
     "operator_silent",
     "An operator fell silent: a terminal or a page is closed, or a process is frozen.",
@@ -150,7 +152,14 @@ class Run:
         self._ankles[train.side].schedule(train)
 
     def take_horizon(self, now: int, until: int, *, last: bool) -> None:
-        """Promise torque up to a horizon, of which everything before ``now`` is known."""
+        """
+        Promise torque up to a horizon, of which everything before ``now`` is known.
+
+        LimitError if it lies farther ahead than any experiment decides, and nothing is promised.
+        """
+        ahead = (until - min(a.robot.promised_until for a in self._ankles.values())) / 1e9
+        if ahead > _FARTHEST:
+            raise LimitError(f"until: {ahead:.3g} s ahead; allowed: at most {_FARTHEST:g} s")
         for ankle in self._ankles.values():
             ankle.take_horizon(now, until, last=last)
 
@@ -257,8 +266,8 @@ class AnkleRun:
             last = self._last and profile.valid_until == self._horizon
             self._publish_profile(profile, last)
         for number, onset in enumerate(profile.onsets, first):
-            assert train is not None
-            self._publish_pulse(number + 1, train.pulses[train.latest(onset)])
+            if train is not None and (place := train.latest(onset)) >= 0:
+                self._publish_pulse(number + 1, train.pulses[place])
         for state in states:
             self._publish_state(state)
         if not robot.faults:
