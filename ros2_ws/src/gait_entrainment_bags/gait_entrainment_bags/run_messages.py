@@ -231,3 +231,22 @@ def _bits(value: Any) -> Any:
     if isinstance(value, float):
         return struct.pack("<d", value)
     return [_bits(item) for item in value] if isinstance(value, (list, tuple)) else int(value)
+
+
+def walker_timing(reader: BagReader) -> dict[str, dict[str, float]]:
+    """Return how well the walker kept time, by its own last report; {} without one."""
+    told = list(reader.messages_of(topic_names.WALKER_TIMING))[-1:]
+    timing = {}
+    for walker in told:
+        if walker.samples:
+            timing["publish_lateness_ms"] = {
+                name: 1e3 * getattr(walker, f"publish_late_{name}")
+                for name in ("p50", "p99", "worst")
+            }
+        timing["promises"] = {
+            "late_stretches": walker.late_stretches,
+            "late_ms": 1e3 * walker.late,
+            "starved_stretches": walker.starved_stretches,
+            "starved_ms": 1e3 * walker.starved,
+        }
+    return timing

@@ -9,8 +9,8 @@ from pathlib import Path
 from gait_entrainment_bags import BagReader
 from gait_entrainment_bags.figures import draw_figures
 from gait_entrainment_bags.recorded_run import messages_line, read_run, recorded_outcome
+from gait_entrainment_bags.run_messages import walker_timing
 from gait_entrainment_bags.truth import detection_lines
-from gait_entrainment_bags.walker_timing import walker_timing
 from gait_entrainment_commands.outcome import summary, timing_summary
 
 

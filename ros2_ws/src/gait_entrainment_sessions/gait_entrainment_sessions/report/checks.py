@@ -15,8 +15,8 @@ from gait_entrainment_bags import BagReader
 from gait_entrainment_bags.messages import state_of
 from gait_entrainment_bags.reader import bag_files
 from gait_entrainment_bags.recorded_run import RecordedRun
+from gait_entrainment_bags.run_messages import walker_timing
 from gait_entrainment_bags.topic_names import ROBOT_SETUP, ROBOT_STATE, TROUBLE
-from gait_entrainment_bags.walker_timing import walker_timing
 from gait_entrainment_commands.outcome import holes_of, timing_outcome, timing_summary
 
 GOOD, DOUBTFUL, BAD = "good", "doubtful", "bad"
