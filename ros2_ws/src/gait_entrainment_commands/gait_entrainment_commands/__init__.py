@@ -74,11 +74,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         where = f"{error.filename}: " if error.filename else ""
         print(f"{prog}: {where}{error.strerror or error}", file=sys.stderr)
     finally:
-        _forget_unwritable_output()
+        forget_unwritable_output()
     return 1
 
 
-def _forget_unwritable_output() -> None:
+def forget_unwritable_output() -> None:
     """Keep Python from writing again at its end what was refused, and from ending with 120."""
     try:
         print(end="", flush=True)
