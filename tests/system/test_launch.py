@@ -251,6 +251,7 @@ def test_death_of_a_node_fails_the_launch_and_ends_everything(node, tmp_path):
         os.kill(launch.nodes[node], signal.SIGKILL)
         assert launch.wait() == 1, launch.text
         assert f"{node} ended with exit code -9" in launch.text
+        assert launch.text.count(f"the bag of the run so far is {bag}") == 1
         assert launch.survivors() == []
     with BagReader(bag) as reader:
         assert sum(1 for _ in reader.messages()) == reader.message_count > 100

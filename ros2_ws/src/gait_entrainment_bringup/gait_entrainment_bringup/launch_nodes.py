@@ -11,11 +11,12 @@ from typing import Any
 from launch import Action, LaunchContext, LaunchDescription
 from launch.actions import (
     DeclareLaunchArgument,
+    LogInfo,
     OpaqueFunction,
     RegisterEventHandler,
     SetEnvironmentVariable,
 )
-from launch.event_handlers import OnProcessExit
+from launch.event_handlers import OnProcessExit, OnShutdown
 from launch.events.process import ProcessExited
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
@@ -149,8 +150,8 @@ def ended_by(
     Return the handlers that end the launch with its nodes.
 
     Those named in ``last`` end by themselves; once all of them have ended well, ``over`` is done.
-    If another node ends, or one with another exit code than 0, the launch ends with exit code 1,
-    and with the path of the ``bag`` that it was to make, if there is one.
+    If another node ends, or one with another exit code than 0, the launch ends with exit code 1.
+    If it ends before its time, it tells the path of the ``bag`` that it was to make, if any.
     """
     waited_for = set(last)
 
@@ -160,11 +161,13 @@ def ended_by(
         name = event.process_name.rpartition("-")[0]
         if event.returncode != 0 or name not in last:
             # Only an exception gives launch an exit code; it prints it in one line.
-            kept = f"; the bag of the run so far is {bag}" if bag and bag.exists() else ""
-            raise LaunchError(f"{name} ended with exit code {event.returncode}{kept}")
+            raise LaunchError(f"{name} ended with exit code {event.returncode}")
         waited_for.discard(name)
         return [] if waited_for else over
 
-    return [
-        RegisterEventHandler(OnProcessExit(target_action=node, on_exit=on_exit)) for node in nodes
-    ]
+    def on_shutdown(*_: Any) -> Action | None:
+        kept = bag is not None and bag.exists() and waited_for
+        return LogInfo(msg=f"the bag of the run so far is {bag}") if kept else None
+
+    exits = [OnProcessExit(target_action=node, on_exit=on_exit) for node in nodes]
+    return [RegisterEventHandler(one) for one in (*exits, OnShutdown(on_shutdown=on_shutdown))]

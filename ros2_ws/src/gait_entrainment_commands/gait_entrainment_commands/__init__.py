@@ -78,7 +78,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         where = f"{error.filename}: " if error.filename else ""
         _tell(f"{prog}: {where}{error.strerror or error}")
     finally:
-        _forget_unwritable_output()
+        forget_unwritable_output()
     return 1
 
 
@@ -88,7 +88,7 @@ def _tell(line: str) -> None:
         print(line, file=sys.stderr)
 
 
-def _forget_unwritable_output() -> None:
+def forget_unwritable_output() -> None:
     """Keep Python from writing again at its end what was refused, and from ending with 120."""
     try:
         print(end="", flush=True)

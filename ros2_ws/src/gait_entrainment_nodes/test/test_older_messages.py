@@ -6,6 +6,7 @@
 from rclpy.serialization import deserialize_message
 
 from gait_entrainment_bags import TopicInfo, find_definition
+from gait_entrainment_bags.definitions import SEPARATOR
 from gait_entrainment_msgs.msg import GaitEvent
 from gait_entrainment_nodes.messaging.older_messages import converter_of
 from gait_entrainment_nodes.messaging.raw_messages import serialize
@@ -40,3 +41,9 @@ def test_what_was_recorded_is_kept_and_what_has_come_since_is_empty():
 def test_a_field_that_is_no_more_or_another_project_is_not_guessed_at():
     assert converter_of(topic("float64 forgotten")) is None
     assert converter_of(topic(of_type="theirs/msg/GaitEvent")) is None
+
+
+def test_the_definition_that_a_copy_was_given_is_not_the_recorded_one():
+    root, *others = find_definition(TYPE).schema_text.split(SEPARATOR)
+    text = SEPARATOR.join([root.rstrip() + "\n", *reversed(others)])  # rosbag2 has another order
+    assert converter_of(TopicInfo("/gait_events", TYPE, text, type_hash="older")) is None

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 import pytest
 import rclpy
 import yaml
+from rclpy.parameter import Parameter
 
 from gait_entrainment.settings import SettingError, settings_of
 from gait_entrainment_nodes.messaging import topics
@@ -146,3 +147,19 @@ def test_both_feet_on_one_topic_are_refused(arguments):
     refused = "left_topic, right_topic: both are"
     with pytest.raises(ValueError, match=refused), node(GaitDetector, *arguments):
         pass
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "reason"),
+    [
+        ("mass", 70, ""),  # a whole number does for a real one, as where the node starts
+        ("seed", 1.5, "Wrong parameter type"),
+        ("mas", 70.0, "mas: there is no such parameter"),
+    ],
+)
+def test_a_parameter_is_set_as_a_person_writes_it(name, value, reason):
+    with node(WalkerSim) as made:
+        result = made.set_parameters_atomically([Parameter(name, value=value)])
+        assert result.successful == (not reason)
+        assert result.reason.startswith(reason)
+        assert made.walker.mass == (80.0 if reason else 70.0)

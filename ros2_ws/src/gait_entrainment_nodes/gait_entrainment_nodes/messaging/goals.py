@@ -18,16 +18,6 @@ def seal_of(key: str) -> str:
 
 def goal_of(run: int, key: str, train: PulseTrain) -> DeliverPulseTrain.Goal:
     """Return the goal that asks for the pulses of a train in a run, of which one has the key."""
-    pulses = [
-        Pulse(
-            onset=to_time(pulse.onset),
-            torque=pulse.torque,
-            duration=pulse.duration,
-            shape=pulse.shape,
-            rise=pulse.rise,
-            fall=pulse.fall,
-            samples=pulse.samples,
-        )
-        for pulse in train.pulses
-    ]
+    # The message has the fields of a pulse under the same names.
+    pulses = [Pulse(**vars(pulse) | {"onset": to_time(pulse.onset)}) for pulse in train.pulses]
     return DeliverPulseTrain.Goal(run=run, key=key, side=train.side, pulses=pulses)

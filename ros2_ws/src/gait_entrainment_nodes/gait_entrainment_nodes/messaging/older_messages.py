@@ -9,7 +9,7 @@ from typing import Any
 from rosidl_parser.definition import AbstractNestedType, NamespacedType
 
 from gait_entrainment_bags.decoding import decoder_for
-from gait_entrainment_bags.definitions import SEPARATOR, fields_of
+from gait_entrainment_bags.definitions import SEPARATOR, fields_of, find_definition
 from gait_entrainment_bags.metadata import TopicInfo
 from gait_entrainment_nodes.messaging.raw_messages import message_class, serialize
 
@@ -20,18 +20,17 @@ def converter_of(topic: TopicInfo) -> Callable[[bytes], bytes] | None:
     """
     Return what turns a recorded message into one of the installed type, which differs.
 
-    None unless it is one of this project that has every field that was recorded.
+    None unless it is one of this project that has every field that was recorded, by its own
+    definition: rosbag2's writer puts the installed one into a copy, beside the recorded hash.
     """
     if not topic.type.startswith(_OWN):
         return None
-    installed = message_class(topic.type)
-    recorded = topic.schema_text.partition(SEPARATOR)[0]
-    if (
-        not {field.name for field in fields_of(recorded, _OWN)}
-        <= installed.get_fields_and_field_types().keys()
-    ):
+    texts = topic.schema_text, find_definition(topic.type).schema_text
+    told, known = ({part.strip() for part in text.split(SEPARATOR)} for text in texts)
+    installed, decode = message_class(topic.type), decoder_for(topic)
+    recorded = {field.name for field in fields_of(topic.schema_text.partition(SEPARATOR)[0], _OWN)}
+    if told == known or recorded - {*installed.get_fields_and_field_types()}:
         return None
-    decode = decoder_for(topic)
     return lambda data: serialize(_filled(installed(), decode(data)))
 
 

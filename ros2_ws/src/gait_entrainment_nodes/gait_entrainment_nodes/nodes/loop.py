@@ -62,7 +62,7 @@ def run_node(make_node: Callable[[], Any]) -> int:
             if node.real_time:
                 come_before_others(node.priority)
         except HelpRequestedError as answer:
-            print(answer)
+            print(answer, flush=True)
             return 0
         except (EntrainmentError, ParameterException, ValueError, RuntimeError) as error:
             print(f"{name}: {' '.join(str(error).split())}", file=sys.stderr)

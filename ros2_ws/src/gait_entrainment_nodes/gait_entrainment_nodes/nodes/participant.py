@@ -13,6 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 
@@ -103,17 +104,21 @@ class Participant(Node):
 
     def set_parameters_atomically(self, parameter_list: list[Any]) -> SetParametersResult:
         """Set what changes; to say again what is so is no change, even of what is read-only."""
-        changes = [parameter for parameter in parameter_list if not self._has(parameter)]
+        changes = []
+        for parameter in parameter_list:
+            name = parameter.name
+            if not self.has_parameter(name):
+                reason = f"{name}: there is no such parameter; ros2 param list names them"
+                return SetParametersResult(successful=False, reason=reason)
+            present = self.get_parameter(name)
+            if (present.type_, parameter.type_) == (Parameter.Type.DOUBLE, Parameter.Type.INTEGER):
+                # A whole number does for a real one, as where the node starts.
+                parameter = Parameter(name, value=float(parameter.value))
+            if present.get_parameter_value() != parameter.get_parameter_value():
+                changes.append(parameter)
         if parameter_list and not changes:
             return SetParametersResult(successful=True)
         return super().set_parameters_atomically(changes)
-
-    def _has(self, parameter: Any) -> bool:
-        """Return whether a parameter has this very value and type."""
-        if not self.has_parameter(parameter.name):
-            return False
-        present = self.get_parameter(parameter.name).get_parameter_value()
-        return bool(present == parameter.get_parameter_value())
 
     def _on_set_parameters(self, changes: Sequence[Any]) -> SetParametersResult:
         """Take a change or refuse it with the reason; types and ranges have been checked."""
