@@ -5,7 +5,7 @@
 
 import math
 from bisect import bisect_left
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path, PurePath
 from typing import Any
@@ -91,6 +91,7 @@ class BagReader(AbstractContextManager["BagReader"]):
         for name, count in contents.counts.items():
             self.counts[name] += count
         description = recorded_description(contents.metadata)
+        _require_plain_messages(file.path, description)
         self.custom_data = custom_data_of(description) or self.custom_data
         self.ros_distro = str(description.get("ros_distro", self.ros_distro))
 
@@ -212,11 +213,8 @@ def bag_files(path: Path) -> list[Path]:
     sqlite = any(path.glob("*.db3")) and not any(path.glob("*.mcap"))
     storage = description.get("storage_identifier", "sqlite3" if sqlite else "mcap")
     if storage != "mcap":
-        raise UnreadableBagError(
-            f"{path}: stored as {storage}, not as MCAP; `ros2 bag convert -i {path} -o FILE` "
-            "makes it one, if FILE holds "
-            "{output_bags: [{uri: NEW, storage_id: mcap, all_topics: true}]}"
-        )
+        raise _convertible(path, f"stored as {storage}, not as MCAP")
+    _require_plain_messages(path, description)
     listed = description.get("relative_file_paths")
     if isinstance(listed, list) and listed:
         # Only the names count: what lies outside of its folder is no part of a bag.
@@ -232,6 +230,20 @@ def bag_files(path: Path) -> list[Path]:
         within = f", but bags in it: {', '.join(bags[:5])}" if bags else ""
         raise UnreadableBagError(f"{path}: no MCAP file in this folder{within}")
     return files
+
+
+def _require_plain_messages(path: Path, description: Mapping[str, Any]) -> None:
+    """Raise UnreadableBagError if rosbag2 has compressed each message by itself."""
+    if str(description.get("compression_mode", "")).upper() == "MESSAGE":
+        raise _convertible(path, "compressed message by message, which is not read")
+
+
+def _convertible(path: Path, what: str) -> UnreadableBagError:
+    """Return the error that says what keeps a bag from being read, and how to convert it."""
+    return UnreadableBagError(
+        f"{path}: {what}; `ros2 bag convert -i {path} -o FILE` makes a bag that is, if FILE holds "
+        "{output_bags: [{uri: NEW, storage_id: mcap, all_topics: true}]}"
+    )
 
 
 def _file_order(path: Path) -> tuple[int, str]:

@@ -266,6 +266,12 @@ def no_bag(tmp_path: Path, kind: str) -> Path:
         (path / "metadata.yaml").write_text(
             "rosbag2_bagfile_information:\n  relative_file_paths: [a_0.mcap.zstd]\n"
         )
+    elif kind == "messages compressed":
+        path.mkdir()
+        (path / "metadata.yaml").write_text(
+            "rosbag2_bagfile_information:\n  relative_file_paths: [a_0.mcap]\n"
+            "  compression_mode: message\n"
+        )
     elif kind == "file missing":
         path.mkdir()
         (path / "metadata.yaml").write_text(
@@ -288,6 +294,7 @@ def no_bag(tmp_path: Path, kind: str) -> Path:
         ("sqlite alone", "stored as sqlite3"),
         ("folder of bags", "no MCAP file in this folder, but bags in it: a, b"),
         ("file compressed", "compressed as a whole"),
+        ("messages compressed", "compressed message by message.*ros2 bag convert"),
         ("file missing", "file missing/a_0.mcap: no such file"),
     ],
 )
