@@ -5,7 +5,8 @@
 # Every test. Most share the processors, a file for each at a time and one more, since some wait;
 # then those that run in real time, one for each processor. Those that stop every robot of this
 # machine, or hold its timing to account, have it to themselves. Files of few, long tests come
-# first, so that no processor waits for them at the end. Arguments go to pytest each time.
+# first, so that no processor waits for them at the end. What took longest is listed. Arguments go
+# to pytest each time.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -13,7 +14,7 @@ nothing_selected=5
 failed=0
 run() {
     echo "test: pytest $*"
-    pytest "$@" || [[ $? == "$nothing_selected" ]] || failed=1
+    pytest --durations=15 "$@" || [[ $? == "$nothing_selected" ]] || failed=1
 }
 
 processors=$(nproc)

@@ -3,6 +3,7 @@
 
 """How fast the tongue is swept, on how many cores, beside the paper's integrator."""
 
+import os
 import time
 from functools import partial
 
@@ -11,7 +12,7 @@ import paper_integrator
 import pytest
 
 from gait_entrainment.parameters import WalkerParameters
-from gait_entrainment_studies.sweep.engine import available_cores, by_processes
+from gait_entrainment_studies.sweep.engine import by_processes
 from gait_entrainment_studies.sweep.plan import Axis, SweepPlan
 from gait_entrainment_studies.sweep.row import exact_borders, sweep_row
 
@@ -50,7 +51,7 @@ def by_the_papers_method(strides):
 
 
 def test_tongue():
-    cores = min(available_cores(), 2)
+    cores = min(len(os.sched_getaffinity(0)), 2)
     alone, together = seconds(lambda: sweep(1)), seconds(lambda: sweep(cores))
     strides = PLAN.walks * PLAN.strides
     # The sample must be the same gait: its mean stride period lies between pulse and own period.

@@ -46,7 +46,8 @@ def asked(client):
 def test_is_asked_until_the_answer_is_acceptable(client, asked):
     answer = client.call(Ready, "answers/ready", accept=lambda a: a.ready, period=0.05)
     assert answer.ready
-    assert answer.waiting_for == f"answer {len(asked)}"
+    # Others may be on their way: on a busy computer an answer takes longer than the period.
+    assert 2 < int(answer.waiting_for.removeprefix("answer ")) <= len(asked)
 
 
 def test_a_question_keeps_the_latest_answer(client, asked):

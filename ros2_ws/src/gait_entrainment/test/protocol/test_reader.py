@@ -120,7 +120,7 @@ def test_what_is_written_reads_back_the_same(
         ("pulses: {shape: trapezoid, rise: 0.2}", ("pulses.rise", "at most the width of 0.1 s")),
         ("pulses: {shape: samples, samples: [0, x]}", ("pulses.samples: '0, x'", "numbers")),
         ("pulses: {shape: samples, samples: [0, 2]}", ("pulses.samples", "from -1 to 1")),
-        ("pulses: {shape: samples}", ("pulses.samples", "at least two")),
+        ("pulses: {shape: samples}", ("pulses.samples", "2 to 10000")),
         ("pulses: {catch_pulses: [5, 51]}", ("pulses.catch_pulses: 51; allowed: from 1 to 50",)),
         ("pulses: {catch_share: 0.1, catch_pulses: [1]}", ("pulses.catch_pulses", "catch_share")),
         ("blocks: 3", ("blocks", "list of at least one")),
