@@ -8,13 +8,13 @@ What the page costs a run, and how soon its STOP acts: the figures of docs/page.
 """
 
 import os
-import random
 import resource
 import signal
 import statistics
 import sys
 import tempfile
 import time
+from functools import partial
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -126,14 +126,9 @@ def stop(folder: Path) -> None:
             walk = (f"--driver={driver}", *WALK, "--pulses=300", "--page", f"--port={port}")
             with entrain_run(place / "bag", *walk) as run:
                 until_served(port, run)
-                Look(browser, port).until("ak_mit_can")
-                button = browser.find_element("id", "stop")
-                if not wait_for_pulse(run, trace, 1):
-                    print("the run ended before:", run.text[-200:])
-                    continue
-                time.sleep(0.03 * random.random())
-                since = time.time_ns()
-                button.click()
+                look = Look(browser, port)
+                look.until("ak_mit_can")
+                since = look.press_stop(partial(wait_for_pulse, run, trace, 1))
                 run.wait()
         pushing = [at for at, _, torque in rows_of(trace) if at >= since and abs(torque) > GONE]
         print(f"STOP: {(max(pushing, default=since) - since) / 1e6:.0f} ms", flush=True)

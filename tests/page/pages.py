@@ -6,13 +6,14 @@
 import http.client
 import socket
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from harness import PATIENCE, Started
 from selenium.common.exceptions import StaleElementReferenceException, WebDriverException
+from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 
 
@@ -100,6 +101,22 @@ class Look:
             assert time.monotonic() < deadline, f"{words} cannot be clicked:\n{self.text}"
             time.sleep(0.05)
         found[0].click()
+
+    def press_stop(self, when: Callable[[], object]) -> int:
+        """
+        Press STOP once it is time; return when the browser took it [ns].
+
+        WebDriver takes its own time until then, less if the pointer is there already.
+        """
+        self.browser.execute_script(
+            "document.addEventListener('pointerdown', () => window.pressed = Date.now(),"
+            " {capture: true, once: true})"
+        )
+        button = self.browser.find_element(By.ID, "stop")
+        ActionChains(self.browser).move_to_element(button).perform()
+        assert when(), self.text
+        ActionChains(self.browser).click().perform()
+        return int(self.browser.execute_script("return window.pressed")) * 10**6
 
     def type(self, words: str) -> None:
         """Type a note or a reason."""

@@ -39,10 +39,7 @@ def test_a_page_that_dies_harms_no_run_and_stop_on_the_next_one_ends_the_torque(
             with page(tmp_path, port=port, ROS_DOMAIN_ID=str(domain)):
                 look.until_not("No connection to the page's server")
                 look.until("pulses", "You are the operator")
-                stop = browser.find_element("id", "stop")
-                assert wait_for_pulse(run, trace, 1), run.text
-                since = time.time_ns()
-                stop.click()
+                since = look.press_stop(lambda: wait_for_pulse(run, trace, 1))
                 told = look.until("STOP:", "measured)", "the stop is latched")
                 assert run.wait() == 1
                 look.until("failed", "latched: stopped")
