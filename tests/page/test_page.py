@@ -28,7 +28,7 @@ protocol:
   driver: "DRIVER"
   walker: {gravity: 156.96, mass: 5, ankle_stiffness: 87.3}
   baseline: 2
-  pulses: {count: 4, torque: 5, width: 0.05, period_offset: -0.0125}
+  pulses: {count: 20, torque: 5, width: 0.05, period_offset: -0.0125}
   washout: 1
 blocks: [{name: pulses}]
 """
@@ -59,7 +59,7 @@ def test_a_blinded_session_with_a_robot_is_conducted_from_the_page(tmp_path, bro
             operator.click("Pause before the next block")
             operator.until("then a pause: belt stopped")
             browser.refresh()
-            operator.until("You are the operator", "of 7", NOTE, "then a pause: belt stopped")
+            operator.until("You are the operator", "of 23", NOTE, "then a pause: belt stopped")
             other = Look(tablet, served.port)
             other.until("Another browser is the operator", "paused before the end: belt stopped")
             other.click("Take over")
@@ -71,7 +71,7 @@ def test_a_blinded_session_with_a_robot_is_conducted_from_the_page(tmp_path, bro
             other.click("Repeat the block")
             other.until("block 1 is the next one again")
             other.click("Go on")
-            operator.until("entrain session has ended with exit code 0", "finished", "7 of 7")
+            operator.until("entrain session has ended with exit code 0", "finished", "23 of 23")
     folder = SessionFolder(study / "sub-P01/ses-1")
     told = [(e.what, e.block, e.text) for e in folder.ledger]
     assert [entry for entry in told if entry[0] in ("note", "pause", "repeat", "go on")] == [

@@ -3,6 +3,7 @@
 
 """The short form of time_to_zero.py: torque ends, no pulse follows, the cause is named."""
 
+import math
 import random
 import sys
 from pathlib import Path
@@ -27,7 +28,11 @@ GOES_ON = 470
 )
 def test_torque_ends_and_no_pulse_follows(tmp_path, action, said):
     draw = random.Random(action)
-    time, further, told = trial(action, draw.choice(list(MOTORS)), draw, tmp_path)
+    for attempt in "abc":  # a run that a busy computer ended before counts for nothing
+        (tmp_path / attempt).mkdir()
+        time, further, told = trial(action, draw.choice(list(MOTORS)), draw, tmp_path / attempt)
+        if not math.isnan(time):
+            break
     print(f"{action}: {time:.0f} ms, {told}")
     assert further == 0
     assert time < GOES_ON
