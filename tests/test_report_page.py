@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from selenium.webdriver.support.ui import WebDriverWait
 
 from gait_entrainment_commands import main
 from gait_entrainment_sessions.folder import SessionFolder
@@ -22,6 +23,7 @@ chromium = importlib.import_module("browser").chromium
 ROOT = Path(__file__).parents[1]
 BAG = ROOT / "bags/paper_example"
 PHONE, DESKTOP = (390, 844), (1280, 900)
+PATIENCE = 60.0  # [s]
 SESSION = """\
 study: pilot
 person: {code: CODE, number: NUMBER, mass: 72, leg_length: 0.91}
@@ -61,6 +63,9 @@ def shown(browser, page, size):
     metrics = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": False}
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
     browser.get(page.as_uri())
+    # On a busy computer get returns before the whole page was read, whatever WebDriver promises.
+    ready = "return document.readyState == 'complete'"
+    WebDriverWait(browser, PATIENCE).until(lambda shows: shows.execute_script(ready))
     text = browser.execute_script("return document.body.innerText")
     root = "document.documentElement"
     width = browser.execute_script(f"return {root}.scrollWidth")
