@@ -44,8 +44,8 @@ def conduct(
     Conduct a protocol through the experiment node to its end, and watch the processes meanwhile.
 
     ``on_start`` is called once the experiment has accepted it. In ``real_time`` this process comes
-    before others. Nodes that nobody else watches may be silent for ``silence`` [s]. Until the run
-    has begun, ``early`` hears a stop. Raises NodeError if the run fails.
+    before others. Nodes that nobody else watches may be silent for ``silence`` [s] in it. Until
+    it has begun, ``early`` hears a stop. Raises NodeError if the run fails.
     """
     bar = tqdm(total=protocol.strides, unit="stride", disable=True if quiet else None, leave=False)
     with bar, keys_at_once(), Client(RUN_CLIENT) as client:
@@ -57,6 +57,7 @@ def conduct(
 
         def on_feedback(message: Any) -> None:
             early.close()
+            watch.silence = silence
             bar.update(message.feedback.state.stride - bar.n)
 
         client.subscribe(STRIDES, lambda s: show(stride=f"period {s.period:.4f} s"))
@@ -64,6 +65,8 @@ def conduct(
         client.action(RunProtocol, ACTION)
         # The recorder ends by itself once the record is complete.
         watch = Watch(client, supervisor, may_end=("bag_recorder",), asked=ASKED, silence=silence)
+        # Before the walk begins no torque can come, and much is loaded.
+        watch.silence = max(silence, SILENCE_TIMEOUT)
         operator = Operator(client)
 
         def look() -> None:

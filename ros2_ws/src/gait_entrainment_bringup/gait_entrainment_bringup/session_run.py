@@ -18,7 +18,7 @@ from typing import Any
 
 from gait_entrainment.errors import EntrainmentError
 from gait_entrainment.protocol import Protocol
-from gait_entrainment.robot import DeviceLimits, find_driver
+from gait_entrainment.robot import DeviceLimits, LimitError, find_driver
 from gait_entrainment_bags import BagError, BagReader
 from gait_entrainment_bags.messages import profile_of, stop_of
 from gait_entrainment_bags.topic_names import TORQUE_PROFILE
@@ -193,24 +193,23 @@ class SessionRun:
         Each block has a perturbator of its own, which knows only what it has delivered itself.
         """
         said, unsaid = protocol.limits, DeviceLimits()
-        lower: dict[str, Any] = {}
         bags, ordered = self._folder.path / "bags", self._session.ordered
         begun = {bags / e.bag: int(e.block) for e in self._folder.ledger if e.what == "begun"}
         runs = ((bag, ordered[number - 1].protocol) for bag, number in begun.items())
         given = [piece for bag, of in runs for piece in _delivered(bag, of)]
+        pulses, impulse = sum(count for count, _ in given), sum(part for _, part in given)
+        lower: dict[str, Any] = {}
         if said.session_pulses != unsaid.session_pulses:
-            count = sum(pulses for pulses, _ in given)
-            planned, left = protocol.planned.count, said.session_pulses - count
-            if planned > left:
-                raise SessionError(
-                    f"limits.session_pulses: {planned} more pulses; allowed: {max(left, 0)}, "
-                    f"since {count} of {said.session_pulses} were delivered"
-                )
-            lower["session_pulses"] = left
+            lower["session_pulses"] = max(said.session_pulses - pulses, 0)
         if said.session_impulse != unsaid.session_impulse:
-            impulse = sum(impulse for _, impulse in given)
             lower["session_impulse"] = max(said.session_impulse - impulse, 0.0)
-        return replace(protocol, limits=replace(said, **lower))
+        left = replace(protocol, limits=replace(said, **lower))
+        try:
+            left.check_limits()
+        except LimitError as error:
+            given_before = f"{pulses} pulses with {impulse:.4g} N m s were delivered before"
+            raise SessionError(f"limits.{error}, since {given_before}") from None
+        return left
 
 
 def _delivered(bag: Path, protocol: Protocol) -> list[tuple[int, float]]:

@@ -20,7 +20,7 @@ class Watch:
 
     Of the supervisor's processes only those that ``may_end`` end by themselves. Nodes that are
     ``asked`` for signs of life may owe one for a time of ``silence`` [s], once they have answered;
-    they are asked six times as often.
+    they are asked six times as often. ``silence`` may be changed at any time.
     """
 
     def __init__(
@@ -33,7 +33,7 @@ class Watch:
         silence: float,
     ) -> None:
         self._client, self._supervisor = client, supervisor
-        self._may_end, self._silence = may_end, silence
+        self._may_end, self.silence = may_end, silence
         never, period = (lambda _: False), silence / 6
         self._signs = {
             node: client.ask(Ready, f"{node}/ready", accept=never, period=period) for node in asked
@@ -44,12 +44,12 @@ class Watch:
         """Look once."""
         ended = self._supervisor.check(self._may_end)
         now = time.monotonic()
-        if now - self._looked_at > HELD_UP * self._silence:
+        if now - self._looked_at > HELD_UP * self.silence:
             self._since = now
         self._looked_at = now
         for node, sign in self._signs.items():
             sign.answer()
             answers = sign.latest is not None and node not in ended
-            if answers and now - max(sign.answered_at, self._since) > self._silence:
-                silent = f"{node} has been silent for {self._silence:g} s"
+            if answers and now - max(sign.answered_at, self._since) > self.silence:
+                silent = f"{node} has been silent for {self.silence:g} s"
                 raise NodeError(silent + who_hangs(self._client.node), node)

@@ -149,4 +149,11 @@ def _find_packages() -> dict[str, dict[str, str]]:
     from importlib.metadata import entry_points
 
     points = sorted(entry_points(group=ENTRY_POINTS), key=lambda point: point.name)
-    return {__name__: COMMANDS} | {point.value: point.load().COMMANDS for point in points}
+    packages = {__name__: COMMANDS}
+    for point in points:
+        try:
+            packages[point.value] = dict(point.load().COMMANDS)
+        except (Exception, SystemExit) as error:  # of somebody else; the other ones work
+            told = f"entrain: the commands of {point.value} cannot be loaded: {error!r}"
+            print(told, file=sys.stderr)
+    return packages

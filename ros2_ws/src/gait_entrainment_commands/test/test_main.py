@@ -73,3 +73,24 @@ def test_figures_ask_no_backend_of_windows(monkeypatch):
     monkeypatch.setenv("MPLBACKEND", "module://of.a.notebook")
     assert main(["simulate", "--baseline=-3"]) == 2
     assert "MPLBACKEND" not in os.environ
+
+
+def test_a_broken_command_of_somebody_else_does_not_take_the_others_with_it(
+    monkeypatch, tmp_path, capsys
+):
+    (tmp_path / "of_somebody.py").write_text("1 / 0")
+    monkeypatch.syspath_prepend(tmp_path)
+    about = tmp_path / "of_somebody-1.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: of_somebody\nVersion: 1\n")
+    (about / "entry_points.txt").write_text("[gait_entrainment.commands]\nodd = of_somebody\n")
+    with pytest.raises(SystemExit) as ended:
+        main(["--help"])
+    assert ended.value.code == 0
+    out, err = capsys.readouterr()
+    assert "simulate" in out
+    assert "analyze" in out
+    assert err == (
+        "entrain: the commands of of_somebody cannot be loaded: "
+        "ZeroDivisionError('division by zero')\n"
+    )

@@ -78,10 +78,21 @@ def test_full_shared_memory_is_named(variables):
 
 
 @pytest.mark.parametrize("left_over", ["SYSTEM_DEFAULT", "LOCALHOST"])
-def test_what_a_run_has_chosen_is_no_wish_of_the_next(left_over, variables):
+@pytest.mark.parametrize("workspace", ["this", "another"])
+def test_what_a_run_has_chosen_is_no_wish_of_the_next(left_over, workspace, variables):
     first = dds_variables(real_time=False)
     paced = dds_variables(real_time=True)
     assert first != paced
+    if workspace == "another":  # of which env.bash was sourced before
+        folder = "/another/share/gait_entrainment_nodes/config"
+        variables.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", f"{folder}/fastdds.xml")
+        assert dds_variables(real_time=False) == first
+        assert dds_variables(real_time=True) == paced
+        paced_there = f"{folder}/fastdds_real_time.xml"
+        variables.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", paced_there)
+        variables.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", left_over)
+        assert dds_variables(real_time=False) == first
+        assert dds_variables(real_time=True) == paced
     for name, value in {**paced, "ROS_AUTOMATIC_DISCOVERY_RANGE": left_over}.items():
         variables.setenv(name, value)
     assert dds_variables(real_time=False) == first

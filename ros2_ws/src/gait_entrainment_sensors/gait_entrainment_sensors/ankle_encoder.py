@@ -57,6 +57,7 @@ class AnkleEncoderDetector(Detector):
     def __init__(self, side: Side, settings: Any = None) -> None:
         super().__init__(side, settings)
         self._period, self._range = OwnMedian(), OwnMedian()
+        self._rise = OwnMedian()  # from trough to peak, in strides
         self._restart()
 
     @property
@@ -67,13 +68,19 @@ class AnkleEncoderDetector(Detector):
     def _restart(self) -> None:
         self._rising = True
         self._extreme, self._at = math.nan, math.nan  # [rad], [s]
-        self._trough = math.nan
+        self._trough, self._trough_at = math.nan, math.nan
         self._peak = math.nan  # time of the latest [s]
         self._strike = math.nan  # foreseen [s]
 
     def troubles(self, now: float | None = None) -> tuple[str, ...]:
-        """Say that this is the fallback."""
-        return (*super().troubles(now), f"{self.side.name.lower()} {self.name}: {self.lacks}")
+        """Say that this is the fallback, and whether it seems to be read the other way round."""
+        where = f"{self.side.name.lower()} {self.name}"
+        told = [*super().troubles(now), f"{where}: {self.lacks}"]
+        if self._rise.value > 0.6:  # push-off lasts a sixth of a stride (Perry and Burnfield)
+            told.append(
+                f"{where}: the angle rises slowly and falls fast: plantarflexion must be positive"
+            )
+        return tuple(told)
 
     def _take(self, time: float, values: Sequence[float]) -> list[Detection]:
         found: list[Detection] = []
@@ -93,7 +100,7 @@ class AnkleEncoderDetector(Detector):
         if self._rising:
             self._take_peak(extreme, self._at)
         else:
-            self._trough = extreme
+            self._trough, self._trough_at = extreme, self._at
         self._rising = not self._rising
         self._extreme, self._at = angle, time
         return found
@@ -106,4 +113,5 @@ class AnkleEncoderDetector(Detector):
         self._peak = at
         if 0.3 <= period <= 5.0:
             self._period.add(period)
+            self._rise.add((at - self._trough_at) / period)
             self._strike = at + self.settings.strike_share * self._period.value

@@ -18,7 +18,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any, ClassVar
 
 from gait_entrainment.conventions import EventKind, Side
-from gait_entrainment.errors import UsageError
+from gait_entrainment.errors import EntrainmentError, UsageError
 from gait_entrainment.robot.drivers import read_options
 from gait_entrainment.settings import Checked, SettingError, setting
 
@@ -309,13 +309,16 @@ def find_detector(text: str) -> ChosenDetector:
     found = detector_names()
     if name not in found:
         raise UsageError(f"detector: {name!r} is unknown; allowed: {', '.join(found)}")
+    whose = f"detector: {name} ({found[name]})"
     try:
         detector = EntryPoint(name, found[name], ENTRY_POINTS).load()
-    except (ImportError, AttributeError) as error:
-        raise UsageError(
-            f"detector: {name} ({found[name]}) cannot be loaded: {error}; install what it needs"
-        ) from None
-    if not (isinstance(detector, type) and issubclass(detector, Detector)):
-        raise UsageError(f"detector: {name} is no Detector: derive it from that class")
-    settings = read_options(f"detector: {name}", detector.Settings, options)
-    return ChosenDetector(name, detector, settings)
+        if not (isinstance(detector, type) and issubclass(detector, Detector)):
+            raise UsageError(f"{whose} is no Detector: derive it from that class")
+        settings = read_options(f"detector: {name}", detector.Settings, options)
+        chosen = ChosenDetector(name, detector, settings)
+        _ = chosen.make(Side.LEFT).latency  # what cannot be made is told here, too
+    except EntrainmentError:
+        raise
+    except (Exception, SystemExit) as error:  # it is somebody else's package
+        raise UsageError(f"{whose} cannot be loaded: {error!r}; install what it needs") from error
+    return chosen

@@ -166,6 +166,11 @@ def events_on_plates(
         )
     contacts: list[list[Detection]] = []
     for index, plate in enumerate(capture.plates):
+        if not np.any(plate.high - plate.low):
+            raise RecordingError(
+                f"{capture.path}: FORCE_PLATFORM:CORNERS of plate {index + 1} are one point: its "
+                "axes, and so its vertical force, are not known; enter its corners"
+            )
         samples = [*zip(plate.times.tolist(), plate.force[:, np.newaxis].tolist(), strict=True)]
         settings = chosen.detector.calibrated(chosen.settings, samples)
         detector = chosen.detector(Side.LEFT if sides is None else sides[index], settings)

@@ -4,6 +4,8 @@
 """What every detector owes, whatever its samples: counts, no exception, nothing late."""
 
 import math
+import sys
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given, settings
@@ -12,6 +14,7 @@ from walks import fed, foot_rate, force, sampled, times
 
 from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment.errors import EntrainmentError
+from gait_entrainment_sensors import detection
 from gait_entrainment_sensors.detection import Detector, detector_names, find_detector
 from gait_entrainment_sensors.foot_gyroscope import FootGyroscopeDetector
 from gait_entrainment_sensors.vertical_force import VerticalForceDetector
@@ -54,6 +57,43 @@ def test_what_is_no_detector_is_refused_in_one_line(text, words):
     with pytest.raises(EntrainmentError, match=words) as refused:
         find_detector(text)
     assert "\n" not in str(refused.value)
+
+
+class Unmade(FootGyroscopeDetector):
+    def _restart(self):  # which the constructor calls
+        raise KeyError("calibration")
+
+
+class Settingless(FootGyroscopeDetector):
+    Settings = None
+
+
+@pytest.mark.parametrize(
+    ("made", "words"),
+    [
+        ("1 / 0", "ZeroDivisionError"),
+        ("raise SystemExit(3)", r"SystemExit\(3\)"),
+        ("Detector = (", "SyntaxError"),
+        ("", "AttributeError"),
+        ("class Detector: pass", "is no Detector"),
+        (Unmade, "KeyError.*calibration"),
+        (Settingless, "TypeError.*dataclass"),
+    ],
+)
+def test_whatever_somebody_elses_detector_does_when_loaded_is_told(
+    monkeypatch, tmp_path, made, words
+):
+    if isinstance(made, str):
+        (tmp_path / "of_somebody.py").write_text(made)
+        monkeypatch.syspath_prepend(tmp_path)
+        monkeypatch.delitem(sys.modules, "of_somebody", raising=False)
+    else:
+        monkeypatch.setitem(sys.modules, "of_somebody", SimpleNamespace(Detector=made))
+    odd = {"odd": "of_somebody:Detector"}
+    monkeypatch.setattr(detection, "detector_names", lambda: odd)
+    with pytest.raises(EntrainmentError, match=rf"odd \(of_somebody:Detector\) .*{words}") as told:
+        find_detector("odd")
+    assert "\n" not in str(told.value)
 
 
 def test_a_measured_bias_is_taken_off():

@@ -140,6 +140,17 @@ def test_belts_are_named_where_there_are_no_markers(tmp_path):
     assert len(events_on_plates(read_c3d(path, named), FORCE)[0]) == 4
 
 
+def test_a_plate_of_which_nothing_tells_where_it_lies_is_named(tmp_path):
+    path = write(tmp_path / "a.c3d")
+    file = ezc3d.c3d(str(path))
+    plate = file["parameters"]["FORCE_PLATFORM"]
+    plate["CORNERS"]["value"] = plate["CORNERS"]["value"] * [1, 0]
+    file.write(str(path))
+    for sides in None, [Side.RIGHT, Side.LEFT]:
+        with pytest.raises(RecordingError, match="CORNERS of plate 2 are one point: "):
+            events_on_plates(read_c3d(path), FORCE, sides)
+
+
 def test_a_file_that_is_none_and_markers_that_are_not_there_are_one_line(tmp_path):
     path = tmp_path / "none.c3d"
     path.write_bytes(b"nothing")

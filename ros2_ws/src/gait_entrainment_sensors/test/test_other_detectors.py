@@ -146,3 +146,15 @@ def test_an_angle_in_degrees_is_told():
     detector = AnkleEncoderDetector(Side.RIGHT)
     fed(detector, sampled(lambda t: (math.degrees(ankle(t)), 0.0), UNTIL))
     assert any("in degrees?" in line for line in detector.troubles())
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_an_encoder_that_counts_the_other_way_round_is_told(sign):
+    def pushed_off(time):
+        place = phase_of(time) / STRIDE
+        return sign * min(place / 0.2, (1 - place) / 0.8) * 0.3, 0.0
+
+    detector = AnkleEncoderDetector(Side.RIGHT)
+    fed(detector, sampled(pushed_off, UNTIL))
+    told = any("plantarflexion must be positive" in line for line in detector.troubles())
+    assert told == (sign < 0)

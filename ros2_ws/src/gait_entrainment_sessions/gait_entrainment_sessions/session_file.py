@@ -37,7 +37,7 @@ from gait_entrainment.protocol import (
 )
 from gait_entrainment.protocol.protocol import BLOCK_FIELDS
 from gait_entrainment.protocol.reader import Entry, composed, entries_in, value_of
-from gait_entrainment.robot import DeviceError, DeviceLimits, LimitError, find_driver
+from gait_entrainment.robot import DeviceError, DeviceLimits, Dose, LimitError, find_driver
 from gait_entrainment.settings import Setting, setting, settings_of
 from gait_entrainment_sessions.order import ORDERS, block_order
 
@@ -168,6 +168,13 @@ class _Reader:
         for number, block in enumerate(blocks):
             if block.name in (other.name for other in blocks[:number]):
                 raise SessionError(f"{block.place}: name: {block.name}: appears twice; keep one")
+        doses = [block.protocol.dose for block in blocks]
+        whole = Dose(sum(dose.pulses for dose in doses), sum(dose.impulse for dose in doses))
+        try:
+            blocks[0].protocol.limits.check_dose(whole, ())
+        except LimitError as error:
+            place = given[f"limits.{str(error).partition(':')[0]}"].where
+            raise SessionError(f"{place}: limits.{error}") from None
         return Session(**own, person=person, blocks=blocks, file=self._path)
 
     def _block(self, node: yaml.Node, told: _Said, common: _Said, rest: float) -> Block:

@@ -10,7 +10,7 @@ from typing import Any
 from gait_entrainment.conventions import Side
 from gait_entrainment.parameters import Variation, WalkerParameters
 from gait_entrainment.protocol.block import Block, PulsePlan
-from gait_entrainment.robot import DeviceLimits, PlannedPulses
+from gait_entrainment.robot import DeviceLimits, Dose, PlannedPulses
 from gait_entrainment.settings import Setting, setting, settings_of
 
 
@@ -77,10 +77,20 @@ class Protocol(Block):
             count=sum(len(self.ankles(b)) * b.pulses.count for b in self.sequence),
         )
 
+    @property
+    def dose(self) -> Dose:
+        """What all blocks are to deliver, at both ankles."""
+        dose = Dose(self.planned.count)
+        for number, block in enumerate(self.sequence, 1):
+            heights = len(self.ankles(block)) * sum(block.pulses.heights(1.0, (self.seed, number)))
+            dose.impulse += heights * block.pulses.pulse(0, block.torque(self.walker)).impulse
+        return dose
+
     def check_limits(self, *blocks: Block) -> None:
-        """Raise LimitError if some pulse, of some blocks only, is outside the limits."""
+        """Raise LimitError if a pulse, of some blocks only, or all together exceed the limits."""
         for block in blocks or self.sequence:
             self.limits.check_pulse(block.pulses.pulse(0, block.torque(self.walker)))
+        self.limits.check_dose(self.dose, ())
 
 
 SECTIONS: dict[str, type[Any]] = {

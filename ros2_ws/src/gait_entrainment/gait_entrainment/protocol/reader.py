@@ -90,7 +90,7 @@ def _checked(protocol: Protocol, said: Sequence[Mapping[str, Entry]], *, to_run:
             protocol.check_limits(block)
         except (LimitError, DeviceError) as error:
             field, heights = str(error).partition(":")[0], (f"pulses.{name}" for name in HEIGHTS)
-            suspects = (field, f"pulses.{field}", *heights, f"limits.{field}")
+            suspects = (field, f"pulses.{field}", f"limits.{field}", *heights)
             raise type(error)(f"{_place(suspects, entries)}{error}") from None
     return protocol
 

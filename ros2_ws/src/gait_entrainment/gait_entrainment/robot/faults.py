@@ -36,7 +36,7 @@ EXPERIMENT_SILENT = Fault(
 TORQUE_UNASKED = Fault(
     "torque_unasked", "Torque is measured that nobody asked for. If it is felt, cut the power."
 )
-READINGS_OLD = Fault("readings_old", "The device reports nothing new: see to it and to its bus.")
+READINGS_OLD = Fault("readings_old", "The device tells nothing new: see to it and to its bus.")
 TORQUE_EXCEEDED = Fault(
     "torque_exceeded", "More torque was delivered than the limit and its margin allow."
 )

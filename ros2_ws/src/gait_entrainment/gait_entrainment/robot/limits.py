@@ -41,10 +41,9 @@ class PlannedPulses(Checked):
             "count": before + len(train.pulses),
         }
         for name, value in asked.items():
-            if not value <= getattr(self, name):
+            if not value <= (most := getattr(self, name)):
                 raise LimitError(
-                    f"{name}: {value:g} is not of the protocol's pulses; allowed: at most "
-                    f"{getattr(self, name):g}"
+                    f"{name}: {value:g} is not of the protocol's pulses; allowed: at most {most:g}"
                 )
 
 
@@ -162,17 +161,13 @@ class DeviceLimits(Checked):
 
     def check_dose(self, dose: Dose, coming: Sequence[Pulse]) -> None:
         """Raise LimitError if pulses to come are too much after what was received already."""
-        pulses = dose.pulses + len(coming)
-        if pulses > self.session_pulses:
-            raise LimitError(
-                f"session_pulses: {pulses} with this train; allowed: at most {self.session_pulses}"
-            )
-        impulse = dose.impulse + sum(pulse.impulse for pulse in coming)
-        if impulse > self.session_impulse:
-            raise LimitError(
-                f"session_impulse: {impulse:.4g} N m s with this train; allowed: at most "
-                f"{self.session_impulse:g} N m s"
-            )
+        asked = {
+            "session_pulses": dose.pulses + len(coming),
+            "session_impulse": dose.impulse + sum(pulse.impulse for pulse in coming),
+        }
+        for name, value in asked.items():
+            if value > (most := getattr(self, name)):
+                raise LimitError(f"{name}: {value:.6g} in all; allowed: at most {most:g}")
 
     def softened(self, train: PulseTrain, begun: int = 0) -> PulseTrain:
         """

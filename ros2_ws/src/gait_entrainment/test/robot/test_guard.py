@@ -75,8 +75,8 @@ def ready(limits=None, simulated=True):
         ({"duty": 0.05}, {}, "duty: 0.0526.*at most 0.05"),
         ({"pulses_per_minute": 30.0}, {}, r"period: 1.9 s; allowed: at least 2 s \(30 pulses"),
         ({}, {"period": 2e-9, "duration": 1e-9}, "period: 2e-09 s"),
-        ({"session_pulses": 3}, {}, "session_pulses: 4 with this train; allowed: at most 3"),
-        ({"session_impulse": 5.0}, {}, "session_impulse: 5.2 N m s.*at most 5"),
+        ({"session_pulses": 3}, {}, "session_pulses: 4 in all; allowed: at most 3"),
+        ({"session_impulse": 5.0}, {}, "session_impulse: 5.2 in all.*at most 5"),
         ({}, {"count": 10_001}, "count: 10001; allowed: 1 to 10000 at a time"),
         ({}, {"first_onset": -1}, "already promised"),
         ({}, {"side": Side.RIGHT}, "other ankle"),
@@ -464,7 +464,7 @@ def test_a_stop_that_meets_a_schedule_wins():
     assert guard.train is None
 
 
-@pytest.mark.parametrize("told", ["nothing", "one state", "old states", "states"])
+@pytest.mark.parametrize("told", ["nothing", "one state", "old states", "no torque", "all"])
 def test_a_device_that_reports_nothing_new_is_a_fault(monkeypatch, told):
     guard, driver = ready(DeviceLimits(silence=0.5), simulated=False)
     guard.arm()
@@ -478,8 +478,10 @@ def test_a_device_that_reports_nothing_new_is_a_fault(monkeypatch, told):
         monkeypatch.setattr("time.monotonic", lambda t=tenth: steady + t / 10)
         monkeypatch.setattr("time.monotonic_ns", lambda n=now: n - guard._offset)
         guard.heard()
+        if told != "no torque":
+            guard.promise(now)
         guard.read()
-    assert guard.faults == (() if told == "states" else (READINGS_OLD,))
+    assert guard.faults == (() if told == "all" else (READINGS_OLD,))
     guard.close()
 
 
@@ -520,7 +522,7 @@ def test_what_stops_one_ankle_stops_both_and_the_dose_is_of_both():
         guard.begin(0)
     left.schedule(train())
     right.schedule(train(side=Side.RIGHT))
-    with pytest.raises(LimitError, match="session_pulses: 12 with this train; allowed"):
+    with pytest.raises(LimitError, match="session_pulses: 12 in all; allowed"):
         left.schedule(train(first_onset=20 * SECOND))
     drivers[Side.RIGHT].faults = (OVERHEATED,)
     right.read()

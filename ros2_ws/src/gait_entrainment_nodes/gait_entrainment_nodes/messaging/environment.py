@@ -100,8 +100,12 @@ def dds_variables(*, real_time: bool) -> dict[str, str]:
         for name in ("fastdds", "fastdds_real_time")
     )
     chosen = {reach: os.environ.get(reach) or "LOCALHOST", file: os.environ.get(file) or common}
-    if chosen[file] == paced:  # not by the user, but by what has started this process
-        chosen = {reach: "LOCALHOST", file: common}
+    given = Path(chosen[file])
+    # Not by the user, but by what has started this process, or the set-up of another workspace.
+    if given.parts[-3:-1] == (PACKAGE, "config"):
+        chosen[file] = common
+        if given.name == Path(paced).name:
+            chosen[reach] = "LOCALHOST"
     alone = chosen[reach] == "LOCALHOST" and not os.environ.get("ROS_STATIC_PEERS")
     if real_time and alone and chosen[file] == common:
         return {reach: "SYSTEM_DEFAULT", file: paced}

@@ -117,6 +117,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
         self._look_at: float | None = None  # when to look after a real robot, steady time [s]
         self._signs = SignsOfLife()
         self._pressed = False  # the emergency stop, for all that it has said
+        self._buttons = 0  # who can press it
         self._stop_thread = StopThread(self.get_name(), self._stop_at_once)
 
         self.subscribe(topics.HORIZON, self._on_horizon)
@@ -302,9 +303,11 @@ class Perturbator(Participant, TolerantLifecycleNode):
     def _require_signs_of_life(self) -> None:
         """End the torque if an operator, or who holds the emergency stop, is not there."""
         robots = self._robots.values()
+        buttons = self.count_publishers("~/emergency_stop")
+        gone, self._buttons = buttons < self._buttons, buttons
         if all(robot.train is None for robot in robots):
             return
-        for fault, told in self._signs.missing(self.settings):
+        for fault, told in self._signs.missing(self.settings, button_gone=gone):
             for robot in robots:
                 robot.stop(fault)
             self._report_faults(told)

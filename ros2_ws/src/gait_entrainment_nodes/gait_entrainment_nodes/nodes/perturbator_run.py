@@ -58,8 +58,10 @@ class SignsOfLife:
         """Note a heartbeat of an operator, or, without one, a word of the emergency stop."""
         self._at[operator] = self._at[operator and _ANY] = time.monotonic()
 
-    def missing(self, settings: Any) -> Iterator[tuple[Fault, str]]:
+    def missing(self, settings: Any, *, button_gone: bool) -> Iterator[tuple[Fault, str]]:
         """Tell of whom no sign came in time, by the perturbator's settings: a fault, in words."""
+        if button_gone:
+            yield _DEADMAN_SILENT, "a node that can press the emergency stop has ended"
         now, wanted = time.monotonic(), list(filter(None, settings.operators)) or [_ANY]
         for watched, timeout, fault in (
             (wanted, settings.operator_timeout, _OPERATOR_SILENT),
