@@ -83,15 +83,15 @@ class Settingless(FootGyroscopeDetector):
 def test_whatever_somebody_elses_detector_does_when_loaded_is_told(
     monkeypatch, tmp_path, made, words
 ):
+    module = tmp_path.name  # which no other test has
     if isinstance(made, str):
-        (tmp_path / "of_somebody.py").write_text(made)
+        (tmp_path / f"{module}.py").write_text(made)
         monkeypatch.syspath_prepend(tmp_path)
-        monkeypatch.delitem(sys.modules, "of_somebody", raising=False)
     else:
-        monkeypatch.setitem(sys.modules, "of_somebody", SimpleNamespace(Detector=made))
-    odd = {"odd": "of_somebody:Detector"}
+        monkeypatch.setitem(sys.modules, module, SimpleNamespace(Detector=made))
+    odd = {"odd": f"{module}:Detector"}
     monkeypatch.setattr(detection, "detector_names", lambda: odd)
-    with pytest.raises(EntrainmentError, match=rf"odd \(of_somebody:Detector\) .*{words}") as told:
+    with pytest.raises(EntrainmentError, match=rf"odd \({module}:Detector\) .*{words}") as told:
         find_detector("odd")
     assert "\n" not in str(told.value)
 

@@ -188,7 +188,8 @@ def test_a_pulse_by_phase_lies_where_the_mean_of_five_strides_predicts(
         strikes[n] + round((early + phase) * statistics.fmean(walked[max(n - 5, 0) : n]) * 1e9)
         for n in range(baseline - early, baseline - early + 6)
     ]
-    assert [train.onsets[0] for train in trains] == expected
+    # Two may be requested at once.
+    assert [onset for train in trains for onset in train.onsets] == expected
     assert conductor.block.train.onsets == tuple(expected)
     assert conductor.block.end == strikes[baseline + 6 + 1]
 
