@@ -32,6 +32,7 @@ from gait_entrainment_msgs.action import RunProtocol
 from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.client import Client
 from gait_entrainment_nodes.messaging.domain import CLAIMS, claimed_domain
+from gait_entrainment_nodes.messaging.environment import come_before_others
 from gait_entrainment_nodes.messaging.stamps import header
 from gait_entrainment_nodes.messaging.topics import GROUND_REACTION, STRIDES, Topic
 
@@ -185,6 +186,18 @@ def probe(domain: int) -> Iterator[Probe]:
     made = Probe(domain)
     with made.client:
         yield made
+
+
+@contextmanager
+def as_prompt_as_a_node() -> Iterator[None]:
+    """Have this process scheduled as the nodes of a real-time run: a test stands for one."""
+    come_before_others()
+    try:
+        yield
+    finally:
+        for thread in Path("/proc/self/task").iterdir():
+            with suppress(OSError):  # has ended meanwhile
+                os.sched_setscheduler(int(thread.name), os.SCHED_OTHER, os.sched_param(0))
 
 
 def stat(pid: int) -> list[str]:

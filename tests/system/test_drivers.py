@@ -16,6 +16,7 @@ from harness import (
     PROMISED_TOPICS,
     QUICK,
     Session,
+    as_prompt_as_a_node,
     entrain_run,
     payloads,
     probe,
@@ -238,7 +239,11 @@ def test_beside_a_page_that_is_a_heartbeat_a_frozen_command_ends_the_torque(tmp_
     quick = (*QUICK, "--baseline=4", "--limit-rising=1")
     options = (f"--driver={driver}", *ARMED, *quick, "--heartbeat")
     beats = OPERATOR_HEARTBEAT
-    with entrain_run(tmp_path / "bag", *options) as run, probe(run.domain()) as page:
+    with (
+        entrain_run(tmp_path / "bag", *options) as run,
+        as_prompt_as_a_node(),
+        probe(run.domain()) as page,
+    ):
         states, troubles = page.listen(ROBOT_STATE), page.listen(TROUBLE)
         heart = page.node.create_publisher(beats.type, beats.name, beats.qos)
 

@@ -46,7 +46,8 @@ def delays(pair="", matched=0.0):
 def before_all_were_up(bag, matched):
     """Return whether a pair was matched before each node had been there for a while."""
     with BagReader(bag) as reader:
-        up = max(raw.publish_time for raw in reader.messages(["/rosout"])) / 1e9
+        said = [(raw, log) for raw, log in reader.decoded(["/rosout"]) if "started" in log.msg]
+        up = max(raw.publish_time for raw, _ in said) / 1e9
         begun = next(iter(reader.messages(["/gait_events"]))).publish_time / 1e9
     assert begun > matched
     return up > matched - 0.5

@@ -263,6 +263,9 @@ class GuardedRobot:
         self.dose.impulse += sum(_impulse(*piece) for piece in profile.pieces)
         self.promised_until = profile.valid_until
         fault = self._delivered_torque.add(profile)
+        behind = min(until, time.monotonic_ns() + self._offset) - self.promised_until
+        if self.train and behind > nanoseconds(self.limits.silence):
+            fault = fault or faults.READINGS_OLD  # not so in simulated time: it promises all
         if fault is not None:
             self.stop(fault)
         return profile
@@ -338,12 +341,9 @@ class GuardedRobot:
                 self.stop(faults.TORQUE_EXCEEDED)
             if state.stamp - self._asked_at > self._fall_time and not able.simulated:
                 self.stop(faults.TORQUE_UNASKED)
-        if self.train and not able.simulated:
-            longest = max(3 / (able.state_rate or math.inf), self.limits.silence)
-            news = time.monotonic() - self._news_at if able.state_rate else 0.0
-            account = (until - self.promised_until) / NANOSECONDS_PER_SECOND - 0.1
-            if max(news, account) > longest:
-                self.stop(faults.READINGS_OLD)
+        period = 3 / able.state_rate if able.state_rate and not able.simulated else math.inf
+        if self.train and time.monotonic() - self._news_at > max(period, self.limits.silence):
+            self.stop(faults.READINGS_OLD)
 
     def _quietly(self, function: Callable[[], None]) -> None:
         """Call the driver on the way out: an error becomes a fault, and the way goes on."""

@@ -468,9 +468,12 @@ def test_a_stop_that_meets_a_schedule_wins():
 def test_a_device_that_reports_nothing_new_is_a_fault(monkeypatch, told):
     guard, driver = ready(DeviceLimits(silence=0.5), simulated=False)
     guard.arm()
-    guard.begin(time.time_ns())
-    guard.schedule(train(first_onset=guard.promised_until + 60 * SECOND))
     steady, begun = time.monotonic(), time.time_ns()
+    if told == "no torque":
+        nothing = TorqueProfile(guard.side, (begun,), (0.0,), (), begun)
+        monkeypatch.setattr(driver, "promise", lambda _: nothing)
+    guard.begin(begun)
+    guard.schedule(train(first_onset=guard.promised_until + 60 * SECOND))
     for tenth in range(8):
         now = begun + tenth * SECOND // 10
         stamps = {"nothing": [], "one state": [begun], "old states": [now // 2]}.get(told, [now])
@@ -478,8 +481,7 @@ def test_a_device_that_reports_nothing_new_is_a_fault(monkeypatch, told):
         monkeypatch.setattr("time.monotonic", lambda t=tenth: steady + t / 10)
         monkeypatch.setattr("time.monotonic_ns", lambda n=now: n - guard._offset)
         guard.heard()
-        if told != "no torque":
-            guard.promise(now)
+        guard.promise(now)
         guard.read()
     assert guard.faults == (() if told == "all" else (READINGS_OLD,))
     guard.close()
