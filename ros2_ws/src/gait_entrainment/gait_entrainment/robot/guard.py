@@ -59,7 +59,7 @@ class GuardedRobot:
         self._configured = self._in_run = False
         self._begun = 0  # pulses scheduled since the latest pause
         self._past: tuple[Pulse, ...] = ()  # of trains that were cancelled, what had begun
-        self._read_until = self._asked_at = -math.inf  # stamp of the latest state, of torque [ns]
+        self._read_until, self._unasked_since = -math.inf, math.inf  # stamps of states [ns]
         # Measured torque must be below this, this long after the command has become zero.
         self._unasked = 0.12 * min(self.capabilities.peak_torque, self.limits.torque)
         self._fall_time = nanoseconds(0.15 + 0.5 / self.capabilities.torque_bandwidth)
@@ -135,7 +135,8 @@ class GuardedRobot:
         self._refuse_inactive()
         self._call(lambda: self._robot.begin(start))
         self.train, self.delivered, self.promised_until = None, 0, start
-        self._past, self._read_until, self._news_at = (), -math.inf, time.monotonic()
+        self._past, self._news_at = (), time.monotonic()
+        self._read_until, self._unasked_since = -math.inf, math.inf
         self._offset = time.time_ns() - time.monotonic_ns()
         self._delivered_torque = _DeliveredTorque(self.limits)
         self._in_run = True
@@ -334,12 +335,12 @@ class GuardedRobot:
             for fault in state.faults:
                 if fault not in self.faults:
                     self.stop(fault)
-            if math.isinf(before) or state.commanded or abs(measured) <= self._unasked:
-                self._asked_at = state.stamp
+            unasked = not state.commanded and abs(measured) > self._unasked
+            self._unasked_since = min(self._unasked_since, state.stamp) if unasked else math.inf
             # In simulated time it is a sensor with flaws that shows more than there is.
             if abs(measured) > self._delivered_torque.most and not able.simulated:
                 self.stop(faults.TORQUE_EXCEEDED)
-            if state.stamp - self._asked_at > self._fall_time and not able.simulated:
+            if state.stamp - self._unasked_since > self._fall_time and not able.simulated:
                 self.stop(faults.TORQUE_UNASKED)
         period = 3 / able.state_rate if able.state_rate and not able.simulated else math.inf
         if self.train and time.monotonic() - self._news_at > max(period, self.limits.silence):
@@ -358,8 +359,7 @@ class GuardedRobot:
             now, longest = time.monotonic(), self.limits.silence
             silent = self.train is not None and now - self._last_heard > longest
             if silent or now - self._called_at > longest:  # a train may be the driver's already
-                calls = (robot._called_at for robot in (self, self.partner) if robot)
-                blocked = now - min(calls) > longest / 2
+                blocked = now - min(r._called_at for r in (self, self.partner) if r) > longest / 2
                 self.stop(faults.DRIVER_BLOCKED if blocked else faults.EXPERIMENT_SILENT)
                 return
             time.sleep(_WATCH_PERIOD)

@@ -318,7 +318,7 @@ def test_more_torque_in_a_state_than_the_limit_latches_but_for_an_emulated_senso
 @pytest.mark.parametrize("simulated", [True, False])
 @pytest.mark.parametrize(
     ("commanded", "measured", "seconds", "ends"),
-    [(0.0, 2.5, 0.16, True), (0.0, 2.3, 9.0, False), (0.0, -2.5, 0.14, False),
+    [(0.0, 2.5, 0.17, True), (0.0, 2.3, 9.0, False), (0.0, -2.5, 0.14, False),
      (2.0, 9.0, 9.0, False)],
 )  # fmt: skip
 def test_torque_that_nobody_asked_for_ends_in_time_whatever_the_driver(
@@ -333,6 +333,18 @@ def test_torque_that_nobody_asked_for_ends_in_time_whatever_the_driver(
     guard.read()
     names = [fault.name for fault in guard.faults]
     assert names == (["torque_unasked"] if ends and not simulated else [])
+    guard.close()
+
+
+def test_one_reading_that_comes_late_is_no_torque_that_nobody_asked_for(monkeypatch):
+    """A pulse ends while nothing is read; what comes first then was measured before its end."""
+    guard, driver = ready(simulated=False)
+    guard.promise(60 * SECOND)
+    told = [(1.0, 5.0, 5.0), (1.3, 0.0, 5.0), (1.31, 0.0, 0.0), (1.6, 0.0, 5.0)]
+    states = [RobotState(round(at * SECOND), *torques, math.nan) for at, *torques in told]
+    monkeypatch.setattr(driver, "read", lambda: states)
+    guard.read()
+    assert guard.faults == ()
     guard.close()
 
 
