@@ -137,13 +137,8 @@ def check_walker(walker: str, detector: str, *, real_time: bool) -> None:
         from gait_entrainment_sensors import find_detector
 
         chosen = find_detector(detector)
-        lacks = chosen.detector.lacks
-        if walker == "sensed":
-            from gait_entrainment_sensors.emulated import NO_TOE_OFF
-
-            lacks = NO_TOE_OFF.get(chosen.name, lacks)
-        if lacks:
-            print(f"{chosen.name}: {lacks}", file=sys.stderr)
+        if chosen.detector.lacks:
+            print(f"{chosen.name}: {chosen.detector.lacks}", file=sys.stderr)
 
 
 def check_numbers(options: argparse.Namespace) -> None:

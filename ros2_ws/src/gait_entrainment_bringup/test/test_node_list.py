@@ -144,7 +144,8 @@ def test_parameters_are_given_to_every_node(real_time):
 @pytest.mark.parametrize(
     ("walker", "detector", "told"),
     [
-        ("sensed", "shank_gyroscope", "shank_gyroscope: no toe-offs on the simulated walker"),
+        ("sensed", "ankle_encoder", "ankle_encoder: a fallback: no toe-offs"),
+        ("sensed", "shank_gyroscope", ""),
         ("person", "shank_gyroscope", ""),
         ("person", "ankle_encoder:decision=0.1", "no entrainment verdict can rest on them"),
         ("simulated", "ankle_encoder", ""),

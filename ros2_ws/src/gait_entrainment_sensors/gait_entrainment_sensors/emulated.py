@@ -16,11 +16,15 @@ What is modelled beyond the walker's own motion, because the model leaves it out
   more is left out. A switch under the toes closes after ``slap_time``.
 - Its swing leg has no dynamics; the foot goes on turning down for a seventh of a second after
   toe-off. A person's is pulled up at once. So that rate fades with ``release_time``.
+- Its knee does not bend. A person's bends from 5 to 40 degrees in push-off, ever faster, and by 20
+  more once the toes are off (Perry and Burnfield, Gait Analysis, 2010). Thigh and shank are about
+  equally long, so each turns by half of that. So a gyroscope on the shank also measures half of
+  ``knee_angle``, turned in the ``push_off_time`` after the other foot's strike and fading with
+  ``knee_time`` after toe-off; that the swing turns it back by as much more is left out.
 
-What is not modelled: the knee does not bend, so the shank turns like the whole leg, about half as
-fast in swing as a person's, without the peaks at strike and toe-off by which a gyroscope on the
-shank tells these events; soft tissue; shocks at impact; cross-talk of axes; forces on the other
-foot's belt; the centre of pressure.
+What is not modelled: the knee in the rest of the stride, so the shank swings about half as fast as
+a person's, without the peak at strike; soft tissue; shocks at impact; cross-talk of axes; forces
+on the other foot's belt; the centre of pressure.
 """
 
 import math
@@ -66,6 +70,9 @@ class EmulatedSettings(Checked):
     slap_angle: float = setting(0.25, "turned down after a strike", "rad", (0.0, 1.0))
     slap_time: float = setting(0.1, "from heel strike to foot flat", "s", (1e-3, 0.5))
     release_time: float = setting(0.015, "time constant of the foot after toe-off", "s", (0, 0.1))
+    knee_angle: float = setting(0.6, "bent in push-off", "rad", (0.0, 1.5))
+    push_off_time: float = setting(0.35, "usual length of double stance", "s", (0.05, 1.0))
+    knee_time: float = setting(0.1, "time constant of the knee after toe-off", "s", (1e-3, 0.5))
     bounce: float = setting(0.004, "time for which a switch bounces", "s", (0.0, 0.1))
 
 
@@ -97,11 +104,6 @@ KINDS: dict[str, tuple[tuple[str, ...], EmulatedSettings]] = {
 
 # The emulated sensor of a detector, where the two have different names.
 USUAL = {"vertical_force": "treadmill_force"}
-# What a detector lacks on this walker alone.
-NO_TOE_OFF = {
-    "shank_gyroscope": "no toe-offs on the simulated walker, whose knee does not bend: phase lags "
-    "count from heel strikes"
-}
 
 
 def find_sensor(text: str) -> tuple[str, EmulatedSettings]:
@@ -142,6 +144,7 @@ class EmulatedSensor:
         self._gap_from = -math.inf  # start of the latest dropout [s]
         self._strikes: list[int] = [_NEVER]  # of this foot [ns]
         self._toe_offs: list[int] = [_NEVER]
+        self._pushes: list[int] = [_NEVER]  # strikes of the other foot, when this one pushes off
 
     def due(self, until: int) -> Stamps:
         """Return the instants of the samples up to and including ``until`` [ns], each once."""
@@ -166,9 +169,11 @@ class EmulatedSensor:
         ``times`` are what `due` returned; ``events`` those of the stretch, of both feet.
         """
         for event in events:
+            struck = event.kind is EventKind.HEEL_STRIKE
             if event.side is self.side:
-                struck = event.kind is EventKind.HEEL_STRIKE
                 (self._strikes if struck else self._toe_offs).append(event.stamp)
+            elif struck:
+                self._pushes.append(event.stamp)
         settings, n = self.settings, times.size
         stamps = (self._taken + np.arange(n)) / settings.rate
         self._taken += n
@@ -219,14 +224,19 @@ class EmulatedSensor:
 
     def _rates(self, times: Stamps, samples: Samples) -> Floats:
         """Sensor x forward, y to the left, z up: it measures toes down, leaning forward as +y."""
+        settings = self.settings
         rate = -samples.velocity[:, HIP + self.side]
-        if self.kind == "foot_gyroscope":
+        trailing = samples.leading != self.side
+        swings = trailing & ~samples.double_stance
+        since = np.where(swings, self._since(self._toe_offs, times), 0.0)
+        if self.kind == "shank_gyroscope":
+            pushed = self._since(self._pushes, times) - since
+            lean = settings.knee_angle * pushed / settings.push_off_time**2
+            rate = rate + np.where(trailing, lean * np.exp(-since / settings.knee_time), 0.0)
+        else:
             rate = rate + samples.velocity[:, ANKLE + self.side]
-            settings = self.settings
-            swings = ~samples.double_stance & (samples.leading != self.side)
-            left = self._since(self._toe_offs, times)
-            fading = np.exp(-left / max(settings.release_time, 1e-9))
-            rate = np.where(swings & (rate > 0.0), rate * fading, rate)
+            fading = np.exp(-since / max(settings.release_time, 1e-9))
+            rate = np.where(rate > 0.0, rate * fading, rate)
             phase = self._since(self._strikes, times) / settings.slap_time
             slap = settings.slap_angle * math.pi / (2 * settings.slap_time)
             rate = rate + np.where(phase < 1.0, slap * np.sin(math.pi * phase), 0.0)

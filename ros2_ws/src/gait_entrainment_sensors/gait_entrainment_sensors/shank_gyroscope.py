@@ -42,7 +42,7 @@ class ShankGyroscopeDetector(GyroscopeDetector):
     2010), taken as twice the standard deviation; no licensed record with a reference was found to
     measure it here.
     Fails: where the fall begins more than ``decision`` before the swing, as with a stiff knee or
-    in very slow walking: no toe-off. So none on the simulated walker, whose knee does not bend.
+    in very slow walking: no toe-off.
     """
 
     name = "shank_gyroscope"

@@ -101,6 +101,27 @@ def test_a_foot_slaps_after_its_strike_and_is_released_at_toe_off():
         assert rates[n + 60] < 0.2
 
 
+def test_the_knee_leans_the_shank_forward_until_the_toes_are_off():
+    plain = EmulatedSettings(rate=1000.0)
+    bent, stiff = (
+        np.array([v[1] for _, v in measured("shank_gyroscope", settings=each)[0]])
+        for each in (plain, replace(plain, knee_angle=0.0))
+    )
+    _, events = measured("shank_gyroscope", settings=plain)
+    knee = 2.0 * (bent - stiff)
+    strikes = [e.stamp for e in events if (e.kind, e.side) == (EventKind.HEEL_STRIKE, Side.LEFT)]
+    toe_offs = [e.stamp for e in events if (e.kind, e.side) == (EventKind.TOE_OFF, Side.RIGHT)]
+    for strike, toe_off in zip(strikes, toe_offs[-len(strikes) :], strict=True):
+        n, m = strike // 1_000_000, toe_off // 1_000_000
+        # 35 degrees in push-off, 20 more thereafter: half of either by the shank.
+        assert np.sum(knee[n + 1 : m + 1]) * 1e-3 == pytest.approx(0.6, abs=0.05)
+        assert np.sum(knee[m + 1 : m + 500]) * 1e-3 == pytest.approx(0.35, abs=0.05)
+        assert not np.any(knee[n - 300 : n])
+        # A plateau that toe-off ends, and the swing soon after it.
+        assert min(bent[n + 1 : m]) > 0.0
+        assert bent[m + 70] < 0.0
+
+
 def test_switches_follow_the_feet():
     rows, events = measured("foot_switch", settings=EmulatedSettings(rate=1000.0, bounce=0.0))
     for time, (heel, toe) in rows:

@@ -13,6 +13,7 @@ from gait_entrainment.gait import Verdict
 from gait_entrainment.parameters import Variation
 from gait_entrainment.protocol import Protocol
 from gait_entrainment_sensors.detection import find_detector
+from gait_entrainment_sensors.emulated import find_sensor
 from gait_entrainment_sensors.rehearsal import Sensors, rehearse
 from gait_entrainment_sensors.scoring import score
 
@@ -21,6 +22,7 @@ CHAINS = [
     ("insole_force", "vertical_force"),
     ("foot_switch", "foot_switch"),
     ("foot_gyroscope", "foot_gyroscope"),
+    ("shank_gyroscope", "shank_gyroscope"),
 ]
 
 
@@ -62,7 +64,8 @@ def test_steps_have_the_numbers_of_the_walker():
 
 def test_where_no_toe_off_is_found_the_verdict_rests_on_heel_strikes():
     protocol = replace(Protocol(), variation=Variation(0.0))
-    chain = Sensors("shank_gyroscope", find_detector("shank_gyroscope"), protocol.side, seed=5)
+    kind, stiff = find_sensor("shank_gyroscope:knee_angle=0")
+    chain = Sensors(kind, find_detector(kind), protocol.side, stiff, seed=5)
     rehearsal = rehearse(protocol, chain)
     assert EventKind.TOE_OFF not in {event.kind for event in rehearsal.events}
     assert rehearsal.analysis.entrainments[-1].verdict is Verdict.ENTRAINED
