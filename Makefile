@@ -18,7 +18,7 @@ help: ## list the targets
 demo: build ## set up, build, then simulate a walk and entrain it: entrain run
 	@$(in_env) entrain run
 
-test: build ## set up, build, then run every test (PYTEST_ARGS="-k name" for some)
+test: build ## set up, build, then run every test (PYTEST_ARGS="-k name" selects some)
 	@$(in_env) scripts/test.sh $(PYTEST_ARGS)
 
 lint: build ## ruff, mypy, import-linter, licence headers, ament linters
@@ -27,10 +27,10 @@ lint: build ## ruff, mypy, import-linter, licence headers, ament linters
 format: setup ## let ruff rewrite the sources
 	@.venv/bin/ruff check --fix . ; .venv/bin/ruff format .
 
-bench: build ## measure the speeds in the README, each beside its baseline
+bench: build ## measure the speeds in the README, each next to its baseline
 	@$(in_env) pytest -s -m benchmark tests/benchmarks
 
-figures: build ## draw the pictures in docs anew
+figures: build ## redraw the pictures in docs
 	@$(in_env) python scripts/make_figures.py
 
 docs: build ## HTML of the public names: docs/api/index.html

@@ -2,7 +2,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-# Build the workspace with colcon where something that needs building has changed.
+# Build the workspace with colcon if something that needs building has changed.
 #
 # Python modules are linked, not copied, so editing one needs no build; a changed message, launch
 # file, entry point or package.xml does.
@@ -19,13 +19,13 @@ fingerprint=$({
 if [ "$(cat ros2_ws/install/complete 2> /dev/null)" != "$fingerprint" ]; then
     echo "build: colcon builds the packages ..."
     start=$SECONDS
-    # What another environment has built names that environment's Python.
+    # A build made by another environment refers to that environment's Python.
     if [ "$(cat ros2_ws/build/environment 2> /dev/null)" != "$(cat .venv/complete)" ]; then
         rm -rf ros2_ws/build ros2_ws/install ros2_ws/log
     fi
     rm -f ros2_ws/install/complete
     (
-        # A shell that has sourced env.bash already stands on the last build: build without it.
+        # A shell that has sourced env.bash has the last build on its paths: build without it.
         for variable in AMENT_PREFIX_PATH CMAKE_PREFIX_PATH PYTHONPATH LD_LIBRARY_PATH; do
             value=$(tr : '\n' <<< "${!variable:-}" | sed "\|^$PWD/|d" | paste -sd :)
             if [ -n "$value" ]; then export "$variable=$value"; else unset "$variable"; fi
@@ -34,7 +34,7 @@ if [ "$(cat ros2_ws/install/complete 2> /dev/null)" != "$fingerprint" ]; then
         root=$PWD
         source scripts/underlay.bash
         cd ros2_ws
-        # What a full ROS 2 has and its wheels lack.
+        # Packages that a full ROS 2 has but its wheels lack.
         base_paths=(src)
         if [ "$(< ../.venv/ros)" = wheels ]; then base_paths+=(wheels); fi
         colcon --log-level error --log-base log build --base-paths "${base_paths[@]}" --symlink-install --event-handlers console_direct- \
@@ -46,7 +46,7 @@ if [ "$(cat ros2_ws/install/complete 2> /dev/null)" != "$fingerprint" ]; then
     echo "build: done in $((SECONDS - start)) s"
 fi
 
-# The walker is compiled at its first use and then kept: let that be now.
+# The walker is compiled and cached at its first use: do that now.
 walker=$({
     cat .venv/complete
     cd ros2_ws/src

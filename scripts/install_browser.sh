@@ -2,7 +2,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-# The browser of the tests, Chromium with its driver, where it is missing and may be installed.
+# Install Chromium and its driver, which the tests use, if they are missing and can be installed.
 set -euo pipefail
 
 command -v chromium > /dev/null && command -v chromedriver > /dev/null && exit 0

@@ -2,7 +2,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-# Every check that reads the sources without running them. Goes through all of them, then fails.
+# Run every static check; fails after all of them have run.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 

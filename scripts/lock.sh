@@ -3,7 +3,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 # Resolve requirements/*.in into requirements/lock.txt: every version, for Python 3.10 to 3.14.
-# Only for those who change the requirements. Needs what setting up has installed.
+# Only needed when the requirements change. Uses what setup.sh has installed.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../requirements"
 
@@ -14,7 +14,7 @@ fi
 
 {
     echo "# Written by \`make lock\` from the .in files beside it. Python 3.10 to 3.14, Linux, x86-64."
-    # The markers of the one platform there is are left out: they would hide the ones that differ.
+    # Markers of the only supported platform are omitted: they would hide those that matter.
     ../.venv/bin/uv pip compile --quiet --universal --python-version 3.10 --no-header \
         --annotation-style line --no-annotate ./*.in |
         sed -E "s/ and implementation_name == 'cpython'//

