@@ -303,7 +303,7 @@ def test_a_folder_that_is_there_is_not_touched(tmp_path: Path) -> None:
     before = {file: file.read_bytes() for file in (tmp_path / "bag").iterdir()}
     with recorder(tmp_path) as (process, _):
         assert process.wait() == 2
-    assert "already there" in process.text
+    assert "already exists" in process.text
     assert {file: file.read_bytes() for file in (tmp_path / "bag").iterdir()} == before
 
 
@@ -329,7 +329,7 @@ def test_runs_that_start_together_leave_each_others_bags_alone(
             assert reader.message_count == sum(1 for _ in reader.messages()) > 0
         assert check(bag) == []
     refused = [problems for _, problems in told if problems]
-    assert all("already there; a bag is never overwritten" in text for text in refused)
+    assert all("already exists; a bag is never overwritten" in text for text in refused)
 
 
 def test_what_was_lost_is_counted_and_written_down(tmp_path: Path) -> None:

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The ``mcap`` library's writer, with a faster way for messages.
+The ``mcap`` library's writer, with a faster path for messages.
 
-The library makes an object of every message, writes each of its fields by itself and counts it;
-here a message is packed at once and counted with its chunk. The file is the same to the byte,
-which a test holds against the library; for that, this reaches into the writer of ``mcap`` 1.
+The library makes an object of every message, writes each field separately and counts the message;
+here a message is packed in one step and counted with its chunk. The file is identical to the
+byte, which a test verifies; to achieve this, the class uses private members of ``mcap`` 1.
 """
 
 import struct
@@ -28,7 +28,7 @@ class _Index:
         self.entries: list[int] = []  # log time and offset of each message in turn
 
     def write(self, records: Any) -> None:
-        """Write it as a record."""
+        """Write the index as a record."""
         count = len(self.entries)
         head = Opcode.MESSAGE_INDEX, 6 + 8 * count, self._channel, 8 * count
         records.write(struct.pack(f"<BQHI{count}Q", *head, *self.entries))
@@ -44,7 +44,7 @@ class ChunkWriter(Writer):
     def add_message(
         self, channel_id: int, log_time: int, data: bytes, publish_time: int, sequence: int = 0
     ) -> None:
-        """Add a message to the present chunk, and finish that once it is large enough."""
+        """Add a message to the current chunk, and finish the chunk once it is large enough."""
         chunk = self._Writer__chunk_builder
         index = chunk.message_indices.get(channel_id)
         if index is None:

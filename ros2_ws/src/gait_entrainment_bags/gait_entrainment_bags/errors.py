@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What can go wrong with a bag. Each message is one line for people."""
+"""Errors about bags. Each message is one readable line."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -11,11 +11,11 @@ from gait_entrainment.errors import EntrainmentError
 
 
 class BagError(EntrainmentError):
-    """Something about a bag prevents what was asked for."""
+    """A request that a bag does not allow."""
 
 
 class BagExistsError(BagError):
-    """The folder to make is already there; nothing was touched."""
+    """The folder to create already exists; nothing was touched."""
 
     exit_code = 2
 
@@ -25,13 +25,13 @@ class UnreadableBagError(BagError):
 
 
 class NoBagError(UnreadableBagError):
-    """There is nothing at the path that was given."""
+    """There is nothing at the given path."""
 
     exit_code = 2
 
 
 class NothingToPlayError(BagError):
-    """A bag without a message on the topics that are to be played."""
+    """A bag without a message on the topics to be played."""
 
 
 class DefinitionMissingError(BagError):
@@ -39,16 +39,16 @@ class DefinitionMissingError(BagError):
 
 
 class BagWriteError(BagError):
-    """The recording could not go on; what was written before is still there."""
+    """The recording could not continue; what was written before is still there."""
 
 
 class DiskFullError(BagWriteError):
-    """The disk is full; the message says whether the bag could be closed."""
+    """The disk is full; the message states whether the bag could be closed."""
 
 
 @contextmanager
 def noting(note: Callable[[str], object]) -> Iterator[None]:
-    """Note what turns out to be unreadable, and go on after it."""
+    """Pass an UnreadableBagError's text to a function instead of raising it."""
     try:
         yield
     except UnreadableBagError as error:
@@ -56,21 +56,21 @@ def noting(note: Callable[[str], object]) -> Iterator[None]:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder, or take an empty one; raises BagExistsError or BagWriteError."""
+    """Create a folder, or use an empty one; raises BagExistsError or BagWriteError."""
     if not is_utf8(folder):
-        raise BagWriteError(f"{str(folder)!a}: cannot be made; allowed: a name in UTF-8")
+        raise BagWriteError(f"{str(folder)!a}: cannot be created; allowed: UTF-8 names")
     try:
         folder.mkdir(parents=True)
     except FileExistsError:
         if folder.is_dir() and not any(folder.iterdir()):
             return
         raise BagExistsError(
-            f"{folder}: is already there; choose another folder, nothing is overwritten"
+            f"{folder}: already exists; choose another folder, nothing is overwritten"
         ) from None
     except OSError as error:
-        raise BagWriteError(f"{folder}: cannot be made: {error.strerror}") from None
+        raise BagWriteError(f"{folder}: cannot be created: {error.strerror}") from None
 
 
 def is_utf8(path: Path) -> bool:
-    """Whether a path can be written into a bag, and be the value of a ROS parameter."""
+    """Return whether a path can be stored in a bag and passed as a ROS parameter."""
     return not any("\ud800" <= character <= "\udfff" for character in str(path.absolute()))

@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-One MCAP file as it lies on the disk: its summary, its chunks, and what is wrong with it.
+One MCAP file on disk: its summary, its chunks, and any damage to it.
 
-Two things are done here that the reader of the ``mcap`` library leaves out. Every length and
-offset is checked against the size of the file before it is followed, so that a damaged file gets
-a verdict. And messages are taken from a chunk by its index: a topic of a few messages costs no
-more than the decompression of the chunks that hold it, whereas the library makes an object of
-every message in them (14 microseconds each).
+This module does two things that the reader of the ``mcap`` library does not. It checks every
+length and offset against the size of the file before using it, so that damage is reported. And
+it takes messages from a chunk through its index: reading a topic of a few messages only costs
+decompressing the chunks that hold it, whereas the library makes an object of every message in
+them (14 microseconds each).
 """
 
 import math
@@ -45,7 +45,7 @@ from gait_entrainment_bags.metadata import first_line
 MAGIC = b"\x89MCAP0\r\n"
 _FOOTER_SIZE = RECORD.size + 20
 _FOOTER = RECORD.pack(Opcode.FOOTER, 20)  # how it begins
-# Of records outside of chunks these are looked into, in stretches of about a megabyte.
+# Record types that are read outside of chunks, in stretches of about a megabyte.
 _LOOSE = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.METADATA)
 _STRETCH = 2**20
 
@@ -55,7 +55,7 @@ class McapFile:
     An MCAP file opened for reading.
 
     Raises UnreadableBagError if there is no such file, or it is empty, not an MCAP file, or
-    without a header; and from every method but `scan` and `walk`, if what it reads is damaged.
+    without a header. Every method except `scan` and `walk` raises it if what it reads is damaged.
     """
 
     def __init__(self, path: Path) -> None:
@@ -85,24 +85,24 @@ class McapFile:
         self._file.close()
 
     def damage(self, offset: int, text: str) -> UnreadableBagError:
-        """Make the error that says what is wrong at an offset."""
+        """Return the error to raise for damage at an offset."""
         return UnreadableBagError(f"{self.path}: at byte {offset}: {text}")
 
     @contextmanager
     def _broken(self, what: str, offset: int) -> Iterator[None]:
-        """Turn what a parser raises for broken bytes into an error that says what lies where."""
+        """Turn a parser's error about broken bytes into one that gives what is broken where."""
         try:
             yield
         except BROKEN as error:
             raise self.damage(offset, f"broken {what}: {first_line(error)}") from None
 
     def read(self, offset: int, length: int) -> bytes:
-        """Read bytes, all of them or an error."""
+        """Read this number of bytes; raises UnreadableBagError if there are fewer."""
         if offset + length > self.size:
             raise self.damage(offset, f"the file ends {offset + length - self.size} bytes early")
         data = b""
         try:
-            while len(data) < length:  # one read gives at most 2 GiB
+            while len(data) < length:  # a single read returns at most 2 GiB
                 more = os.pread(self._file.fileno(), length - len(data), offset + len(data))
                 if not more:
                     raise self.damage(offset, "the file became shorter while it was read")
@@ -112,23 +112,23 @@ class McapFile:
         return data
 
     def record_at(self, offset: int) -> tuple[int, int]:
-        """Give opcode and length of the record at an offset, all of which the file holds."""
+        """Return opcode and length of the record at an offset, which is completely in the file."""
         opcode, length = RECORD.unpack(self.read(offset, RECORD.size))
         missing = offset + RECORD.size + length - self.size
         if missing > 0:
-            raise self.damage(offset, f"the file ends {missing} bytes before its record does")
+            raise self.damage(offset, f"the record ends {missing} bytes after the file does")
         return opcode, length
 
     def record(self, offset: int, expected: Opcode) -> bytes:
-        """Read the content of the record at an offset, which must be of a kind."""
+        """Read the content of the record at an offset, which must have the expected opcode."""
         opcode, length = self.record_at(offset)
         if opcode != expected:
             what = expected.name.lower().replace("_", " ")
-            raise self.damage(offset, f"no {what} where there must be one")
+            raise self.damage(offset, f"expected a record of type {what}")
         return self.read(offset + RECORD.size, length)
 
     def read_footer(self) -> Footer:
-        """Read the footer; an error says that the file was never closed, or its end is lost."""
+        """Read the footer; raises an error if the file was never closed, or its end is lost."""
         offset = self.size - len(MAGIC) - _FOOTER_SIZE
         if offset >= self.data_start:
             end = self.read(offset, self.size - offset)
@@ -141,14 +141,14 @@ class McapFile:
         )
 
     def read_summary(self) -> Contents | None:
-        """Read the summary; None if the writer made none that lists chunks and counts."""
+        """Read the summary; None if there is none that lists chunks and counts."""
         footer = self.read_footer()
         begin, end = footer.summary_start, self.size - len(MAGIC) - _FOOTER_SIZE
         if begin == 0:
             return None
         if not self.data_start <= begin <= end:
             raise self.damage(end, "the footer points outside of the file")
-        # The checksum covers the footer as well, up to the checksum itself.
+        # The checksum also covers the footer, up to the checksum itself.
         summary = self.read(begin, end + _FOOTER_SIZE - 4 - begin)
         if footer.summary_crc and zlib.crc32(summary) != footer.summary_crc:
             raise self.damage(begin, "the summary does not match its checksum")
@@ -180,7 +180,7 @@ class McapFile:
         return contents
 
     def chunk_data(self, chunk: Chunk) -> bytes:
-        """Read the records of a chunk, decompressed and checked by size and checksum."""
+        """Read the records of a chunk, decompressed and checked against size and checksum."""
         if not chunk.is_record:
             return self.read(chunk.offset, chunk.length)
         content = self.record(chunk.offset, Opcode.CHUNK)
@@ -196,10 +196,10 @@ class McapFile:
         end: float = math.inf,
     ) -> list[BagMessage]:
         """
-        Read messages of these topics (by channel) from a chunk; rank: its place in the bag.
+        Read messages of these topics (by channel) from a chunk; rank is its place in the bag.
 
-        Those with log times outside of ``start`` up to ``end`` [ns] are left out where an index
-        tells them beforehand.
+        Messages with log times outside of ``start`` up to ``end`` [ns] are left out if an index
+        gives their log times.
         """
         place = rank * LARGEST_CHUNK
         with self._broken("chunk", chunk.offset):
@@ -227,20 +227,20 @@ class McapFile:
             return parse_message_index(content, channel)
 
     def records(self, offset: int) -> Iterator[tuple[int, int, int]]:
-        """Give opcode, offset and length of the content of the data section's next records."""
+        """Yield opcode, offset and content length of the next records of the data section."""
         while True:
             if offset == self.size:
                 raise self.damage(offset, "the file was never closed")
             opcode, length = self.record_at(offset)
             if opcode == 0:
-                raise self.damage(offset, "no record, but a zero")
+                raise self.damage(offset, "a zero instead of a record")
             yield opcode, offset, length
             if opcode in (Opcode.DATA_END, Opcode.FOOTER):
                 return
             offset += RECORD.size + length
 
     def check_data(self) -> None:
-        """Check the data section against the checksum at its end, if the writer left one."""
+        """Check the data section against the checksum at its end, if there is one."""
         opcode, end, length = deque(self.records(self.data_start), maxlen=1).pop()
         if opcode != Opcode.DATA_END or length != 4:
             raise self.damage(end, "the end of the data section is not marked")
@@ -252,7 +252,7 @@ class McapFile:
             raise self.damage(end, "the data section does not match its checksum")
 
     def scan(self) -> Contents:
-        """Take stock of the data section, whatever is damaged in it."""
+        """List the contents of the data section, including its damages."""
         contents = Contents()
         deque(self.walk(contents), maxlen=0)
         return contents
@@ -261,11 +261,11 @@ class McapFile:
         self, contents: Contents, summary: Contents | None = None
     ) -> Iterator[tuple[Chunk, list[BagMessage]]]:
         """
-        Give every readable chunk with the messages in it, in the order of the file.
+        Yield every readable chunk with its messages, in the order of the file.
 
         ``contents`` is filled with what is found on the way, and with the damages. The channels
-        of a summary count as announced, and damage that leads astray is passed over up to the
-        next chunk that it lists.
+        of a summary count as announced. If damage hides where the next record begins, reading
+        continues at the next chunk that the summary lists.
         """
         summary = summary or Contents()
         contents.schemas += summary.schemas
@@ -285,7 +285,7 @@ class McapFile:
                 yield chunk, messages
 
     def _read_chunk(self, contents: Contents, chunk: Chunk, messages: list[BagMessage]) -> None:
-        """Read all of a chunk: messages into the list, the rest into `contents`."""
+        """Read a whole chunk: messages into the list, the rest into `contents`."""
         place = len(contents.chunks) * LARGEST_CHUNK
         names = contents.names
         with self._broken("chunk", chunk.offset):
@@ -299,10 +299,10 @@ class McapFile:
                 elif message := parse_message(records, start, stop, place, names):
                     messages.append(message)
                 else:
-                    raise ValueError("a message of a channel that is not announced")
+                    raise ValueError("a message on a channel that is not announced")
 
     def _stretches(self, contents: Contents, listed: list[int]) -> Iterator[Chunk]:
-        """Give the chunks of the data section, and what else may hold or announce messages."""
+        """Yield the data section's chunks, and stretches outside them that may hold messages."""
         position: int | None = self.data_start  # where the next record begins
         while position is not None:
             begin = position  # of a stretch outside of chunks
@@ -325,7 +325,7 @@ class McapFile:
             position = later[0] if later else self._find_chunk(position + 1)
 
     def _find_chunk(self, offset: int) -> int | None:
-        """Search for the next chunk where no index lists one."""
+        """Search for the next chunk if no index lists one."""
         while offset < self.size:
             piece = self.read(offset, min(_STRETCH + CHUNK_HEAD, self.size - offset))
             for place, length in find_chunks(piece):

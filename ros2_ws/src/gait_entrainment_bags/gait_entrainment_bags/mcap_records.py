@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The records of an MCAP file, from bytes: what it announces, its messages, its chunks.
+Parsing the records of an MCAP file: schemas and channels, messages, chunks.
 
-The ``mcap`` library parses the kinds of records of which there are few. Those of which there are
-many, messages and their indexes, are parsed here, ten times as fast. Bytes that make no sense
-raise one of `BROKEN`; `mcap_file` adds where in the file they lie.
+The ``mcap`` library parses the rare kinds of records. The frequent ones, messages and their
+indexes, are parsed here, ten times as fast. Invalid bytes raise one of `BROKEN`; `mcap_file`
+adds where in the file they are.
 """
 
 import re
@@ -31,7 +31,7 @@ from gait_entrainment_bags.metadata import TopicInfo, topic_of
 BROKEN = (McapError, ZstdError, struct.error, ValueError, OverflowError, RuntimeError, MemoryError)
 RECORD = struct.Struct("<BQ")  # opcode, length of the content
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
-_WHOLE_MESSAGE = struct.Struct("<BQHIQQ")  # the two together
+_WHOLE_MESSAGE = struct.Struct("<BQHIQQ")  # RECORD and _MESSAGE together
 _CHUNK = struct.Struct("<QQQII")  # start, end, size, checksum, length of the compression's name
 _CHUNK_INDEX = struct.Struct("<QQQQI")  # start, end, offset, length, length of the offsets
 _INDEX_OFFSET = struct.Struct("<HQ")  # channel, offset of its message index
@@ -43,20 +43,20 @@ _RECORD_TYPES: dict[int, Any] = {
     Opcode.STATISTICS: Statistics,
     Opcode.METADATA: Metadata,
 }
-# What gives a chunk away among other bytes: length and name of its compression.
+# Bytes that identify a chunk among other bytes: length and name of its compression.
 _CHUNK_NAME = re.compile(rb"\x04\0\0\0zstd|\x03\0\0\0lz4")
 _CHUNK_NAME_OFFSET = RECORD.size + _CHUNK.size - 4
-CHUNK_HEAD = _CHUNK_NAME_OFFSET + 8  # bytes by which `find_chunks` knows a chunk
-# A chunk is held in memory at once. Writers make them a megabyte; this is for damaged sizes.
+CHUNK_HEAD = _CHUNK_NAME_OFFSET + 8  # bytes by which `find_chunks` recognizes a chunk
+# A chunk is kept in memory as a whole. Writers make them a megabyte; this catches damaged sizes.
 LARGEST_CHUNK = 2**31
 
 
 class BagMessage(NamedTuple):
     """
-    A message as stored; sorts by log time, then by its place in the bag.
+    A stored message; sorts by log time, then by its place in the bag.
 
-    ``log_time`` and ``publish_time`` [ns since the epoch] are when it was received (or the
-    instant that it is about) and sent; ``data`` is CDR with its header of four bytes.
+    ``log_time`` [ns since the epoch] is when the message was received, or the time that it is
+    about; ``publish_time`` is when it was sent; ``data`` is CDR with its four-byte header.
     """
 
     log_time: int
@@ -85,7 +85,7 @@ class Chunk:
 
 @dataclass
 class Contents:
-    """What an MCAP file holds, from its summary or from a walk through all of it."""
+    """The contents of an MCAP file, from its summary or from reading all of it."""
 
     schemas: list[Schema] = field(default_factory=list)
     channels: list[Channel] = field(default_factory=list)
@@ -104,12 +104,12 @@ class Contents:
 
     @property
     def topics(self) -> list[TopicInfo]:
-        """Topics, one for each channel: a name may be there twice, with two types."""
+        """Topics, one for each channel: a name may appear twice, with two types."""
         schemas = {schema.id: schema for schema in self.schemas}
         return [topic_of(channel, schemas.get(channel.schema_id)) for channel in self.channels]
 
     def take(self, opcode: int, content: bytes) -> None:
-        """Enter a record of the summary or of the data section, other than messages."""
+        """Add a record of the summary or of the data section that is not a message."""
         if opcode == Opcode.CHUNK_INDEX:
             start, end, offset, length, size = _CHUNK_INDEX.unpack_from(content)
             pairs = content[_CHUNK_INDEX.size : _CHUNK_INDEX.size + size]
@@ -129,16 +129,16 @@ class Contents:
                 known.append(record)
                 if others:
                     kind = Opcode(opcode).name.lower()
-                    raise ValueError(f"{kind} {record.id} is there twice, and differs")
+                    raise ValueError(f"{kind} {record.id} appears twice, with different content")
 
 
 def parse(record_type: Any, content: bytes) -> Any:
-    """Parse the content of a record as a type of ``mcap.records``."""
+    """Parse the content of a record as one of the types in ``mcap.records``."""
     return record_type.read(ReadDataStream(BytesIO(content)))
 
 
 def split(records: bytes) -> Iterator[tuple[int, int, int]]:
-    """Give opcode, start and stop of the content of each record."""
+    """Yield opcode, start and stop of the content of each record."""
     offset, end = 0, len(records)
     while offset < end:
         if offset + RECORD.size > end:
@@ -154,7 +154,7 @@ def split(records: bytes) -> Iterator[tuple[int, int, int]]:
 def parse_message(
     records: bytes, start: int, stop: int, place: int, names: Mapping[int, str]
 ) -> BagMessage | None:
-    """Parse a message, or give None if it belongs to none of the topics (by channel)."""
+    """Parse a message; return None if its channel is not one of the named ones."""
     if stop - start < _MESSAGE.size:
         raise ValueError("a message is too short")
     channel, _, log_time, publish_time = _MESSAGE.unpack_from(records, start)
@@ -168,7 +168,7 @@ def parse_message(
 def parse_indexed_message(
     records: bytes, offset: int, log_time: int, place: int, names: Mapping[int, str]
 ) -> BagMessage:
-    """Parse the message that an index says is at an offset."""
+    """Parse the message at an offset given by an index."""
     if offset + _WHOLE_MESSAGE.size <= len(records):
         fields = _WHOLE_MESSAGE.unpack_from(records, offset)
         opcode, length, channel, _, found, publish_time = fields
@@ -181,15 +181,15 @@ def parse_indexed_message(
 
 
 def parse_message_index(content: bytes, channel: int) -> list[tuple[int, int]]:
-    """Return log times and offsets in the chunk of the messages of a channel."""
+    """Return the log times of a channel's messages and their offsets in the chunk."""
     found, size = _MESSAGE_INDEX.unpack_from(content)
     if found != channel or size != len(content) - _MESSAGE_INDEX.size:
-        raise ValueError("it is another one")
+        raise ValueError("its channel or length is wrong")
     return list(_INDEX_ENTRY.iter_unpack(content[_MESSAGE_INDEX.size :]))
 
 
 def decompress(chunk: bytes) -> bytes:
-    """Return the records in the content of a chunk, checked by their size and checksum."""
+    """Return the records in the content of a chunk, checked against size and checksum."""
     _, _, size, checksum, name_length = _CHUNK.unpack_from(chunk)
     begin = _CHUNK.size + name_length + 8
     (length,) = struct.unpack_from("<Q", chunk, begin - 8)
@@ -211,7 +211,7 @@ def decompress(chunk: bytes) -> bytes:
 
 
 def find_chunks(piece: bytes) -> Iterator[tuple[int, int]]:
-    """Give offset and length of what may be chunks, found by the name of their compression."""
+    """Yield offset and length of possible chunks, found by the name of their compression."""
     for match in _CHUNK_NAME.finditer(piece, _CHUNK_NAME_OFFSET):
         offset = match.start() - _CHUNK_NAME_OFFSET
         opcode, length = RECORD.unpack_from(piece, offset)

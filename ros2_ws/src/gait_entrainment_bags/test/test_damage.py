@@ -106,10 +106,10 @@ def test_a_number_that_stands_for_two_things(tmp_path: Path, kind: str) -> None:
     else:
         data = data.replace(b"\2\0\2\0\2\0\0\0/2", b"\1\0\2\0\2\0\0\0/2")
     path.write_bytes(data)
-    with pytest.raises(UnreadableBagError, match=f"{kind} 1 is there twice, and differs"):
+    with pytest.raises(UnreadableBagError, match=f"{kind} 1 appears twice, with different"):
         BagReader(path)
     assert "intact" in [finding.rule for finding in check(path)]
-    assert f"{kind} 1 is there twice" in recover(path, tmp_path / "rescued").losses[0]
+    assert f"{kind} 1 appears twice" in recover(path, tmp_path / "rescued").losses[0]
 
 
 @settings(derandomize=True, deadline=None, max_examples=150)

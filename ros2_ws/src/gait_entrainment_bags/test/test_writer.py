@@ -143,7 +143,7 @@ def test_files_are_those_of_the_mcap_library_to_the_byte(
 def test_folder_is_never_overwritten(tmp_path: Path) -> None:
     (tmp_path / "walk").mkdir()
     (tmp_path / "walk" / "precious").write_text("data")
-    with pytest.raises(BagExistsError, match="already there"):
+    with pytest.raises(BagExistsError, match="already exists"):
         BagWriter(tmp_path / "walk", ros_distro="jazzy")
     assert [path.name for path in (tmp_path / "walk").iterdir()] == ["precious"]
 

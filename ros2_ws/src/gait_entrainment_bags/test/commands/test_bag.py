@@ -93,12 +93,12 @@ def test_export_makes_tables(capsys, bag, tmp_path):
     [
         (["info", "NOWHERE"], 2, "no such file or folder"),
         (["check", "BAG", "NOWHERE"], 2, "no such file or folder"),
-        (["recover", "BAG", "BAG"], 2, "already there"),
-        (["export", "BAG", "BAG"], 2, "already there"),
+        (["recover", "BAG", "BAG"], 2, "already exists"),
+        (["export", "BAG", "BAG"], 2, "already exists"),
         (["export", "BAG", "OUT", "--topics", "/b"], 1, "no topic /b"),
         (["info", "EMPTY"], 1, "is empty"),
         (["info", "no\n\x1b[31m"], 2, r"no\n\x1b[31m: no such file"),
-        (["recover", "BAG", "\udcff"], 1, r"'\udcff': cannot be made; allowed: a name in UTF-8"),
+        (["recover", "BAG", "\udcff"], 1, r"'\udcff': cannot be created; allowed: UTF-8 names"),
         (["recover", "EMPTY", "OUT"], 1, "is empty"),
     ],
 )
