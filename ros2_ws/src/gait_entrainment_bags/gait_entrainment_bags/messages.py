@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Between decoded ROS messages and the values of the core, without ROS.
+Conversion between decoded ROS messages and the values of the core, without ROS.
 
 Only attributes of a message are read, so it does not matter which library decoded it: rclpy in a
 node, mcap_ros2 from a bag. The field names are those of gait_entrainment_msgs. Message stamps
-count from 1970, the core's instants from wherever the caller wants: each function subtracts
+count from 1970, the core's times from an origin that the caller chooses: each function subtracts
 ``start`` [ns].
 """
 
@@ -25,11 +25,11 @@ _E = TypeVar("_E", bound=IntEnum)
 
 
 class MessageError(UsageError):
-    """A message that has no meaning, such as one about a third leg."""
+    """A message that makes no sense, such as one about a third leg."""
 
 
 def side_of(message: Any) -> Side:
-    """Return the side of a message about one leg; raises MessageError for an unknown one."""
+    """Return the side of a message about one leg; raises MessageError for an unknown side."""
     return _member(Side, "side", message.side)
 
 
@@ -37,15 +37,15 @@ def event_of(message: Any, start: int = 0) -> GaitEvent:
     """Return the event of a GaitEvent message; raises MessageError for an unknown kind or side."""
     stamp = nanoseconds_of(message.header.stamp) - start
     kind = _member(EventKind, "kind", message.kind)
-    uncertainty = getattr(message, "uncertainty", 0.0)  # bags of earlier versions have none
+    uncertainty = getattr(message, "uncertainty", 0.0)  # missing in bags of earlier versions
     return GaitEvent(stamp, kind, side_of(message), int(message.step), uncertainty)
 
 
 def stop_of(message: Any, start: int = 0) -> int | None:
     """
-    Return the instant [ns] of the stop that a TorqueProfile message reports, if it reports one.
+    Return the time [ns] of the stop that a TorqueProfile message reports, if it reports one.
 
-    From that instant on there is no torque, and every profile before loses what it promised.
+    From that time on there is no torque, and the promises of all earlier profiles are void.
     """
     return nanoseconds_of(message.header.stamp) - start if message.stop else None
 
@@ -54,7 +54,7 @@ def profile_of(message: Any, start: int = 0) -> TorqueProfile:
     """
     Return the torque profile of a TorqueProfile message that reports no stop.
 
-    Raises MessageError for an unknown side, and for what is no profile by itself.
+    Raises MessageError for an unknown side or an invalid profile.
     """
     profile = TorqueProfile(
         side=side_of(message),
@@ -71,53 +71,53 @@ def profile_of(message: Any, start: int = 0) -> TorqueProfile:
 
 
 def pulse_of(message: Any, start: int = 0) -> tuple[int, float, float]:
-    """Return onset [ns], height [N m] and width [s] of a TorquePulse message; or MessageError."""
+    """Return a TorquePulse message's onset [ns], height [N m], width [s]; or MessageError."""
     height, width = message.torque, message.duration
-    if not (math.isfinite(height) and 0 <= width < 1000):  # no protocol allows a hundredth of it
-        raise MessageError(f"torque, duration: {height:g} N m for {width:g} s cannot be")
+    if not (math.isfinite(height) and 0 <= width < 1000):  # no protocol allows even 1 %
+        raise MessageError(f"torque, duration: {height:g} N m for {width:g} s is implausible")
     return nanoseconds_of(message.header.stamp) - start, height, width
 
 
 class ProfileOrder:
     """
-    Holds each torque profile of an ankle against the one before, which by contract it adjoins.
+    Checks each torque profile of an ankle against the previous one, which by contract it adjoins.
 
-    Instants are [ns since 1970]. After a stop, and once the run is over, nothing is owed.
+    Times are in ns since 1970. After a stop, and once the run is over, no profile is due.
     """
 
     def __init__(self) -> None:
-        self._owed_from: float | None = None  # where the next one begins; None before the first
+        self._due_from: float | None = None  # when the next one begins; None before the first
         self._revision = -1
 
     def take(
         self, message: Any
     ) -> tuple[int | None, tuple[int, int] | None, TorqueProfile | None]:
         """
-        Take a TorqueProfile message, or raise MessageError for what cannot be.
+        Take a TorqueProfile message; raises MessageError if it is invalid.
 
-        Returns since when all that was promised is void, the span of which no profile is here,
-        and the profile; None for what there is not.
+        Returns the time from which earlier promises are void, the span whose profile is missing,
+        and the profile, each None if there is none.
         """
         stop = stop_of(message)
         if stop is not None:
-            self._owed_from = math.inf
+            self._due_from = math.inf
             return stop, None, None
-        profile, owed = profile_of(message), self._owed_from
+        profile, due = profile_of(message), self._due_from
         begin, step = profile.times[0], message.revision - self._revision
-        if owed is None:
-            owed = 0 if message.revision else begin
-        hole = (int(owed), begin) if begin > owed else None
-        void = begin if begin < owed < math.inf else None
+        if due is None:
+            due = 0 if message.revision else begin
+        hole = (int(due), begin) if begin > due else None
+        void = begin if begin < due < math.inf else None
         if (hole and step == 1) or (void is not None and step < 1):
             raise MessageError(f"revision {message.revision}: does not adjoin {self._revision}")
         self._revision = message.revision
-        self._owed_from = math.inf if message.last else profile.valid_until
+        self._due_from = math.inf if message.last else profile.valid_until
         return void, hole, profile
 
     def hole_up_to(self, instant: int) -> tuple[int, int] | None:
-        """Return the span up to an instant, the latest of the record, that no profile covers."""
-        owed = self._owed_from or 0
-        return (int(owed), instant) if instant > owed else None
+        """Return the span that no profile covers, up to the latest time of the record."""
+        due = self._due_from or 0
+        return (int(due), instant) if instant > due else None
 
 
 def train_of(message: Any, start: int = 0) -> PulseTrain:
@@ -138,7 +138,7 @@ def train_of(message: Any, start: int = 0) -> PulseTrain:
 
 
 def state_of(message: Any, start: int = 0) -> RobotState:
-    """Return the state of an AnkleRobotState message; of its faults a message has only names."""
+    """Return the state of an AnkleRobotState message, without the faults, which it only names."""
     return RobotState(
         stamp=nanoseconds_of(message.header.stamp) - start,
         commanded=message.commanded_torque,
@@ -151,7 +151,7 @@ def result_values(result: Result, side: Side) -> dict[str, Any]:
     """
     Return the fields of the message that publishes a result about the perturbed leg.
 
-    Instants are integer nanoseconds, ``header`` that of its stamp; the field ``run`` is left out.
+    Times are integer nanoseconds, ``header`` is its stamp; the field ``run`` is left out.
     """
     if isinstance(result, Stride):
         return {

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-One recorded run, read from its bag and analyzed again, without ROS.
+A recorded run, read from its bag and analyzed again, without ROS.
 
-Only what is needed is read, through the index of the bag: of an hour of samples the events, what
-the robot promised and felt, and what the analyzer published. Ankle torque is read only where a
-figure shows it.
+Only what is needed is read, through the index of the bag: the events, what the robot promised and
+measured, and what the analyzer published. Ankle torque is read only for strides that a figure
+shows.
 """
 
 import json
@@ -33,29 +33,29 @@ from gait_entrainment_bags.truth import TOE_OFF_BIAS, detector_errors, lag_shift
 from gait_entrainment_bags.writer import ENDED_EARLY
 from gait_entrainment_commands.outcome import outcome_of, timing_outcome
 
-# Strides of which the ankle torque is drawn: more would not be told apart in a figure. Those while
-# a lock forms are drawn one by one, the latest of them if they are many.
+# Strides whose ankle torque is drawn: a figure of more would be unreadable. While a lock forms,
+# every stride is drawn, or the latest of them if they are many.
 STRIDES_DRAWN = 24
 _FORMING_DRAWN = 30
 
 
 @dataclass(frozen=True)
 class RecordedRun(Run):
-    """What a bag holds of one run; stamps are nanoseconds since 1970, as recorded."""
+    """One run as recorded in a bag; stamps are nanoseconds since 1970."""
 
     name: str  # of the protocol; without one, of the bag
     side: Side  # the perturbed leg
-    torques: AnkleTorques  # of the strides that figures show; empty unless asked for
+    torques: AnkleTorques  # of the strides that figures show; empty unless requested
     messages: int  # in the bag, on all topics
     lost: int | None  # published but not recorded; None if no publisher gave a count
-    real_time_factor: float  # walked time over wall time, first to last /clock; NaN without
-    left_out: int = 0  # messages of another run, and those that cannot be
-    onset: str = "commanded"  # what the live analysis took pulses to begin with, or "measured"
+    real_time_factor: float  # walked time over wall time, first to last /clock; NaN without it
+    left_out: int = 0  # messages of another run, and invalid ones
+    onset: str = "commanded"  # onset used by the live analysis: this or "measured"
     toe_off_bias: float = 0.0  # [s] by which the toe-offs of the events are late
-    detector_errors: dict[str, Any] | None = None  # None if nobody knows the exact events
+    detector_errors: dict[str, Any] | None = None  # None if the exact events are unknown
     ended_early: str = ""  # why the recording ended before the run did
-    # How what the analyzer published live differs from another analysis of the same onsets, a
-    # line per topic; () if they are equal to the last bit, None if nothing was recorded.
+    # How the results published live differ from another analysis of the same onsets, a line per
+    # topic; () if they are equal to the last bit, None if none were recorded.
     differences: tuple[str, ...] | None = None
 
 
@@ -69,12 +69,12 @@ def read_run(
     side: Side | None = None,
 ) -> RecordedRun:
     """
-    Read a bag, a folder or an ``.mcap`` file of any recorder, and analyze it again.
+    Read a bag, a folder or an ``.mcap`` file from any recorder, and analyze it again.
 
-    ``settings`` are the numbers in the verdict. ``torques`` reads the ankle torque of the strides
-    in figures. A pulse begins at its "commanded" or "measured" ``onset``, by default that of the
-    live analysis; ``protocol`` and ``side`` as in `protocol_and_side`. Raises BagError if it is no
-    bag, is damaged, or lacks the topics that are needed.
+    ``settings`` are the verdict's parameters. ``torques`` reads the ankle torque of the strides
+    in figures. A pulse begins at its "commanded" or "measured" ``onset``, by default as in the
+    live analysis; ``protocol`` and ``side`` are as in `protocol_and_side`. Raises BagError if it
+    is not a bag, is damaged, or lacks required topics.
     """
     with BagReader(path) as bag:
         protocol, side = protocol_and_side(bag, protocol, side)
@@ -91,17 +91,17 @@ def read_run(
             live_sides = protocol.sides
         bias = _toe_off_bias(bag)
         events = without_bias(record.events, bias)
-        told = settings_for(protocol.sequence if protocol else (), settings)
+        used = settings_for(protocol.sequence if protocol else (), settings)
         live = {
-            leg: analyze_blocks((), events, onsets[live_onset], leg, told, record.unknown)[0]
+            leg: analyze_blocks((), events, onsets[live_onset], leg, used, record.unknown)[0]
             for leg in live_sides
         }
         blocks = conducted(protocol, record.events)
-        begun, unknown = onsets[onset or live_onset], record.unknown
-        if side not in {leg for leg, _ in begun}:  # its strides, with pulses on the other ankle
-            begun = [(side, at) for _, at in begun]
+        chosen, unknown = onsets[onset or live_onset], record.unknown
+        if side not in {leg for leg, _ in chosen}:  # its strides, with pulses on the other ankle
+            chosen = [(side, time) for _, time in chosen]
             unknown = sorted({(side, start, end) for _, start, end in unknown})
-        analysis, judged = analyze_blocks(blocks, events, begun, side, settings, unknown)
+        analysis, judged = analyze_blocks(blocks, events, chosen, side, settings, unknown)
         measured_period, pulse_period = periods_of(blocks, analysis)
         run = RecordedRun(
             protocol=protocol,
@@ -124,7 +124,7 @@ def read_run(
             ended_early=bag.custom_data.get(ENDED_EARLY, ""),
         )
         if record.true_events:
-            exact, _ = analyze_blocks((), record.true_events, begun, side, settings)
+            exact, _ = analyze_blocks((), record.true_events, chosen, side, settings)
             errors = detector_errors(record.events, record.true_events)
             run = replace(run, detector_errors=errors | lag_shift(analysis, exact))
         if torques:
@@ -136,15 +136,15 @@ def protocol_and_side(
     bag: BagReader, protocol: Protocol | None = None, side: Side | None = None
 ) -> tuple[Protocol | None, Side]:
     """
-    Return the protocol of a recorded run, if anybody tells it, and the perturbed leg.
+    Return the protocol of a recorded run, if it is known, and the perturbed leg.
 
     A given ``protocol`` replaces the one in the bag, and a given ``side`` the protocol's.
-    A recorder of another project keeps no protocol: the leg is then that on which the robot sat.
-    Raises BagError if the bag's protocol cannot be read, or the leg is not known.
+    Other projects' recorders store no protocol: the leg is then the one that wore the robot.
+    Raises BagError if the bag's protocol cannot be read, or the leg is unknown.
     """
     if protocol is None and (text := bag.custom_data.get("protocol", "").strip()):
         try:
-            protocol = read_protocol(f"{text}\n")  # with a line break it is no path
+            protocol = read_protocol(f"{text}\n")  # the line break marks it as text, not a path
         except ProtocolError as error:
             raise BagError(
                 f"{bag.path}: its protocol cannot be read: {error}; give --protocol"
@@ -155,14 +155,14 @@ def protocol_and_side(
     side = side_in(bag, topic_names.TORQUE_PROFILE) if side is None else side
     if side is None:
         raise BagError(
-            f"{bag.path}: holds no run, or does not say which leg is perturbed: "
+            f"{bag.path}: holds no run, or does not state which leg is perturbed: "
             "give --side or --protocol"
         )
     return None, side
 
 
 def conducted(protocol: Protocol | None, events: Sequence[GaitEvent]) -> Sequence[BlockRun]:
-    """Return the blocks of a protocol, if there is one, as they were planned on a walk."""
+    """Return the blocks of a protocol as they were planned on a walk; () without a protocol."""
     if protocol is None:
         return ()
     conductor = Conductor(protocol)
@@ -170,12 +170,12 @@ def conducted(protocol: Protocol | None, events: Sequence[GaitEvent]) -> Sequenc
         for event in events:
             conductor.add_event(event)
     except (GaitError, ProtocolError):
-        pass  # too few events are left to plan by: the periods stay unknown
+        pass  # too few events are left for planning: the periods stay unknown
     return conductor.blocks
 
 
 def periods_of(blocks: Sequence[BlockRun], analysis: Analysis) -> tuple[float, float]:
-    """Return unperturbed and pulse period [s]: as they were planned, else as analyzed."""
+    """Return unperturbed and pulse period [s]: as planned, otherwise as analyzed."""
     if blocks:
         return blocks[-1].measured_period, blocks[-1].pulse_period
     last = analysis.entrainments[-1] if analysis.entrainments else None
@@ -183,34 +183,34 @@ def periods_of(blocks: Sequence[BlockRun], analysis: Analysis) -> tuple[float, f
 
 
 def _toe_off_bias(bag: BagReader) -> float:
-    """Return by how much toe-offs are late [s], as it was known when the run was recorded."""
-    told = bag.custom_data.get("toe_off_bias", "0")
+    """Return by how much toe-offs are late [s], as known when the run was recorded."""
+    recorded = bag.custom_data.get("toe_off_bias", "0")
     try:
-        return float(TOE_OFF_BIAS.parse("toe_off_bias", told))
+        return float(TOE_OFF_BIAS.parse("toe_off_bias", recorded))
     except SettingError as error:
         raise BagError(f"{bag.path}: {error}") from None
 
 
 def _lost(bag: BagReader) -> int | None:
-    """Return how many published messages are missing here; None if that is not known."""
+    """Return how many published messages are missing in the bag; None if that is unknown."""
     published: dict[str, int] = {}
     names = [n for n, topic in bag.topics.items() if topic.type.endswith("/PublishedCounts")]
     for _, message in bag.decoded(names):
         published |= dict(zip(message.topics, message.counts, strict=False))
     lost = sum(max(n - bag.counts.get(name, n), 0) for name, n in published.items())
-    told = bag.custom_data.get("messages_lost")
-    if told is None or (RECOVERY_KEY in bag.custom_data and not published):
+    text = bag.custom_data.get("messages_lost")
+    if text is None or (RECOVERY_KEY in bag.custom_data and not published):
         return lost or None
     try:
-        return max(lost, sum(map(int, json.loads(told).values())))
+        return max(lost, sum(map(int, json.loads(text).values())))
     except (ValueError, OverflowError, TypeError, AttributeError):
         raise BagError(
-            f"{bag.path}: its messages_lost is {told!r}; allowed: a JSON object of counts by topic"
+            f"{bag.path}: its messages_lost is {text!r}; allowed: a JSON object of counts by topic"
         ) from None
 
 
 def drawn_strides(run: Run) -> list[Stride]:
-    """Return the strides whose ankle torque is drawn: evenly spread, each while a lock forms."""
+    """Return the strides whose ankle torque is drawn: evenly spaced, all while a lock forms."""
     strides, forming = run.strides, list[Stride]()
     for part in [block.analysis for block in run.blocks] or [run.analysis]:
         since = part.entrainments[-1].entrained_since_stride if part.entrainments else None
@@ -225,7 +225,7 @@ def drawn_strides(run: Run) -> list[Stride]:
 
 
 def recorded_outcome(run: RecordedRun, bag: Path) -> dict[str, Any]:
-    """Return the outcome of a run, and what its bag says about how it went."""
+    """Return the outcome of a run, and what its bag says about the recording."""
     factor = run.real_time_factor
     return outcome_of(run) | {
         "bag": str(bag),
@@ -241,10 +241,10 @@ def recorded_outcome(run: RecordedRun, bag: Path) -> dict[str, Any]:
 
 
 def walker_timing(reader: BagReader) -> dict[str, dict[str, float]]:
-    """Return how a walker kept to its time, by its last report; {} without one."""
-    told = list(reader.messages_of(topic_names.WALKER_TIMING))[-1:]
+    """Return how punctual a walker was, from its last report; {} without one."""
+    last = list(reader.messages_of(topic_names.WALKER_TIMING))[-1:]
     timing = {}
-    for walker in told:
+    for walker in last:
         if walker.samples:
             timing["publish_lateness_ms"] = {
                 name: 1e3 * getattr(walker, f"publish_late_{name}")
@@ -260,10 +260,10 @@ def walker_timing(reader: BagReader) -> dict[str, dict[str, float]]:
 
 
 def messages_line(run: RecordedRun) -> str:
-    """Say how many messages were recorded, and what is missing."""
+    """Return a line about how many messages were recorded, and what is missing."""
     missing = "" if run.lost is None else f", {run.lost} lost"
     if run.ended_early:
         missing = f"; the recording ended early: {run.ended_early}"
     if run.left_out:
-        missing += f"; {run.left_out} left out: of another run, or none that can be"
+        missing += f"; {run.left_out} left out: of another run, or invalid"
     return f"messages         {run.messages} recorded{missing}"

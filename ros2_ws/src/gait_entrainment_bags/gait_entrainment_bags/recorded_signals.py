@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The signals of sensors in a bag, whoever recorded it, as detectors take them."""
+"""Sensor signals in a bag from any recorder, in the form that detectors take."""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -18,10 +18,10 @@ def read_signals(
     path: Path, detectors: Iterable[ChosenDetector]
 ) -> tuple[ChosenDetector, list[Stream]]:
     """
-    Return the first of some detectors whose topics a bag has, and what it reads of each foot.
+    Return the first detector whose topics a bag has, and each foot's signals for it.
 
-    Topics are found in whatever namespace; times are stamps [s since 1970].
-    Raises BagError if the bag cannot be read or lacks the topics, or a message has other fields.
+    Topics are found in any namespace; times are stamps [s since 1970].
+    Raises BagError if the bag cannot be read or lacks the topics, or a message lacks a field.
     """
     lacking: list[str] = []
     with BagReader(path) as bag:
@@ -38,7 +38,7 @@ def read_signals(
                     _stream(bag, s, full, source, signals) for s, full in found.items()
                 ]
             lacking += source.topics
-    raise BagError(f"{path}: lacks topics of sensors: {', '.join(lacking)}")
+    raise BagError(f"{path}: lacks sensor topics: {', '.join(lacking)}")
 
 
 def _stream(

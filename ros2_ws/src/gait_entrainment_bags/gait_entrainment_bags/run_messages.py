@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The messages of one run in a bag: events, promises, what the robot felt, published results."""
+"""One run's messages in a bag: events, promises, robot measurements, published results."""
 
 import math
 import struct
@@ -54,18 +54,17 @@ class AnkleTorques:
 
     stamps: NDArray[np.int64]  # [ns], shape (n,)
     intrinsic: NDArray[np.float64]  # of the leg's own spring [N m], shape (n,)
-    delivered: NDArray[np.float64]  # by the robot, whatever the phase [N m], shape (n,)
-    effective: NDArray[np.float64]  # the part of it that acts on the walker [N m], shape (n,)
+    delivered: NDArray[np.float64]  # by the robot, at any phase [N m], shape (n,)
+    effective: NDArray[np.float64]  # the part that acts on the walker [N m], shape (n,)
 
 
 class RunMessages:
     """
     Events, onsets and published results of a run, read in one pass.
 
-    Messages of another run are left out, as by the analyzer. Raises BagError if another begins.
-
-    The messages of a topic are taken in the order in which they were received, which is that of
-    the file: the analyzer met them in that order, and a stop voids only what was promised before.
+    Messages of another run are left out, as in the analyzer. Raises BagError if another run
+    begins. A topic's messages are taken in the order of the file, in which they were received:
+    the analyzer got them in that order, and a stop voids only earlier promises.
     """
 
     def __init__(self, bag: BagReader) -> None:
@@ -78,10 +77,10 @@ class RunMessages:
         self._torque = self._names.pop(topic_names.ANKLE_TORQUE, "")
         self._messages: dict[str, list[BagMessage]] = {name: [] for name in self._names.values()}
         self.real_time_factor = self._read()
-        self.left_out = 0  # of another run, or what cannot be
+        self.left_out = 0  # messages of another run, or invalid ones
         self._run: int | None = None  # its number
-        self._begun: dict[int, bytes] = {}  # the first of its profiles, by ankle
-        # Ankle and span of which no torque profile is here [ns].
+        self._first_profiles: dict[int, bytes] = {}  # by ankle
+        # Ankle and span without a torque profile [ns].
         self.unknown: list[tuple[Side, int, int]] = []
         measured = defaultdict[Side, MeasuredOnsets](MeasuredOnsets)
         orders = defaultdict[Side, ProfileOrder](ProfileOrder)
@@ -104,37 +103,37 @@ class RunMessages:
         for side in set(orders) or Side:
             if hole := orders[side].hole_up_to(latest):
                 self.unknown.append((side, *hole))
-        # Whether the log times are the stamps, so that instants can be looked up.
+        # Whether the log times are the stamps, so that messages can be looked up by time.
         self._stamped = [m.log_time for m in events] == [event.stamp for event in self.events]
         for side, pulse in self._values(topic_names.PULSES, lambda m: (side_of(m), pulse_of(m))):
             measured[side].add_pulse(*pulse)
         states = self._values(topic_names.ROBOT_STATE, lambda m: (side_of(m), state_of(m)))
         for side, state in states:
             measured[side].add_state(state)
-        for of_ankle in measured.values():
-            of_ankle.finish()
-        self.delivered = [(side, one) for side, of in measured.items() for one in of.timings]
+        for ankle in measured.values():
+            ankle.finish()
+        self.delivered = [(side, timing) for side, m in measured.items() for timing in m.timings]
 
     def _read(self) -> float:
-        """Read the messages by topic; return walked over wall time by /clock, NaN without."""
+        """Read the messages by topic; return walked over wall time by /clock, NaN without it."""
         clocks: list[BagMessage] = []  # the first and the last
         clock = [topic_names.CLOCK] if topic_names.CLOCK in self._bag.topics else []
         for message in self._bag.messages([*self._messages, *clock]):
             if message.topic in self._messages:
                 self._messages[message.topic].append(message)
-            elif not clocks or message.place > clocks[-1].place:  # not by what one of them says
+            elif not clocks or message.place > clocks[-1].place:  # not by its log time
                 clocks[1:] = [message]
         for received in self._messages.values():
             received.sort(key=lambda message: message.place)
         if len(clocks) < 2 or clocks[1].publish_time <= clocks[0].publish_time:
             return math.nan
-        # By what the clock said: other recorders log by the wall clock.
+        # Decode the clock's own time: other recorders log by the wall clock.
         decode = decoder_for(self._bag.topics[topic_names.CLOCK])
         begin, end = (messages.nanoseconds_of(decode(tick.data).clock) for tick in clocks)
         return (end - begin) / (clocks[1].publish_time - clocks[0].publish_time)
 
     def _values(self, relative: str, value_of: Callable[[Any], _Value]) -> Iterator[_Value]:
-        """Give the values of the messages of a topic, which are not kept; of those that can be."""
+        """Yield the values of a topic's valid messages; the messages are not kept."""
         if relative in self._names:
             name = self._names[relative]
             decode = decoder_for(self._bag.topics[name])
@@ -149,23 +148,23 @@ class RunMessages:
                         yield value
 
     def _is_of_run(self, message: Any, data: bytes) -> bool:
-        """Whether a message is of the run of the first: of a torque profile, if there is one."""
+        """Return whether a message belongs to the first message's run; profiles come first."""
         if self._run is None:
             self._run = message.run
-        # Profiles of a run are counted from 0, on each ankle; one may have been recorded twice.
+        # A run's profiles are counted from 0 on each ankle; one may have been recorded twice.
         begins = not getattr(message, "revision", True)
         if begins and (
-            message.run != self._run or self._begun.setdefault(message.side, data) != data
+            message.run != self._run or self._first_profiles.setdefault(message.side, data) != data
         ):
             raise BagError(
-                f"{self._bag.path}: more than one run is in it (run {self._run}, then run "
-                f"{message.run}): record each into a bag of its own"
+                f"{self._bag.path}: holds more than one run (run {self._run}, then run "
+                f"{message.run}): record each into its own bag"
             )
         self.left_out += message.run != self._run
         return bool(message.run == self._run)
 
     def differences_from(self, live: Mapping[Side, Analysis]) -> tuple[str, ...] | None:
-        """Return how the results published differ from an analysis; None if there are none."""
+        """Return how the published results differ from an analysis; None if there are none."""
         if _RESULTS.keys().isdisjoint(self._names):
             return None
         differences = []
@@ -180,7 +179,7 @@ class RunMessages:
         return tuple(filter(None, differences))
 
     def read_torques(self, side: Side, strides: Sequence[Stride]) -> AnkleTorques:
-        """Read the ankle torque of some strides; of all if the log times are not the stamps."""
+        """Read some strides' ankle torque; all of it if log times are not stamps."""
         stamps: list[int] = []
         rows: list[tuple[float, float, float]] = []
         spans: list[tuple[int, float]] = [(stride.start, stride.end) for stride in strides]
@@ -196,7 +195,7 @@ class RunMessages:
 
 
 def side_in(bag: BagReader, relative: str) -> Side | None:
-    """Return the side that the first message of a topic names; None if there is none."""
+    """Return the side in a topic's first valid message; None if there is none."""
     with fields_expected(relative):
         for message in bag.messages_of(relative, f"{_OWN}{_TYPES[relative]}"):
             with suppress(messages.MessageError):
@@ -206,7 +205,7 @@ def side_in(bag: BagReader, relative: str) -> Side | None:
 
 @contextmanager
 def fields_expected(topic: str) -> Iterator[None]:
-    """Raise BagError for a message without a field that this version knows."""
+    """Raise BagError for a message that lacks a field of this version."""
     try:
         yield
     except AttributeError as error:
@@ -216,7 +215,7 @@ def fields_expected(topic: str) -> Iterator[None]:
 
 
 def _difference(topic: str, published: Sequence[Any], current: Sequence[dict[str, Any]]) -> str:
-    """Say where published messages first differ from results; an empty text if nowhere."""
+    """Describe where published messages first differ from results; "" if they do not."""
     for number, (message, values) in enumerate(zip(published, current, strict=False), start=1):
         for name, value in values.items():
             if name in _ADDED and not hasattr(message, name):
@@ -230,13 +229,13 @@ def _difference(topic: str, published: Sequence[Any], current: Sequence[dict[str
 
 
 def _plain(value: Any) -> Any:
-    """Return a header or a time as nanoseconds, anything else as it is."""
+    """Return a header or a time as nanoseconds, anything else unchanged."""
     value = getattr(value, "stamp", value)
     return messages.nanoseconds_of(value) if hasattr(value, "nanosec") else value
 
 
 def _bits(value: Any) -> Any:
-    """Return a value in a form that is equal only if every bit of a float is, also of a NaN."""
+    """Return a value in a form that compares floats, including NaN, bit by bit."""
     if isinstance(value, float):
         return struct.pack("<d", value)
     return [_bits(item) for item in value] if isinstance(value, (list, tuple)) else int(value)

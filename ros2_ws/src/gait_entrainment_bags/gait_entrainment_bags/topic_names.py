@@ -2,15 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The names of the topics, without ROS: for the nodes that publish them and for readers of bags.
+Topic names, without ROS: for the nodes that publish them and for readers of bags.
 
-Names are relative, so that a namespace or a remapping moves a whole experiment, except for those
-that others expect at the root. Types and quality of service are in
-``gait_entrainment_nodes/messaging/topics.py``; those of sensors have their names in
+Names are relative, so a namespace or a remapping moves a whole experiment, except for names that
+other software expects at the root. Types and quality of service are in
+``gait_entrainment_nodes/messaging/topics.py``; the names of sensor topics are in
 ``gait_entrainment_sensors/sources.py``.
 """
 
-# Of the walker.
+# Walker.
 JOINT_STATES = "joint_states"
 GAIT_EVENTS = "gait_events"
 ANKLE_TORQUE = "ankle_torque"
@@ -19,11 +19,11 @@ WALKER_PROGRESS_BEFORE = "walker_sim/progress"  # its name in bags of earlier ve
 WALKER_TIMING = "walker_sim/timing"
 CLOCK = "/clock"
 
-# The exact events of a walker that is seen through sensors.
+# Exact events of a walker that is observed through sensors.
 TRUE_EVENTS = "truth/gait_events"
 TRUE_PROGRESS = "truth/progress"
 
-# Of the robot.
+# Robot.
 TORQUE_PROFILE = "perturbation/torque_profile"
 PULSES = "perturbation/pulses"
 ROBOT_STATE = "perturbator/state"
@@ -31,25 +31,25 @@ ROBOT_SETUP = "perturbator/setup"
 TROUBLE = "perturbator/trouble"
 EMERGENCY_STOP = "perturbator/emergency_stop"
 
-# Of the experiment.
+# Experiment.
 HORIZON = "experiment/horizon"
 EXPERIMENT_STATE = "experiment/state"
 
-# Of whoever started the run.
+# Operator: the person or program that started the run.
 OPERATOR_HEARTBEAT = "operator/heartbeat"
 OPERATOR_NOTES = "operator/notes"
 
-# Of the analyzer.
+# Analyzer.
 STRIDES = "gait/strides"
 PULSE_PHASES = "gait/pulse_phases"
 ENTRAINMENT = "gait/entrainment"
 
-# Of the recorder, and of every node.
+# Recorder, and every node.
 RECORDER_PROGRESS = "bag_recorder/progress"
 PUBLISHED_COUNTS = "published_counts"
 DIAGNOSTICS = "/diagnostics"
 
-# Of the display.
+# Display.
 TF = "/tf"
 ROBOT_DESCRIPTION = "robot_description"
 MARKERS = "walker_display/markers"

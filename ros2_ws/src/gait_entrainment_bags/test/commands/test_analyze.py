@@ -146,9 +146,9 @@ def test_the_bag_follows_every_rule_and_opens_without_ros_and_message_packages()
     ("name", "expected", "words"),
     [
         ("nowhere", 2, "no such file"),
-        ("foreign", 1, "does not say which leg is perturbed"),
+        ("foreign", 1, "does not state which leg is perturbed"),
         ("text", 1, "not an MCAP"),
-        ("strangers", 1, "does not say which leg is perturbed"),
+        ("strangers", 1, "does not state which leg is perturbed"),
         ("protocol=\0", 1, "its protocol cannot be read"),
         ("onset=sideways", 1, "'sideways'; allowed: commanded, measured"),
         ("messages_lost=oops", 1, "'oops'; allowed: a JSON object"),
@@ -189,7 +189,7 @@ def test_a_second_run_in_a_bag_is_refused(capsys, tmp_path):
 
     code, out, err = entrain(capsys, "analyze", copy(tmp_path / "two", begun_again))
     assert (code, out) == (1, "")
-    assert "more than one run is in it (run 1, then run 1)" in err
+    assert "holds more than one run (run 1, then run 1)" in err
 
 
 def test_what_was_recorded_twice_counts_once(capsys, tmp_path):

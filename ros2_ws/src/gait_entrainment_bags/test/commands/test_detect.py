@@ -153,4 +153,4 @@ def test_the_signals_of_a_bag_in_any_namespace(capsys, tmp_path, topic, typestor
     assert "/foot_switch/left: a sensor_msgs/msg/JointState has no such field" in err
     code, _, err = entrain(capsys, "detect", folder, "--detector", "shank_gyroscope")
     assert code == 1
-    assert "lacks topics of sensors: imu/left_shank, imu/right_shank" in err
+    assert "lacks sensor topics: imu/left_shank, imu/right_shank" in err
