@@ -340,7 +340,7 @@ def test_device_is_brought_up_and_its_end_ends_the_launch(tmp_path):
 @pytest.mark.parametrize(
     ("file", "argument", "words"),
     [
-        ("experiment", f"bag:={BAG}", f"bag: {BAG} is already there"),
+        ("experiment", f"bag:={BAG}", f"bag: {BAG} already exists"),
         ("experiment", "protocol:=nowhere.yaml", "nowhere.yaml: cannot be read"),
         ("experiment", "params_file:=nowhere.yaml", "nowhere.yaml: no such file"),
         ("experiment", "onset:=felt", "onset: 'felt'; allowed: commanded, measured"),

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The points of the checklist before a session, each with what was found."""
+"""The points of the checklist before a session, each with its finding."""
 
 import math
 import shutil
@@ -29,12 +29,12 @@ from gait_entrainment_nodes.nodes.stop_thread import StopThread
 
 # How long the commands of the robot's loop are watched [s].
 _WATCHED = 3.0
-# A command may come later than its period by this [s]: a quarter of what the loop itself allows.
+# How late a command may be [s]: a quarter of what the loop itself allows.
 _LATE = 0.0125
-# Space that a session needs at the least [bytes]: an hour of samples at 1 kHz.
+# Least free space for a session [bytes]: an hour of samples at 1 kHz.
 _SPACE = 2 * 10**9
-# A clock is compared so often; the quickest answer tells most.
-_ASKED = 20
+# How many times each clock is compared; the quickest answer is the most accurate.
+_COMPARISONS = 20
 # Torque has this long to fall after the stop [s].
 _FALL_TIME = 0.3
 
@@ -54,7 +54,7 @@ def points(
     """
     Go through the checklist with a protocol's robot, enabled at zero torque.
 
-    ``elsewhere`` are nodes on other hosts; the stop has to be pressed within ``timeout`` [s].
+    ``elsewhere`` are nodes on other hosts; the stop must be pressed within ``timeout`` [s].
     """
     yield _limits(protocol)
     for side in protocol.sides:
@@ -67,8 +67,8 @@ def points(
             with robot:
                 robot.configure()
                 robot.activate()
-                told = robot.identity or "answers, but does not say what it is"
-                yield Point("device", True, told)
+                identity = robot.identity or "answers, but does not identify itself"
+                yield Point("device", True, identity)
                 yield _loop(robot)
                 yield _stop(robot, timeout)
     except DeviceError as error:
@@ -77,11 +77,11 @@ def points(
 
 def _limits(protocol: Protocol) -> Point:
     limits = asdict(protocol.limits) | limits_of(protocol, worn=True)
-    told = ", ".join(f"{name} {value:g}" for name, value in limits.items())
+    listed = ", ".join(f"{name} {value:g}" for name, value in limits.items())
     plan = protocol.planned
     most = "" if len(protocol.sequence) == 1 else "at most "
     pulses = f"{plan.count} pulses of {most}{protocol.pulse_torque:g} N m for {plan.duration:g} s"
-    return Point("limits", True, f"{pulses}; {told}")
+    return Point("limits", True, f"{pulses}; {listed}")
 
 
 def _watchdog(driver: str) -> Point:
@@ -105,7 +105,7 @@ def _record(bag: Path) -> Point:
 def _clocks(nodes: Sequence[str]) -> Iterator[Point]:
     """Compare the clocks of other hosts with this one."""
     set_environment(wanted_domain() or 0, real_time=True)
-    # Not at the top: they load ROS, which is to find an environment that it can start in.
+    # Not at the top: they load ROS, for which the environment must be set first.
     from gait_entrainment_msgs.srv import Ready
     from gait_entrainment_nodes.messaging.client import Client
     from gait_entrainment_nodes.nodes.experiment_run import ExperimentError
@@ -114,14 +114,14 @@ def _clocks(nodes: Sequence[str]) -> Iterator[Point]:
     with Client("entrain_preflight") as client:
         for node in nodes:
             offsets = []
-            for _ in range(_ASKED):
+            for _ in range(_COMPARISONS):
                 question = client.ask(Ready, f"{node}/ready")
                 if not client.wait(question.answer, 5.0):
                     break
-                asked = time.time_ns()
+                sent = time.time_ns()
                 answer = client.call(Ready, f"{node}/ready")
-                told = nanoseconds_of(answer.now)
-                offsets.append(ClockOffset.measured(asked, told, time.time_ns()))
+                remote = nanoseconds_of(answer.now)
+                offsets.append(ClockOffset.measured(sent, remote, time.time_ns()))
             if not offsets:
                 yield Point("clock", False, f"{node} does not answer")
                 continue
@@ -132,7 +132,7 @@ def _clocks(nodes: Sequence[str]) -> Iterator[Point]:
                 yield Point("clock", False, str(error))
                 continue
             ahead, uncertain = 1e3 * best.offset, 1e3 * best.uncertainty
-            found = f"that of {node} is ahead by {ahead:+.2f} ms, give or take {uncertain:.2f} ms"
+            found = f"{node}'s clock is ahead by {ahead:+.2f} ms, give or take {uncertain:.2f} ms"
             yield Point("clock", True, f"{found}; allowed: {1e3 * CLOCK_OFFSET:g} ms")
 
 
@@ -156,7 +156,7 @@ def _loop(robot: GuardedRobot) -> Point:
 
 
 def _stop(robot: GuardedRobot, timeout: float) -> Point:
-    """Have the stop pressed, and see that it is obeyed."""
+    """Wait for the stop to be pressed, and check that it is obeyed."""
 
     def stop() -> StopAnswer:
         robot.stop()
@@ -181,12 +181,12 @@ def _stop(robot: GuardedRobot, timeout: float) -> Point:
     finally:
         channel.close()
     if not abs(measured) <= NEAR_ZERO_SHARE * torque_scale(robot.capabilities):
-        return Point("stop", False, f"pressed, but {measured:.2f} N m are measured: cut the power")
+        return Point("stop", False, f"pressed, but {measured:.2f} N m is measured: cut the power")
     return Point("stop", True, f"obeyed and latched, {measured:+.2f} N m measured")
 
 
 def _watch(robot: GuardedRobot, over: Callable[[], bool], longest: float) -> float:
-    """Read a robot until a condition holds, or for a time [s]; return the last torque measured."""
+    """Read a robot until a condition holds or time [s] is up; return the last measured torque."""
     give_up, measured = time.monotonic() + longest, math.nan
     while time.monotonic() < give_up and not over():
         time.sleep(0.01)

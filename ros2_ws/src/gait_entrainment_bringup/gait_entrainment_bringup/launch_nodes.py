@@ -28,7 +28,7 @@ from gait_entrainment_bringup.node_list import DISPLAY, MOVED, PAGE, Parameters,
 from gait_entrainment_nodes.messaging.client import Client
 from gait_entrainment_nodes.messaging.environment import PACKAGE, dds_variables, shared_file
 
-# Argument of a launch file: name, default (None if it must be given), what --show-args says.
+# Argument of a launch file: name, default (None if it must be given), what --show-args shows.
 Argument = tuple[str, str | None, str]
 NAMESPACE: Argument = ("namespace", "", "of all nodes and topics, for several side by side")
 PARAMETERS_FILE: Argument = ("params_file", str(settings_file()), "values for the nodes (YAML)")
@@ -41,7 +41,7 @@ class LaunchError(EntrainmentError):
 
 
 class _OverError(Exception):
-    """The launch has ended meanwhile."""
+    """The launch has already ended."""
 
 
 def description(
@@ -50,7 +50,7 @@ def description(
     """
     Describe a launch that makes nodes once the arguments are known.
 
-    A launch without an argument ``real_time`` is one in real time.
+    A launch file without the argument ``real_time`` runs in real time.
     """
 
     def make(context: LaunchContext) -> list[Action]:
@@ -68,7 +68,7 @@ def value(context: LaunchContext, name: str) -> str:
 
 
 def choice(context: LaunchContext, name: str, *allowed: str) -> str:
-    """Return the value of an argument, one of those allowed; LaunchError for another."""
+    """Return the value of an argument; LaunchError if it is not one of those allowed."""
     if (text := value(context, name).lower()) not in allowed:
         raise LaunchError(f"{name}: {text!r}; allowed: {', '.join(allowed)}")
     return text
@@ -80,7 +80,7 @@ def is_true(context: LaunchContext, name: str) -> bool:
 
 
 def full_namespace(context: LaunchContext, namespace: str) -> str:
-    """Return a namespace from the root on, below those that including launch files push."""
+    """Return the absolute namespace, below those that including launch files push."""
     pushed = context.launch_configurations.get("ros_namespace")
     return str(make_namespace_absolute(prefix_namespace(pushed, namespace)) or "/")
 
@@ -88,11 +88,11 @@ def full_namespace(context: LaunchContext, namespace: str) -> str:
 def make_node(
     context: LaunchContext, name: str, namespace: str, given: dict[str, Any], **options: Any
 ) -> Node:
-    """Return the action that runs a node; what is given wins over the parameter file."""
+    """Return the action that runs a node; ``given`` wins over the parameter file."""
     file = value(context, "params_file")
-    if not Path(file).is_file():  # launch_ros would go on without it
+    if not Path(file).is_file():  # launch_ros would ignore that
         raise LaunchError(f"params_file: {file}: no such file")
-    # Text stays text even if it reads like YAML, as a protocol does.
+    # A string stays a string even if it looks like YAML, as a protocol does.
     typed = {
         key: ParameterValue(item, value_type=str) if isinstance(item, str) else item
         for key, item in given.items()
@@ -108,7 +108,7 @@ def make_node(
 
 
 def rviz(context: LaunchContext, namespace: str, given: Parameters) -> list[Action]:
-    """Return RViz, if wanted, and the node that draws the walker, if it is given parameters."""
+    """Return RViz, if requested, and the node that draws the walker, if it has parameters."""
     if not is_true(context, "rviz"):
         return []
     picture = shared_file("gait_entrainment_bringup", "rviz/walker.rviz")
@@ -122,7 +122,7 @@ def rviz(context: LaunchContext, namespace: str, given: Parameters) -> list[Acti
 
 
 def page(context: LaunchContext, namespace: str, given: Parameters) -> list[Action]:
-    """Return the operator's page, if wanted; the launch does not end with it."""
+    """Return the operator's page, if requested; the launch does not end with it."""
     if not is_true(context, "page"):
         return []
     package = {"package": "gait_entrainment_page"}
@@ -130,7 +130,7 @@ def page(context: LaunchContext, namespace: str, given: Parameters) -> list[Acti
 
 
 def in_background(context: LaunchContext, work: Callable[[Client], None]) -> None:
-    """Do work with a client in a thread until the launch ends; an exception ends it with 1."""
+    """Run ``work`` in a thread while the launch lasts; an exception ends it with exit code 1."""
 
     def go_on() -> None:
         if context.is_shutdown:
@@ -149,9 +149,9 @@ def ended_by(
     """
     Return the handlers that end the launch with its nodes.
 
-    Those named in ``last`` end by themselves; once all of them have ended well, ``over`` is done.
-    If another node ends, or one with another exit code than 0, the launch ends with exit code 1.
-    If it ends before its time, it tells the path of the ``bag`` that it was to make, if any.
+    Nodes in ``last`` end by themselves; once all of them have exited with 0, ``over`` is executed.
+    If any other node ends, or a node exits with another code, the launch ends with exit code 1.
+    If it ends early, it prints the path of the ``bag`` that was being recorded, if any.
     """
     waited_for = set(last)
 
@@ -160,7 +160,7 @@ def ended_by(
             return []
         name = event.process_name.rpartition("-")[0]
         if event.returncode != 0 or name not in last:
-            # Only an exception gives launch an exit code; it prints it in one line.
+            # Only an exception sets the exit code of launch, which prints it in one line.
             raise LaunchError(f"{name} ended with exit code {event.returncode}")
         waited_for.discard(name)
         return [] if waited_for else over
@@ -170,4 +170,4 @@ def ended_by(
         return LogInfo(msg=f"the bag of the run so far is {bag}") if kept else None
 
     exits = [OnProcessExit(target_action=node, on_exit=on_exit) for node in nodes]
-    return [RegisterEventHandler(one) for one in (*exits, OnShutdown(on_shutdown=on_shutdown))]
+    return [*map(RegisterEventHandler, (*exits, OnShutdown(on_shutdown=on_shutdown)))]

@@ -4,8 +4,8 @@
 """
 The nodes of an experiment and of a replay: one list for the commands and the launch files.
 
-What a user may set is in config/nodes.yaml. Here is what follows from the protocol, the mode and
-the bag.
+What a user may set is in config/nodes.yaml. What follows from the protocol, the mode and the bag
+is set here.
 """
 
 import json
@@ -29,7 +29,7 @@ from gait_entrainment_nodes.messaging.environment import shared_file
 
 RECORDER = "bag_recorder"
 # Who walks: the model with its exact events; the model as sensors see it; a person with sensors.
-# The last node plays the walker's role to the others.
+# The last node plays the walker's role towards the others.
 WALKERS = {
     "simulated": ("walker_sim",),
     "sensed": ("sensor_sim", "gait_detector"),
@@ -43,11 +43,11 @@ def nodes_for(walker: str) -> tuple[str, ...]:
 
 
 NODES = nodes_for("simulated")
-# Only looks on: started if somebody wants to see the walk, waited for by nobody.
+# An onlooker: started only to show the walk; no node waits for it.
 DISPLAY = "walker_display"
-# The operator's page: looks on as well, and is what one looks at, so it outlives the torque.
+# The operator's page: also an onlooker. The operator watches it, so it outlives the torque.
 PAGE = "operator_page"
-# The client that conducts a run, and by that name the operator who started it.
+# The client that conducts a run; also the name of the operator who started it.
 RUN_CLIENT = "entrain_run"
 # In the order in which they are stopped: torque first, the record last.
 STOP_ORDER = (
@@ -55,29 +55,29 @@ STOP_ORDER = (
     *("gait_analyzer", DISPLAY, PAGE, "bag_recorder"),
 )
 DETECTOR = "vertical_force"
-# In real time promises are short, so that more can be decided late, but longer than a hiccup [s].
+# In real time promises are short, so that decisions can be late, but longer than a hiccup [s].
 LEAD_TIME = 0.3
-# A real robot's torque is known only once it has been measured and promised: by so much the walker
-# lags behind the wall clock to show what it felt [s].
+# A real robot's torque is known only once it has been measured and promised. The walker lags this
+# far behind the wall clock to show what it felt [s].
 MEASURED_DELAY = 0.1
 # The flanks of a real robot's pulses, as a share of their width, and how many of its first pulses
 # are lower.
 FLANK_SHARE = 0.1
 RISING = 5
-# By how much the clocks of the hosts of a real robot may differ [s]: what a phase lag is worth.
+# How much the clocks of a real robot's hosts may differ [s]; a phase lag is no more accurate.
 CLOCK_OFFSET = 0.005
-# From the sample of a sensor to its arrival [s], with the time from one sample to the next.
+# From a sensor's sample to its arrival [s], including the time from one sample to the next.
 DELIVERY = 0.03
 # How long any node, or the operator, may be silent while a real robot is worn [s].
 PERSON_SILENCE = 0.3
 
-# Names at the root that are moved into a namespace: each experiment keeps its own time.
+# Names at the root that are moved into a namespace, so that each experiment has its own time.
 MOVED = (
     "/clock",
     "/diagnostics",
     "/tf",
     "/tf_static",
-    # Absolute in RViz's configuration alone.
+    # Absolute only in RViz's configuration.
     "/robot_description",
     "/walker_display/markers",
 )
@@ -95,13 +95,13 @@ NOT_REPLAYED = (
     "/parameter_events",
 )
 ANALYZED = ("gait_events", "perturbation/torque_profile", "walker/progress")
-MEASURED = ("perturbation/pulses", "perturbator/state")  # if onsets are those measured
+MEASURED = ("perturbation/pulses", "perturbator/state")  # if onsets are measured
 
 Parameters = dict[str, dict[str, Any]]  # by node name, then by name
 
 
 def settings_file() -> Path:
-    """Return the file of what a user may set of the nodes."""
+    """Return the file with what a user may set for the nodes."""
     return shared_file("gait_entrainment_bringup", "config/nodes.yaml")
 
 
@@ -122,12 +122,12 @@ def parameters(
     """
     Return the parameters of every node for a run that is recorded into the folder ``bag``, if any.
 
-    If ``armed``, a real robot may deliver torque without another word, even one whose watchdog is
-    ``unproved`` (`gait_entrainment_drivers.proof`); ``onset`` is when the analyzer takes a pulse
-    to begin, "commanded" or "measured"; promised torque leads by ``lead_time`` [s] in real time.
-    ``walker`` is one of WALKERS, ``detector`` what finds its events in sensors' signals,
-    ``sensor`` what is emulated, by default the detector's; toe-offs are detected late by
-    ``toe_off_bias`` [s].
+    If ``armed``, a real robot may deliver torque without further confirmation; if ``unproved``,
+    even if its watchdog was not proved (`gait_entrainment_drivers.proof`). ``onset`` is where the
+    analyzer takes a pulse to begin: "commanded" or "measured". In real time, promised torque
+    leads by ``lead_time`` [s]. ``walker`` is one of WALKERS, ``detector`` finds its events in
+    sensor signals, and ``sensor`` is the one to emulate, by default the detector's. Toe-offs are
+    detected late by ``toe_off_bias`` [s].
     """
     nodes = nodes_for(walker)
     ankles = {"side": protocol.side.name.lower(), "both_ankles": len(protocol.sides) > 1}
@@ -177,11 +177,11 @@ def parameters(
     if walker != "simulated":
         latency = _add_detection(given, walker, detector, sensor, real_time=real_time)
     if real_time:
-        # What is known is by so much older.
+        # What is known is older by the latency.
         given["experiment"]["longest_lookahead"] = lead_time + latency
     if measured:
-        # A person wears it: who falls silent ends the torque, and so does a record that cannot
-        # be written.
+        # A person wears the robot: a node that falls silent ends the torque, and so does a record
+        # that cannot be written.
         given["experiment"]["silence_timeout"] = PERSON_SILENCE
         given["perturbator"]["operator_timeout"] = PERSON_SILENCE
         given["experiment"]["longest_clock_offset"] = CLOCK_OFFSET
@@ -192,8 +192,8 @@ def parameters(
 def _add_detection(
     given: Parameters, walker: str, detector: str, sensor: str, *, real_time: bool
 ) -> float:
-    """Add the nodes by which a sensed walker takes part; return the latency of its events [s]."""
-    # Here, since few runs need it.
+    """Add the nodes that detect the walker's events; return the latency of these events [s]."""
+    # Not at the top: few runs need it.
     from gait_entrainment_sensors import find_detector
 
     chosen = find_detector(detector)
@@ -209,25 +209,25 @@ def _add_detection(
         sensor = sensor or USUAL.get(chosen.name, chosen.name)
         _, quality = find_sensor(sensor)
         given["sensor_sim"] = simulated | {"sensor": sensor, "ground_reaction": False}
-        if not real_time:  # nothing is on its way but the sample that decides
+        if not real_time:  # only the deciding sample is still on its way
             detecting["delivery"] = 2 / quality.rate
     return float(max(chosen.make(side).latency for side in Side) + detecting["delivery"])
 
 
 def limits_of(protocol: Protocol, *, worn: bool) -> dict[str, Any]:
     """
-    Return the limits that are not as by default: what the protocol says.
+    Return the limits that differ from the defaults: those that the protocol sets.
 
-    If a person has the robot ``worn``, no pulse is square and of full height from the first one
-    on, unless it is said.
+    If a person has the robot ``worn``, pulses get flanks and the first ones are lower, unless the
+    protocol sets this.
     """
     if not worn:
         return said(protocol.limits)
     gentle: dict[str, float] = {
         "rising": RISING,
-        # No two pulses closer than the shortest stride that is believed.
+        # No two pulses are closer than the shortest plausible stride.
         "pulses_per_minute": 60 / GaitLimits().stride_least,
-        # The experiment is to name who is silent before the robot misses it.
+        # The experiment must name the silent node before the robot reports the silence.
         "silence": PERSON_SILENCE + 0.05,
     }
     rates = [
@@ -240,13 +240,13 @@ def limits_of(protocol: Protocol, *, worn: bool) -> dict[str, Any]:
 
 
 def _verdict(protocol: Protocol | None) -> dict[str, Any]:
-    """Return what the analyzer must know of the protocol's pulses: irregular, or by phase."""
-    told = settings_for(protocol.sequence if protocol else ())
-    return {f"verdict.{name}": value for name, value in said(told).items()} if told else {}
+    """Return what the analyzer must know about the protocol's pulses: irregular, or by phase."""
+    settings = settings_for(protocol.sequence if protocol else ())
+    return {f"verdict.{n}": value for n, value in said(settings).items()} if settings else {}
 
 
 def _drawn(protocol: Protocol) -> dict[str, Any]:
-    """Return what the display must know of the walker."""
+    """Return what the display must know about the walker."""
     return {"leg_length": protocol.walker.leg_length, "foot_length": protocol.walker.foot_length}
 
 
@@ -260,10 +260,10 @@ def replay_parameters(
     """
     Return the namespace and the parameters of a replay of a bag, a folder or an ``.mcap`` file.
 
-    It goes into a namespace, by default into the one that was recorded, which is returned without
-    a slash at its end, and is recorded into ``out``, if given. ``protocol`` and ``side`` are as
-    `protocol_and_side` takes them. There are parameters of the display only if the bag holds no
-    picture. BagError if the bag cannot be read or holds no gait events.
+    The replay goes into a namespace, by default the recorded one, which is returned without a
+    trailing slash. It is recorded into ``out``, if given. ``protocol`` and ``side`` are as
+    `protocol_and_side` takes them. The display has parameters only if the bag holds no picture.
+    BagError if the bag cannot be read or holds no gait events.
     """
     with BagReader(path) as bag:
         topics = list(bag.topics)
@@ -290,7 +290,7 @@ def replay_parameters(
             "exclude": list(NOT_REPLAYED),
             "remap": [f"{n}:={namespace}{to.removeprefix(recorded)}" for n, to in moved.items()]
             or [""],
-            # Once by the analyzer, and once more by the recorder.
+            # By the analyzer, and by the recorder as well.
             "expect": expected if out is None else expected * 2,
             "use_sim_time": False,
         },
@@ -318,12 +318,12 @@ def replay_parameters(
 
 
 def bag_folder(protocol: Protocol) -> Path:
-    """Return where a run is recorded unless the user says otherwise."""
+    """Return the folder in which a run is recorded by default."""
     return Path("bags") / f"{datetime.now():%Y%m%d-%H%M%S}_{protocol.name}"
 
 
 def parameter_arguments(given: Parameters, folder: Path) -> list[str]:
-    """Return arguments by which a node loads config/nodes.yaml, then these, from a folder."""
+    """Return arguments that make a node load config/nodes.yaml, then ``given`` from a folder."""
     file = folder / "parameters.yaml"
     file.write_text(yaml.safe_dump({f"/**/{n}": {"ros__parameters": p} for n, p in given.items()}))
     files = (settings_file(), file)

@@ -20,7 +20,7 @@ STOP_KEY = " "
 
 
 class Operator:
-    """Called in each round of a client: says that somebody watches, and looks at the keyboard."""
+    """Called in each round of a client: shows that someone watches, and checks the keyboard."""
 
     def __init__(self, client: Client) -> None:
         self._heartbeat = client.node.create_publisher(
@@ -31,13 +31,13 @@ class Operator:
         """Publish the heartbeat; raise NodeError if the stop key was pressed."""
         self._heartbeat.publish(OPERATOR_HEARTBEAT.type(data=RUN_CLIENT))
         if pressed_key() == STOP_KEY:
-            told = [f"{name}: {answer.message}" for name, answer in stop_all().items()]
-            raise NodeError("stopped by the space bar: " + "; ".join(told), "")
+            answers = [f"{name}: {answer.message}" for name, answer in stop_all().items()]
+            raise NodeError("stopped by the space bar: " + "; ".join(answers), "")
 
 
 @contextmanager
 def keys_at_once() -> Iterator[None]:
-    """Have a terminal hand over each key as it is pressed, without showing it."""
+    """Have a terminal pass on each key as it is pressed, without echoing it."""
     if not _is_attended():
         yield
         return
@@ -51,15 +51,15 @@ def keys_at_once() -> Iterator[None]:
 
 
 def pressed_key() -> str:
-    """Return a key that was pressed, or an empty text."""
+    """Return a key that was pressed, or an empty string."""
     if not _is_attended() or not select.select([0], [], [], 0)[0]:
         return ""
     return os.read(0, 1).decode(errors="replace")
 
 
 def _is_attended() -> bool:
-    """Whether keys come here: a job in the background that touches its terminal is suspended."""
+    """Whether keys arrive here: a background job that touches its terminal is suspended."""
     try:
         return os.isatty(0) and os.tcgetpgrp(0) == os.getpgrp()
-    except OSError:  # it is not the terminal that controls jobs
+    except OSError:  # it is not the controlling terminal
         return True

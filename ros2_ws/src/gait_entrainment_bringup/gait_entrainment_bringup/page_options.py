@@ -20,35 +20,35 @@ def add_page_options(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     group = parser.add_argument_group("the operator's page")
     group.add_argument(
-        "--host", default="127.0.0.1", help="serve it at this address; another asks for a token"
+        "--host", default="127.0.0.1", help="address to serve it at; any other needs a token"
     )
-    group.add_argument("--port", default="8080", help="at this port (8080); 0: a free one")
+    group.add_argument("--port", default="8080", help="port to serve it at (8080); 0: a free one")
     group.add_argument(
         "--token",
         default="",
-        help="whoever has it may act; default: that of ENTRAIN_PAGE_TOKENS, or a new one",
+        help="lets its holder act; default: the one in ENTRAIN_PAGE_TOKENS, or a new one",
     )
     group.add_argument(
         "--heartbeat",
         action="store_true",
-        help="the page, too, is the operator's sign of life: closed, it ends torque",
+        help="the page is also the operator's sign of life: closing it ends torque",
     )
     group.add_argument(
         "--blinded", action="store_true", help="hide what would reveal the condition"
     )
     group.add_argument(
-        "--foxglove", metavar="PORT", default="0", help="offer the same data to Foxglove there"
+        "--foxglove", metavar="PORT", default="0", help="port to offer the same data to Foxglove"
     )
 
 
 def check_heartbeat(options: argparse.Namespace, protocol: Protocol | None) -> None:
-    """Raise UsageError if the page is to be a heartbeat that nothing heeds."""
+    """Raise UsageError if nothing would heed the page's heartbeat."""
     if options.heartbeat and (protocol is None or find_driver(protocol.driver).simulated):
         raise UsageError("--heartbeat: only a real robot heeds it; leave it out")
 
 
 def checked_page(options: argparse.Namespace, protocol: Protocol | None) -> dict[str, Any]:
-    """Return the node's parameters, its tokens into the environment; raises UsageError."""
+    """Return the node's parameters, and set its tokens in the environment; raises UsageError."""
     check_heartbeat(options, protocol)
     access = Access.of_environment(options.host, options.token)
     port = _PORT.parse("--port", options.port)
@@ -57,7 +57,7 @@ def checked_page(options: argparse.Namespace, protocol: Protocol | None) -> dict
         raise UsageError("--foxglove: offers what a blinded session hides; leave it out")
     if foxglove:
         try:
-            import foxglove as _  # noqa: F401, to see that it is there
+            import foxglove as _  # noqa: F401, only to check that it is installed
         except ImportError:
             raise UsageError("--foxglove: needs its SDK: pip install foxglove-sdk") from None
         listen(options.host, foxglove, "--foxglove").close()

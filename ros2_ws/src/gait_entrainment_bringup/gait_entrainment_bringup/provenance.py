@@ -26,7 +26,7 @@ def provenance(protocol: Protocol, *, real_time: bool, onset: str) -> dict[str, 
 
 
 def _commit() -> str:
-    """Return the git commit of the sources that run, "+" if they were changed since."""
+    """Return the git commit of the running sources, with "+" if they have changed since."""
     here = Path(__file__).resolve().parent
     status = ["status", "--porcelain", "-uno", "--", ":/ros2_ws/src"]
     try:

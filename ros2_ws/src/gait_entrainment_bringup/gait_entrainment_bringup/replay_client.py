@@ -20,10 +20,10 @@ from gait_entrainment_nodes.nodes.gait_analyzer_run import RESULTS
 
 class ReplayClient(Client):
     """
-    Has a bag played to a gait analyzer, and collects what the analyzer makes of it.
+    Has a bag played to a gait analyzer, and collects the analyzer's results.
 
-    ``namespace`` is that of the replay, without a slash at its end; ``recorded`` says whether a
-    recorder listens, too. ``results`` are serialized messages by relative topic name, in the order
+    ``namespace`` is that of the replay, without a trailing slash; ``recorded`` is whether a
+    recorder listens too. ``results`` are serialized messages by relative topic name, in the order
     in which they were published.
     """
 
@@ -35,14 +35,14 @@ class ReplayClient(Client):
         for topic in RESULTS.values():
             self.subscribe(topic, self.results[topic.name].append, raw=True)
         self.subscribe(PUBLISHED_COUNTS, self._on_counts)
-        # Player and recorder end by themselves once everything was played and recorded.
+        # Player and recorder end by themselves once everything has been played and recorded.
         may_end = ("bag_player", "bag_recorder")
         self.each_round = Watch(
             self, supervisor, may_end=may_end, asked=REPLAY_NODES, silence=TIMEOUT
         )
 
     def play(self, *, quiet: bool) -> None:
-        """Play the bag, wait for all that the analyzer makes of it; NodeError if a node fails."""
+        """Play the bag and wait for all of the analyzer's results; NodeError if a node fails."""
         for node in REPLAY_NODES:
             self.call(Ready, f"{node}/ready", accept=self._all_listen)
         self.call(srv.Resume, "bag_player/resume")
@@ -59,17 +59,17 @@ class ReplayClient(Client):
             raise SilenceError("gait_analyzer/finish", TIMEOUT)
 
     def _all_listen(self, answer: Ready.Response) -> bool:
-        """Whether a node is ready and everyone will hear it: this client, a recorder if any."""
+        """Whether a node is ready and will be heard by this client and by a recorder, if any."""
         heard_here = {self._beneath + name for name in (*self.results, PUBLISHED_COUNTS.name)}
         return answer.ready and all(
             matched >= (topic in heard_here) + self._recorded
             for topic, matched in zip(answer.topics, answer.matched, strict=True)
-            # A recorder hears what is in its namespace, hidden topics apart.
+            # A recorder hears the topics in its namespace, except hidden ones.
             if topic.startswith(self._beneath) and "/_" not in topic
         )
 
     def _complete(self) -> bool:
-        """Whether everything that the analyzer says it has published is here."""
+        """Whether everything that the analyzer has published has arrived."""
         return self._counts is not None and all(
             len(messages) >= self._counts[self._beneath + name]
             for name, messages in self.results.items()

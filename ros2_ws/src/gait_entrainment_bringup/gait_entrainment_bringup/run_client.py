@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The client of a run: asks the experiment to conduct a protocol, and shows how it goes."""
+"""The client of a run: asks the experiment to conduct a protocol, and shows its progress."""
 
 from collections.abc import Callable
 from typing import Any
@@ -24,8 +24,8 @@ from gait_entrainment_nodes.messaging.topics import PULSE_PHASES, STRIDES
 ACTION = "experiment/run_protocol"
 # How long the experiment may take to appear [s].
 APPEARANCE_TIMEOUT = 30.0
-# Nodes for whom nothing in the chain of promises waits, so that they are asked for a sign of life;
-# and how long they may owe it [s]. The experiment watches the others.
+# Nodes that nothing in the chain of promises waits for, so they are asked for a sign of life, and
+# how long they may owe it [s]. The experiment watches the others.
 ASKED = ("experiment", "gait_analyzer")
 SILENCE_TIMEOUT = 3.0
 
@@ -43,9 +43,9 @@ def conduct(
     """
     Conduct a protocol through the experiment node to its end, and watch the processes meanwhile.
 
-    ``on_start`` is called once the experiment has accepted it. In ``real_time`` this process comes
-    before others. Nodes that nobody else watches may be silent for ``silence`` [s] in it. Until
-    it has begun, ``early`` hears a stop. Raises NodeError if the run fails.
+    ``on_start`` is called once the experiment has accepted it. In ``real_time`` this process is
+    scheduled before others. During the run, nodes that no other node watches may be silent for
+    ``silence`` [s]; until it has started, ``early`` hears a stop. NodeError if the run fails.
     """
     bar = tqdm(total=protocol.strides, unit="stride", disable=True if quiet else None, leave=False)
     with bar, keys_at_once(), Client(RUN_CLIENT) as client:
@@ -65,7 +65,7 @@ def conduct(
         client.action(RunProtocol, ACTION)
         # The recorder ends by itself once the record is complete.
         watch = Watch(client, supervisor, may_end=("bag_recorder",), asked=ASKED, silence=silence)
-        # Before the walk begins no torque can come, and much is loaded.
+        # Before the walk starts there is no torque, and much is still being loaded.
         watch.silence = max(silence, SILENCE_TIMEOUT)
         operator = Operator(client)
 
@@ -83,7 +83,7 @@ def conduct(
         goal = RunProtocol.Goal(protocol=write_protocol(protocol))
         handle = client.send_goal(RunProtocol, ACTION, goal, on_feedback=on_feedback)
         if not handle.accepted:
-            raise NodeError("experiment rejected the protocol: it conducts another", "experiment")
+            raise NodeError("experiment rejected the protocol: it runs another one", "experiment")
         on_start()
         answer = client.result(handle)
     if answer.status != GoalStatus.STATUS_SUCCEEDED:

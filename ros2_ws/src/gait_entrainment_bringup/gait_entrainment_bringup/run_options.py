@@ -32,14 +32,14 @@ from gait_entrainment_drivers.proof import require_proof
 from gait_entrainment_sessions.session_file import Session, read_session
 
 _SWITCHES = {
-    "--real-time": "at the pace of the wall clock, not in lock-step",
+    "--real-time": "run at the pace of the wall clock, not in lock-step",
     "--arm": "let a real ankle robot deliver torque (docs/safety.md)",
-    "--arm-later": "start unarmed: Arm on the page, or perturbator/arm, before the first pulse",
-    "--unproved": "arm it although its own watchdog was not proved here; the bag says so",
+    "--arm-later": "start unarmed; arm on the page or by perturbator/arm before the first pulse",
+    "--unproved": "arm it even if its watchdog was not proved here; the bag records that",
     "--require-record": "end the run if nothing more can be recorded, as on a full disk",
     "--no-ground-reaction": "leave out the ground reaction forces",
 }
-SESSION_FILE = "the file is one of a session"
+SESSION_FILE = "the file is a session file"
 _NUMBERS = {
     "lead_time": Setting(
         f"real time: lead of promised torque (default {LEAD_TIME:g}); more for a slow network",
@@ -67,19 +67,19 @@ def add_conduct_options(parser: argparse.ArgumentParser, out: str) -> None:
     """Add the options of how a protocol is conducted, and ``--out`` with its meaning."""
     for option, text in _SWITCHES.items():
         parser.add_argument(option, action="store_true", help=text)
-    for name, told in _NUMBERS.items():
-        text = f"{told.meaning}; {told.allowed}"
+    for name, setting in _NUMBERS.items():
+        text = f"{setting.meaning}; {setting.allowed}"
         parser.add_argument(_option(name), metavar="FLOAT", help=text)
     parser.add_argument(
         "--walker",
         choices=WALKERS,
         default="simulated",
-        help="the model with exact events; the model through sensors and detectors; a person",
+        help="the model with exact events, the model through sensors and detectors, or a person",
     )
     parser.add_argument(
-        "--detector", default=DETECTOR, help=f"of a person's gait events; default {DETECTOR}"
+        "--detector", default=DETECTOR, help=f"detector of gait events; default {DETECTOR}"
     )
-    parser.add_argument("--sensor", default="", help="to emulate; default: the detector's")
+    parser.add_argument("--sensor", default="", help="sensor to emulate; default: the detector's")
     parser.add_argument("--out", type=Path, help=out)
     add_onset_option(parser)
 
@@ -92,7 +92,7 @@ def checked_run(
     options: argparse.Namespace, *, drives: bool = True, records: bool = True
 ) -> tuple[Protocol, Path]:
     """
-    Return the protocol that the options name and the folder of the bag; checks all that they say.
+    Check all options; return the protocol that they name and the folder of the bag.
 
     The driver is checked only if this process ``drives`` the robot, the folder if it ``records``.
     Raises UsageError, LimitError or DeviceError.
@@ -110,12 +110,12 @@ def checked_run(
 
 def checked_session(file: Path | str | None, options: argparse.Namespace) -> Session:
     """
-    Return the session of a file; checks all that the options say.
+    Check all options; return the session of a file.
 
     Raises SessionError, UsageError, LimitError or DeviceError.
     """
     if not file:
-        raise UsageError("--session: which one is missing; allowed: a session file")
+        raise UsageError("--session: no file is given; allowed: a session file")
     session = read_session(Path(file))
     check_numbers(options)
     check_walker(options.walker, options.detector, real_time=options.real_time)
@@ -130,9 +130,9 @@ def _check_arming(protocol: Protocol, options: argparse.Namespace) -> None:
 
 
 def check_walker(walker: str, detector: str, *, real_time: bool) -> None:
-    """Raise UsageError if nobody would walk like this, or nothing would find the events."""
+    """Raise UsageError if nothing would walk in this mode, or nothing would find the events."""
     if walker == "person" and not real_time:
-        raise UsageError("--walker: a person walks in real time only; add --real-time")
+        raise UsageError("--walker: a person walks only in real time; add --real-time")
     if walker != "simulated":
         from gait_entrainment_sensors import find_detector
 
@@ -143,9 +143,9 @@ def check_walker(walker: str, detector: str, *, real_time: bool) -> None:
 
 def check_numbers(options: argparse.Namespace) -> None:
     """Convert the options that are numbers; raises SettingError."""
-    for name, told in _NUMBERS.items():
+    for name, setting in _NUMBERS.items():
         if (text := getattr(options, name)) is not None:
-            setattr(options, name, told.parse(_option(name), text))
+            setattr(options, name, setting.parse(_option(name), text))
 
 
 def check_robot(protocol: Protocol, *, real_time: bool, armed: bool, unproved: bool) -> None:
@@ -157,8 +157,8 @@ def check_robot(protocol: Protocol, *, real_time: bool, armed: bool, unproved: b
         raise LimitError(f"driver: {driver.name} runs in real time only; add --real-time")
     if not armed:
         raise LimitError(
-            f"driver: {driver.name} applies real torque: see that all is well, then add --arm, or "
-            "--arm-later to arm it once the walk has begun"
+            f"driver: {driver.name} applies real torque: check that all is well, then add --arm, "
+            "or --arm-later to arm it once the walk has started"
         )
     for side in make_robots(protocol.driver, protocol.sides, protocol.limits):
         require_proof(driver_on(protocol.driver, side), unproved=unproved)
@@ -166,14 +166,14 @@ def check_robot(protocol: Protocol, *, real_time: bool, armed: bool, unproved: b
 
 def check_output(bag: Path, option: str = "--out", *, exactly: bool = True) -> None:
     """
-    Raise UsageError if a bag cannot be made, ``exactly`` there or under a name beside.
+    Raise UsageError if a bag cannot be made there or, unless ``exactly``, under a similar name.
 
     The message begins with the option that named it.
     """
     if not is_utf8(bag):
         raise UsageError(f"{option}: {str(bag.absolute())!a}; allowed: a name in UTF-8")
     if exactly and os.path.lexists(bag):
-        raise UsageError(f"{option}: {bag} is already there; a bag is never overwritten")
+        raise UsageError(f"{option}: {bag} already exists; a bag is never overwritten")
     parent = next(folder for folder in bag.absolute().parents if folder.exists())
     if not parent.is_dir():
         raise UsageError(f"{option}: {parent} is not a folder; allowed: a new folder in a folder")
@@ -188,10 +188,10 @@ def check_output(bag: Path, option: str = "--out", *, exactly: bool = True) -> N
 @contextmanager
 def claimed_folder(bag: Path, *, exactly: bool) -> Iterator[Path]:
     """
-    Make the folder of a bag, which is this run's from then on; remove it if it stays empty.
+    Make the folder of a bag and claim it for this run; remove it if it stays empty.
 
-    Unless it has to be ``exactly`` this one, a number is appended while another run has it.
-    Raises UsageError if it is there already.
+    If the folder exists, a number is appended to its name; UsageError if it must be ``exactly``
+    this one.
     """
     parents = [parent for parent in bag.absolute().parents if not parent.exists()]
     for number in itertools.count(1):
@@ -202,18 +202,18 @@ def claimed_folder(bag: Path, *, exactly: bool) -> Iterator[Path]:
         except FileExistsError:
             if exactly:
                 raise UsageError(
-                    f"--out: {bag} is already there; a bag is never overwritten"
+                    f"--out: {bag} already exists; a bag is never overwritten"
                 ) from None
     try:
         yield folder
     finally:
-        with suppress(OSError):  # one is not empty
+        with suppress(OSError):  # not empty
             for made in (folder, *parents):
                 made.rmdir()
 
 
 def chosen_parameters(protocol: Protocol, bag: Path, options: argparse.Namespace) -> Parameters:
-    """Return the parameters of every node as the options ask for them."""
+    """Return the parameters of every node according to the options."""
     chosen = parameters(
         protocol,
         bag,
@@ -227,7 +227,7 @@ def chosen_parameters(protocol: Protocol, bag: Path, options: argparse.Namespace
         sensor=options.sensor,
         toe_off_bias=options.toe_off_bias or 0.0,
     )
-    # What is not said stays as config/nodes.yaml has it.
+    # Everything else stays as in config/nodes.yaml.
     walker = chosen.get(WALKERS[options.walker][0], {})
     if options.sample_rate is not None:
         walker["sample_rate"] = options.sample_rate

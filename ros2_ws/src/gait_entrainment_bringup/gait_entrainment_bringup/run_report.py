@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What came of a run: the outcome, how well time was kept, the figures, read from the bag."""
+"""The report of a run, read from the bag: the outcome, how well time was kept, the figures."""
 
 import json
 from pathlib import Path

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The node ``session``: takes what the operator asks of a session that `entrain session` conducts.
+The node ``session``: takes the operator's requests to a session that `entrain session` conducts.
 
-It is a process of its own, as a process with a ROS context could not fork the blocks. What is
-asked goes into the ledger, where the conductor finds it before the next block; so do notes, which
-nobody else records between two blocks. Its state says how the session stands.
+It is a separate process because a process with a ROS context cannot fork the blocks. Requests go
+into the ledger, where the conductor finds them before the next block; so do notes, which nothing
+else records between two blocks. The node's state reports how the session stands.
 """
 
 import time
@@ -25,7 +25,7 @@ from gait_entrainment_nodes.nodes.participant import Participant
 from gait_entrainment_sessions.folder import SessionFolder
 from gait_entrainment_sessions.session_file import SessionError
 
-# How often the state is looked at anew [s].
+# How often the state is updated [s].
 _PERIOD = 0.5
 
 
@@ -40,7 +40,7 @@ class SessionDesk(Participant):
     """ROS side of a session."""
 
     settings: Settings
-    real_time = False  # it waits for nobody, but its turn does not come before that of others
+    real_time = False  # it waits for no other node, but needs no priority over them
 
     def __init__(self) -> None:
         super().__init__("session", settings=Settings, fixed=settings_of(Settings))
@@ -50,7 +50,7 @@ class SessionDesk(Participant):
             self.create_service(AskSession, f"~/{name}", self._answered(getattr(self, f"_{name}")))
 
     def _answered(self, action: Callable[[str], str]) -> Callable[[Any, Any], Any]:
-        """Return the callback of a service that does an action, or says why not."""
+        """Return a service callback that performs an action, or answers why it cannot."""
 
         def answer(request: AskSession.Request, response: AskSession.Response) -> Any:
             try:
@@ -64,9 +64,9 @@ class SessionDesk(Participant):
 
     def _pause(self, reason: str) -> str:
         if self._folder.paused is not None:
-            raise SessionError("the session is to pause already")
+            raise SessionError("the session is already asked to pause")
         self._folder.note("pause", self._folder.next_block() or 0, text=reason)
-        return "the session waits before its next block"
+        return "the session will wait before its next block"
 
     def _go_on(self, reason: str) -> str:
         if self._folder.paused is None:
@@ -81,11 +81,11 @@ class SessionDesk(Participant):
         self._folder.note("note", self._folder.next_block() or 0, text=note.text)
 
     def next_deadline(self) -> float:
-        """Return when to look at the session."""
+        """Return when to check the session next."""
         return self._due
 
     def on_deadline(self) -> None:
-        """Note how the session stands: a warning while it waits for the operator."""
+        """Report how the session stands: a warning while it waits for the operator."""
         self._due = time.monotonic() + _PERIOD
         waits = self._folder.paused is not None
         level = DiagnosticStatus.WARN if waits else DiagnosticStatus.OK

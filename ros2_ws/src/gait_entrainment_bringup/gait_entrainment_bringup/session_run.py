@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Conducting a session: block after block, each in its own process, with rests between."""
+"""Conduct a session: block after block, each in its own process, with rests between."""
 
 import argparse
 import math
@@ -29,8 +29,8 @@ from gait_entrainment_drivers.proof import preflight_of
 from gait_entrainment_sessions.folder import KEY_HASH, SessionFolder
 from gait_entrainment_sessions.session_file import Session, SessionError
 
-# How often a paused session looks whether it may go on [s].
-_LOOKED = 0.1
+# How often a paused session checks whether it may go on [s].
+_CHECK_PERIOD = 0.1
 
 
 class BlockFailedError(EntrainmentError):
@@ -41,8 +41,8 @@ class SessionRun:
     """
     Conducts what is left of a session.
 
-    Its blocks take place in a ROS ``domain``. ``ask`` gets a question and returns the operator's
-    answer; nobody is asked without a terminal, or where a page is shown instead.
+    Its blocks run in a ROS ``domain``. ``ask`` takes a question and returns the operator's answer;
+    no questions are asked without a terminal, or if a page is shown instead.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class SessionRun:
         self._domain = domain
         self._session, self._folder, self._options = session, folder, options
         self._ask = ask or (input if sys.stdin.isatty() and not options.page else None)
-        # With nobody in the walker's place there is nobody to rest.
+        # In lock-step there is no person who could need a rest.
         self._rests = options.real_time and not options.no_rest
 
     def conduct(self) -> None:
@@ -66,7 +66,7 @@ class SessionRun:
             folder.note("note", text=options.note)
         if options.repeat is not None:
             folder.repeat(options.reason, options.repeat)
-        if folder.paused is not None:  # by whoever has now had it go on
+        if folder.paused is not None:  # by repeating the command
             folder.note("go on", text="resumed")
         rested = not folder.runs()
         while True:
@@ -79,7 +79,7 @@ class SessionRun:
                 rested = True
             elif self._ask and not self._agreed(number):
                 return
-            elif folder.next_block() == number:  # else the one before is to be repeated
+            elif folder.next_block() == number:  # else the block before is to be repeated
                 self._run(number)
                 rested = False
 
@@ -96,7 +96,7 @@ class SessionRun:
             if not word:
                 return True
             if word not in ("p", "r", "n") or not text.strip():
-                print("p REASON pauses, r REASON repeats the block before, n TEXT notes")
+                print("p REASON pauses, r REASON repeats the block before, n TEXT adds a note")
             elif word == "n":
                 self._folder.note("note", number, text=text)
             elif word == "p":
@@ -107,13 +107,13 @@ class SessionRun:
                 return True
 
     def _wait(self) -> None:
-        """Wait until the operator has the session go on."""
-        print(f"{self._folder.standing()}; session/go_on ends it", file=sys.stderr, flush=True)
+        """Wait until the operator lets the session go on."""
+        print(f"{self._folder.standing()}; session/go_on resumes it", file=sys.stderr, flush=True)
         while self._folder.paused is not None:
-            time.sleep(_LOOKED)
+            time.sleep(_CHECK_PERIOD)
 
     def _rest(self, number: int) -> None:
-        """Count the rest before a block down."""
+        """Count down the rest before a block."""
         seconds = self._session.ordered[number - 1].rest
         self._folder.note("rest", number, text=f"{seconds:g} s")
         end = time.monotonic() + seconds
@@ -138,8 +138,8 @@ class SessionRun:
             about[KEY_HASH] = folder.plan["key"]
         if not find_driver(protocol.driver).simulated:
             checked = preflight_of(protocol.driver)
-            told = f"{checked.at}: {checked.failed or 'passed'}" if checked else "none"
-            folder.note("preflight", number, text=told)
+            result = f"{checked.at}: {checked.failed or 'passed'}" if checked else "none"
+            folder.note("preflight", number, text=result)
         folder.note("begun", number, bag.name)
         print(f"block {number} of {len(session.blocks)}     {session.shown(number)}", flush=True)
         bag.mkdir(parents=True)
@@ -147,13 +147,13 @@ class SessionRun:
         if reason:
             folder.note("failed", number, bag.name, reason)
             why, *log = reason.splitlines()
-            told = f"block {number}: {why}; the same command resumes at it"
-            raise BlockFailedError("\n".join([told, *log]))
+            message = f"block {number}: {why}; the same command resumes at this block"
+            raise BlockFailedError("\n".join([message, *log]))
         folder.note("done", number, bag.name)
 
     def _in_a_process(self, protocol: Protocol, bag: Path, about: dict[str, str]) -> str:
         """
-        Conduct a block in a fresh process; return why it failed, an empty text if it did not.
+        Conduct a block in a new process; return why it failed, or an empty text.
 
         A run forks its nodes, which a process can do only before it has had a ROS context.
         """
@@ -165,7 +165,7 @@ class SessionRun:
             protocol,
             bag,
             self._domain,
-            # One page is there for all of them.
+            # There is one page for all blocks.
             options=argparse.Namespace(**vars(self._options) | {"page": False}),
             quiet=self._session.blind,  # a blinded operator does not see where the pulses fall
             about=about,
@@ -188,22 +188,22 @@ class SessionRun:
 
     def _within_dose(self, protocol: Protocol) -> Protocol:
         """
-        Return a protocol whose limits of a whole session are what the blocks before have left.
+        Return a protocol whose limits of a whole session are what the earlier blocks have left.
 
-        Each block has a perturbator of its own, which knows only what it has delivered itself.
+        Each block has its own perturbator, which knows only what it has delivered itself.
         """
-        said, unsaid = protocol.limits, DeviceLimits()
+        limits, defaults = protocol.limits, DeviceLimits()
         bags, ordered = self._folder.path / "bags", self._session.ordered
         begun = {bags / e.bag: int(e.block) for e in self._folder.ledger if e.what == "begun"}
         runs = ((bag, ordered[number - 1].protocol) for bag, number in begun.items())
         given = [piece for bag, of in runs for piece in _delivered(bag, of)]
         pulses, impulse = sum(count for count, _ in given), sum(part for _, part in given)
         lower: dict[str, Any] = {}
-        if said.session_pulses != unsaid.session_pulses:
-            lower["session_pulses"] = max(said.session_pulses - pulses, 0)
-        if said.session_impulse != unsaid.session_impulse:
-            lower["session_impulse"] = max(said.session_impulse - impulse, 0.0)
-        left = replace(protocol, limits=replace(said, **lower))
+        if limits.session_pulses != defaults.session_pulses:
+            lower["session_pulses"] = max(limits.session_pulses - pulses, 0)
+        if limits.session_impulse != defaults.session_impulse:
+            lower["session_impulse"] = max(limits.session_impulse - impulse, 0.0)
+        left = replace(protocol, limits=replace(limits, **lower))
         try:
             left.check_limits()
         except LimitError as error:
@@ -216,28 +216,28 @@ def _delivered(bag: Path, protocol: Protocol) -> list[tuple[int, float]]:
     """
     Return how many pulses began in each profile of a bag, and their impulse [N m s].
 
-    If it cannot be read, as after a crash, every pulse of its protocol counts as delivered.
+    If the bag cannot be read, as after a crash, every pulse of its protocol counts as delivered.
     """
     try:
         with BagReader(bag) as reader:
-            told = [m for m in reader.messages_of(TORQUE_PROFILE) if stop_of(m) is None]
+            messages = [m for m in reader.messages_of(TORQUE_PROFILE) if stop_of(m) is None]
             return [
                 (
-                    len(one.onsets),
-                    sum(abs(t) * (end - begin) / 1e9 for begin, end, t in one.pieces),
+                    len(profile.onsets),
+                    sum(abs(t) * (end - begin) / 1e9 for begin, end, t in profile.pieces),
                 )
-                for one in map(profile_of, told)
+                for profile in map(profile_of, messages)
             ]
     except BagError:
         if not any(bag.glob("*")) and not bag.with_name(f"{bag.name}_unfinished").exists():
-            return []  # nothing had begun
+            return []  # nothing had started
         planned = protocol.planned
         return [(planned.count, planned.count * planned.torque * planned.duration)]
 
 
 def _conduct(parent: int, answer: Any, keyboard: int, conduct: Callable[..., None]) -> None:
-    """Conduct one block in a process of its own; tell the parent how it ended."""
-    os.dup2(keyboard, 0)  # the space bar stops
+    """Conduct one block in this child process; send the parent the reason if it failed."""
+    os.dup2(keyboard, 0)  # so that the space bar stops the run
     end_once()
     reason = ""
     try:

@@ -4,8 +4,8 @@
 """
 The processes of a run: started together, watched, and stopped together, torque first.
 
-Each process writes a log of its own. If one ends early or falls silent, the error names
-it and quotes the end of its log; the others are stopped within five seconds.
+Each process writes its own log. If one ends early or falls silent, the error names it and quotes
+the end of its log; the others are stopped within five seconds.
 """
 
 import os
@@ -60,7 +60,7 @@ class Supervisor:
         return {node: code for node, code in codes.items() if code is not None}
 
     def check(self, may_end: Collection[str]) -> dict[str, int]:
-        """Return ``ended``; NodeError if one has failed, or is not one that may end."""
+        """Return ``ended``; NodeError if one has failed, or has ended without being allowed to."""
         ended = self.ended()
         for node, code in ended.items():
             if node in self._onlookers:
@@ -80,22 +80,22 @@ class Supervisor:
             raise NodeError("bag_recorder did not complete the record", "bag_recorder")
 
     def request_stop(self, nodes: Iterable[str]) -> None:
-        """Ask processes to stop, by SIGTERM, without waiting for them."""
+        """Send SIGTERM to processes without waiting for them to end."""
         for node in nodes:
             process = self._processes.get(node)
             if process is not None and process.is_alive():
                 process.terminate()
                 with suppress(ProcessLookupError):  # it may have ended by now
-                    # A suspended process can only obey once it goes on.
+                    # A suspended process can only obey once it continues.
                     os.kill(process.pid or 0, signal.SIGCONT)
 
     def stop(self, order: Sequence[str]) -> list[str]:
         """
-        Stop what still runs: SIGTERM in order, SIGKILL for what does not obey.
+        Stop what is still running: SIGTERM in order, SIGKILL for what does not obey.
 
-        The first has ended before the next are asked, which end side by side; then the last is
-        asked. Returns the nodes that had to be killed. Another Ctrl-C meanwhile changes nothing:
-        it would leave a recorder at work on a bag that this process believes to be abandoned.
+        The first one ends before the next ones are asked, which end in parallel; then the last
+        one is asked. Returns the nodes that had to be killed. Another Ctrl-C in the meantime is
+        ignored: it would leave a recorder writing a bag that this process considers abandoned.
         """
         ended = self.ended()
         running = [node for node in order if node in self._processes and node not in ended]
@@ -130,11 +130,11 @@ def supervised(
     real_time: bool = False,
 ) -> Iterator[Supervisor]:
     """
-    Give a supervisor of processes in a ROS domain, and stop these in order at the end.
+    Yield a supervisor of processes in a ROS domain, and stop them in order at the end.
 
     They are forked: start them before anything that starts a thread, such as a ROS client.
-    What fails or is interrupted meanwhile becomes a NodeError: the reason, what ``remains`` says
-    once everything has stopped, and the end of the log of the node to blame.
+    A failure or an interruption becomes a NodeError with the reason, what ``remains`` returns
+    once everything has stopped, and the end of the blamed node's log.
     """
     environment = set_environment(domain, real_time=real_time)
     load()

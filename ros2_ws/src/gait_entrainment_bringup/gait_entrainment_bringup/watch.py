@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""While a client waits: which nodes have ended early, and which have fallen silent."""
+"""Watch, while a client waits, for nodes that end early or fall silent."""
 
 import time
 from collections.abc import Collection
@@ -16,11 +16,11 @@ from gait_entrainment_nodes.nodes.waiting import HELD_UP
 
 class Watch:
     """
-    Called in each round of a client, ends its waiting by a NodeError that names the culprit.
+    Called in each round of a client; ends its wait with a NodeError that names the culprit.
 
-    Of the supervisor's processes only those that ``may_end`` end by themselves. Nodes that are
-    ``asked`` for signs of life may owe one for a time of ``silence`` [s], once they have answered;
-    they are asked six times as often. ``silence`` may be changed at any time.
+    Only those of the supervisor's processes in ``may_end`` may end by themselves. Nodes in
+    ``asked`` are asked for a sign of life six times per ``silence`` [s]; once they have answered,
+    they may be silent for that long. ``silence`` may be changed at any time.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class Watch:
         self._looked_at = self._since = time.monotonic()
 
     def __call__(self) -> None:
-        """Look once."""
+        """Check once."""
         ended = self._supervisor.check(self._may_end)
         now = time.monotonic()
         if now - self._looked_at > HELD_UP * self.silence:

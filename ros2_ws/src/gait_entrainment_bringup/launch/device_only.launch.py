@@ -4,9 +4,9 @@
 """
 Perturbator and gait analyzer, for a real walker with real sensors.
 
-The sensors publish `gait_events`; pulses are asked for by `perturbator/deliver_pulse_train` and
-promised by `experiment/horizon`, see docs/launch.md. The launch file brings the perturbator up,
-and ends with exit code 1 if that fails or one of the nodes ends.
+The sensors publish `gait_events`; pulses are requested through `perturbator/deliver_pulse_train`
+and promised by `experiment/horizon`, see docs/launch.md. The launch file brings up the
+perturbator, and ends with exit code 1 if that fails or if one of the nodes ends.
 """
 
 import math
@@ -27,10 +27,10 @@ TRANSITIONS = {
 
 
 def nodes(context: LaunchContext) -> list[Action]:
-    """Make the nodes, and bring the perturbator up meanwhile."""
+    """Make the nodes, and bring up the perturbator in the background."""
     namespace, driver = (shared.value(context, name) for name in ("namespace", "driver"))
     side = shared.choice(context, "side", "left", "right")
-    find_driver(driver)  # which one there is not is told before a node is started
+    find_driver(driver)  # an unknown driver is reported before a node is started
     arming = {"armed": "arm", "unproved": "unproved"}
     given = {"side": side, "driver": driver}
     given |= {name: shared.is_true(context, argument) for name, argument in arming.items()}
@@ -61,8 +61,8 @@ def generate_launch_description() -> LaunchDescription:
         nodes,
         ("driver", None, "ankle robot: NAME or NAME:OPTION=VALUE,... (entrain driver list)"),
         ("side", "right", "ankle on which the robot sits: left or right"),
-        ("arm", "false", "let a real ankle robot deliver torque at once: see safety.md"),
-        ("unproved", "false", "even one whose own watchdog was not proved on this computer"),
+        ("arm", "false", "let a real ankle robot deliver torque right away: see safety.md"),
+        ("unproved", "false", "even if its own watchdog was not proved on this computer"),
         shared.NAMESPACE,
         shared.PARAMETERS_FILE,
     )

@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Conduct one protocol over the nodes and record it: `entrain run` as a launch file.
+Conduct one protocol with the nodes and record it: `entrain run` as a launch file.
 
-Nodes and parameters are those of `entrain run`. The experiment brings the perturbator up, and the
+Nodes and parameters are those of `entrain run`. The experiment brings up the perturbator, and the
 launch ends with the experiment: exit code 0 and the outcome once it is over and recorded, 1 if it
-failed. What would make it fail from the first is found before a node is started. Somebody else
-may record it, with a delay in which he finds the topics (docs/bags.md).
+failed. Whatever would make it fail from the start is reported before a node is started. Another
+program may record it, after a delay in which that program finds the topics (docs/bags.md).
 """
 
 from pathlib import Path
@@ -33,7 +33,7 @@ DELAY = Setting("from the start of the other nodes to that of the experiment", f
 
 
 def nodes(context: LaunchContext) -> list[Action]:
-    """Make the nodes once the arguments are known: the protocol says what they are given."""
+    """Make the nodes once the arguments are known: their parameters depend on the protocol."""
     protocol = read_protocol(shared.value(context, "protocol") or None, to_run=True)
     real_time = shared.is_true(context, "real_time")
     arming = {"armed": "arm", "unproved": "unproved"}
@@ -46,7 +46,7 @@ def nodes(context: LaunchContext) -> list[Action]:
         bag = Path(shared.value(context, "bag") or bag_folder(protocol)).absolute()
         check_output(bag, "bag")
     elif shared.value(context, "bag"):
-        raise shared.LaunchError("bag: there is none with recorder:=none; leave one of them out")
+        raise shared.LaunchError("bag: not recorded with recorder:=none; leave one of them out")
     check_robot(protocol, real_time=real_time, **switches)
     walking = {
         "walker": shared.choice(context, "walker", *WALKERS),
@@ -81,14 +81,14 @@ def generate_launch_description() -> LaunchDescription:
     return shared.description(
         nodes,
         ("protocol", "", "protocol file (YAML); empty: the paper's example"),
-        ("real_time", "false", "at the pace of the wall clock, not in lock-step"),
-        ("arm", "false", "let a real ankle robot deliver torque at once: see safety.md"),
-        ("unproved", "false", "even one whose own watchdog was not proved on this computer"),
+        ("real_time", "false", "run at the pace of the wall clock, not in lock-step"),
+        ("arm", "false", "let a real ankle robot deliver torque right away: see safety.md"),
+        ("unproved", "false", "even if its own watchdog was not proved on this computer"),
         ("walker", "simulated", "who walks: simulated, sensed (through sensors) or person"),
-        ("detector", DETECTOR, "what finds the events of a walker who is not simulated"),
-        ("onset", "commanded", "when the analyzer takes a pulse to begin: or measured"),
-        ("recorder", RECORDER, "or none: somebody else records, such as ros2 bag record"),
-        ("start_delay", "0", "seconds in which another recorder finds topics, before the run"),
+        ("detector", DETECTOR, "what finds the gait events of a sensed walker or a person"),
+        ("onset", "commanded", "onset of a pulse for the analyzer: commanded or measured"),
+        ("recorder", RECORDER, "or none: another program records, such as ros2 bag record"),
+        ("start_delay", "0", "seconds before the run in which another recorder finds the topics"),
         ("bag", "", "folder of the bag; empty: bags/<time>_<name>"),
         shared.NAMESPACE,
         shared.PARAMETERS_FILE,

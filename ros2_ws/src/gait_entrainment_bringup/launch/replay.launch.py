@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Play a bag to the gait analyzer, at the pace of the record or as fast as it goes.
+Play a bag to the gait analyzer, at the pace of the record or as fast as possible.
 
-The launch ends once the bag is played and the analyzer has published all that it makes of it.
+The launch ends once the bag has been played and the analyzer has published all its results.
 """
 
 import math
@@ -24,7 +24,7 @@ RATE = Setting("seconds of the bag per second", least=0)
 
 
 def nodes(context: LaunchContext) -> list[Action]:
-    """Make the nodes once the arguments are known: the bag says what they are given."""
+    """Make the nodes once the arguments are known: their parameters depend on the bag."""
     chosen = shared.value(context, "namespace")
     into = shared.full_namespace(context, chosen) if chosen else None
     namespace, given = replay_parameters(Path(shared.value(context, "bag")), into)
@@ -34,13 +34,13 @@ def nodes(context: LaunchContext) -> list[Action]:
     made = [shared.make_node(context, name, place, given[name]) for name in REPLAY_NODES]
 
     def finish(client: Client) -> None:
-        """Let the analyzer publish its last word, then end the launch."""
+        """Let the analyzer publish its last results, then end the launch."""
         client.call(Trigger, f"{namespace}/gait_analyzer/finish", timeout=math.inf)
         over = Shutdown(reason="the bag is played and analyzed")
         context.asyncio_loop.call_soon_threadsafe(context.emit_event_sync, over)
 
-    last_word = OpaqueFunction(function=shared.in_background, args=[finish])
-    ending = shared.ended_by(made, {"bag_player"}, [last_word])
+    finishing = OpaqueFunction(function=shared.in_background, args=[finish])
+    ending = shared.ended_by(made, {"bag_player"}, [finishing])
     seen = [*shared.rviz(context, place, given), *shared.page(context, place, given)]
     return [*ending, *seen, *made]
 
@@ -50,8 +50,8 @@ def generate_launch_description() -> LaunchDescription:
     return shared.description(
         nodes,
         ("bag", None, "bag to play: a folder or an .mcap file"),
-        ("rate", "", "seconds of the bag per second; 0: as fast as it goes; empty: 1"),
-        ("namespace", "", "to play into; empty: the one that was recorded"),
+        ("rate", "", "seconds of the bag per second; 0: as fast as possible; empty: 1"),
+        ("namespace", "", "to play into; empty: the recorded one"),
         shared.PARAMETERS_FILE,
         shared.RVIZ,
         shared.SHOW_PAGE,

@@ -42,4 +42,4 @@ def test_without_a_browser_the_address_is_told(monkeypatch, capsys):
         port = listener.getsockname()[1]
         page.open_browser("127.0.0.1", port)
     address = f"http://127.0.0.1:{port}/?token=letmeactnow"
-    assert capsys.readouterr().err.endswith(f"no browser is found: open {address} in one\n")
+    assert capsys.readouterr().err.endswith(f"no browser was found: open {address} in one\n")

@@ -126,7 +126,7 @@ def test_the_end_of_the_input_is_a_pause(conduct, monkeypatch):
 
 
 def test_a_block_that_fails_ends_the_session_and_is_the_next(conduct):
-    told = r"block 2: it fell; the same command resumes at it\n  walker_sim\| more"
+    told = r"block 2: it fell; the same command resumes at this block\n  walker_sim\| more"
     with pytest.raises(BlockFailedError, match=told):
         conduct(ends=["", "it fell\n  walker_sim| more"])
     folder = conduct()

@@ -18,15 +18,15 @@ from gait_entrainment_nodes.messaging.environment import PACKAGE, set_environmen
 
 DESCRIPTION = (
     "Run one node with the parameters that follow from the protocol and the options. The "
-    "experiment conducts the protocol at once; bag_recorder ends by itself once the record is "
+    "experiment conducts the protocol right away; bag_recorder ends by itself once the record is "
     "complete; the others run until they are stopped."
 )
 EXAMPLES = """examples:
-  ROS_DOMAIN_ID=42 entrain node walker_sim               here, the rest on another host, which has
+  ROS_DOMAIN_ID=42 entrain node walker_sim               here; the rest on another host, by
   ROS_DOMAIN_ID=42 entrain run --elsewhere walker_sim
-  entrain node experiment protocol.yaml                  conducts it, and ends with it
+  entrain node experiment protocol.yaml                  conducts it, then ends
 
-Each node is given what entrain run would give it: give every one the same protocol and options.
+Each node gets what entrain run would give it: give all of them the same protocol and options.
 """
 
 
@@ -46,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
     given = chosen_parameters(protocol, bag, options)
     given["experiment"]["protocol"] = write_protocol(protocol)
     if options.node not in given:
-        raise UsageError(f"NODE: {options.node} takes no part with --walker {options.walker}")
+        raise UsageError(f"NODE: {options.node} is not used with --walker {options.walker}")
     with tempfile.TemporaryDirectory(prefix="entrain_") as folder:
         arguments = parameter_arguments({options.node: given[options.node]}, Path(folder))
         sys.argv = [options.node, *arguments]

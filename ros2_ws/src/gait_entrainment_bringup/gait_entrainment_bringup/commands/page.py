@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""entrain page: what a run does, in a browser, with a stop that works."""
+"""entrain page: a run in a browser, with a stop that works."""
 
 import argparse
 import importlib
@@ -32,13 +32,13 @@ from gait_entrainment_sessions.runs import is_sealed
 DESCRIPTION = (
     "Show a live run, a replay or a recorded bag in a browser, and let the operator act: "
     "preflight, start, arm, note, stop. The other options are those of the run that it may start."
-    " No substitute for a switch in the hand: see docs/safety.md."
+    " It is no substitute for a hand-held switch: see docs/safety.md."
 )
 EXAMPLES = """examples:
   entrain page protocol.yaml --real-time        then start the run from the page
   entrain page --session session.yaml --real-time      the same with a session
-  entrain page --bag bags/paper_example         a recorded bag, at any instant of it
-  ROS_DOMAIN_ID=42 entrain page                 beside a run or a replay in that domain
+  entrain page --bag bags/paper_example         a recorded bag, at any time in it
+  ROS_DOMAIN_ID=42 entrain page                 alongside a run or a replay in that domain
   entrain run --real-time --page                a run with its page
   entrain page --host 0.0.0.0                   for a tablet: with tokens, to act and to look on
 """
@@ -72,8 +72,8 @@ def run(options: argparse.Namespace) -> int:
     set_environment(domain, real_time=options.real_time)
     given |= {"command": run_words(options), "record": str(Path.cwd()), "use_sim_time": False}
     if options.open:
-        told = (options.host, given["port"])
-        threading.Thread(target=open_browser, args=told, daemon=True).start()
+        address = (options.host, given["port"])
+        threading.Thread(target=open_browser, args=address, daemon=True).start()
     with tempfile.TemporaryDirectory(prefix="entrain_") as folder:
         sys.argv = [PAGE, *parameter_arguments({PAGE: given}, Path(folder))]
         return int(importlib.import_module(f"gait_entrainment_page.{PAGE}").main())
@@ -120,8 +120,8 @@ def run_words(options: argparse.Namespace) -> list[str]:
 
 
 def open_browser(host: str, port: int) -> None:
-    """Open the page in a browser once it is served; say so if there is none."""
-    *_, (_, address) = Access.of_environment(host).addresses(port)  # the last is the one to act
+    """Open the page in a browser once it is served; report it if there is no browser."""
+    *_, (_, address) = Access.of_environment(host).addresses(port)  # the last one is for acting
     while True:
         try:
             socket.create_connection((urlsplit(address).hostname, port), 1.0).close()
@@ -129,4 +129,4 @@ def open_browser(host: str, port: int) -> None:
         except OSError:
             time.sleep(0.1)
     if not webbrowser.open(address):
-        print(f"entrain page: no browser is found: open {address} in one", file=sys.stderr)
+        print(f"entrain page: no browser was found: open {address} in one", file=sys.stderr)

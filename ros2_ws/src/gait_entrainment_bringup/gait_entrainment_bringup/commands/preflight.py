@@ -25,10 +25,10 @@ DESCRIPTION = (
     "Go through the checklist before a session: what the protocol asks for and what limits it, the"
     " device's own watchdog, the stop, the loop that times the torque, the record, the clocks of"
     " other hosts. The robot is enabled at zero torque; no pulse is delivered. The result is"
-    " remembered on this computer for this driver, and each bag says what it was."
+    " remembered on this computer for this driver, and recorded in each bag."
 )
 EXAMPLES = """examples:
-  entrain preflight my_protocol.yaml --arm       then press the stop, when asked to
+  entrain preflight my_protocol.yaml --arm       then press the stop when asked to
   entrain preflight my_protocol.yaml --arm --elsewhere walker_sim
 """
 
@@ -41,7 +41,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         action="append",
         metavar="NODE",
         default=[],
-        help="compare the clock of this node's host, on which it runs already; repeatable",
+        help="compare the clock of the host on which this node already runs; repeatable",
     )
     parser.add_argument("--session", action="store_true", help=SESSION_FILE)
     parser.add_argument("--timeout", default="60", help=f"{_TIMEOUT.meaning} [s] (60)")
@@ -49,14 +49,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Go through the checklist; 1 if a point of it fails."""
+    """Go through the checklist; return 1 if a point fails."""
     timeout = _TIMEOUT.parse("--timeout", options.timeout)
-    options.real_time = options.unproved = True  # a lacking proof is a point that fails
+    options.real_time = options.unproved = True  # a missing proof is a failed point
     if options.session:
         session = checked_session(options.protocol, options)
-        # The limits are the person's, so the highest pulses stand for all.
+        # The limits are the person's, so the block with the highest pulses represents all.
         blocks = [block.protocol for block in session.blocks]
-        protocol = max(blocks, key=lambda one: abs(one.pulse_torque))
+        protocol = max(blocks, key=lambda block: abs(block.pulse_torque))
         bag = options.out or Path("sessions")
     else:
         protocol, bag = checked_run(options)

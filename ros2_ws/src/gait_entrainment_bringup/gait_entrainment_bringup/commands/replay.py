@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""entrain replay: a bag played to the gait analyzer, its results compared with the recorded."""
+"""entrain replay: play a bag to the gait analyzer and compare its results with the recorded."""
 
 import argparse
 import json
@@ -19,14 +19,14 @@ from gait_entrainment_bringup.supervisor import supervised
 from gait_entrainment_commands.outcome import outcome_of, summary
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 
-DESCRIPTION = "Play a bag to the gait analyzer, and compare with what was recorded live."
+DESCRIPTION = "Play a bag to the gait analyzer and compare its results with those recorded live."
 EXAMPLES = """examples:
   entrain replay bags/paper_example              as fast as the analyzer takes it
   entrain replay bags/paper_example --rate 1     at the pace of the record, to watch it in RViz
   entrain replay bags/mine --out bags/again      records the replay, with the new results
   ROS_DOMAIN_ID=42 entrain replay bags/mine --rate 2
 
-Exit code 1 if the results differ from those that were recorded, or the replay failed.
+Exit code 1 if the results differ from those that were recorded, or if the replay failed.
 """
 STOP_ORDER = ("bag_player", "gait_analyzer", "bag_recorder")
 _RATE = Setting("seconds of the bag per second", least=0, least_excluded=True)
@@ -43,7 +43,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Replay and print; 1 if the results differ."""
+    """Replay and print; return 1 if the results differ."""
     if not options.bag.exists():
         raise UsageError(f"{options.bag}: no such file or folder")
     if not is_utf8(options.bag):
@@ -69,7 +69,7 @@ def replay(options: argparse.Namespace, domain: int) -> dict[str, list[bytes]]:
         for node in STOP_ORDER:
             if node in given:
                 supervisor.start(node, arguments)
-        # Not at the top: it loads ROS, and a mistake in the options is answered without.
+        # Not at the top: it loads ROS, and errors in the options are reported without it.
         from gait_entrainment_bringup.replay_client import ReplayClient
 
         recorded = options.out is not None
@@ -84,7 +84,7 @@ def replay(options: argparse.Namespace, domain: int) -> dict[str, list[bytes]]:
 def report(
     options: argparse.Namespace, recorded: RecordedRun, results: dict[str, list[bytes]]
 ) -> int:
-    """Print what came of the replay, and how it compares with the record."""
+    """Print the outcome of the replay, and how it compares with the record."""
     compared = differences(options.bag, results)
     differing = [difference for difference in compared.values() if difference]
     names = ("strides", "pulse phases", "verdicts")
@@ -108,8 +108,8 @@ def report(
 
 
 def differences(path: Path, results: dict[str, list[bytes]]) -> dict[str, str]:
-    """Return how results differ from those in a bag, "" for not at all, by recorded topic."""
-    # Here, since it loads ROS.
+    """Return how results differ from those in a bag, "" if not at all, by recorded topic."""
+    # Not at the top: it loads ROS.
     from gait_entrainment_nodes.messaging.older_messages import converter_of
 
     differing = {}
@@ -122,12 +122,12 @@ def differences(path: Path, results: dict[str, list[bytes]]) -> dict[str, str]:
             recorded = bag.topics[name]
             convert = None
             if recorded.type_hash != find_definition(recorded.type).type_hash:
-                convert = converter_of(recorded)  # by an earlier version
+                convert = converter_of(recorded)  # from an earlier version
             live = [convert(message.data) if convert else message.data for message in found]
             differing[topic] = ""
-            for number, (one, other) in enumerate(zip(live, again, strict=False), start=1):
-                if one != other:
-                    differing[topic] = f"{topic}: message {number} is another"
+            for number, (old, new) in enumerate(zip(live, again, strict=False), start=1):
+                if old != new:
+                    differing[topic] = f"{topic}: message {number} differs"
                     break
             else:
                 if len(live) != len(again):

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""entrain run: the nodes as processes, one protocol conducted, the run recorded."""
+"""entrain run: start the nodes as processes, conduct one protocol, record the run."""
 
 import argparse
 import importlib
@@ -49,10 +49,10 @@ EXAMPLES = """examples:
   entrain run --real-time --page       with the operator's page (docs/page.md)
   ROS_DOMAIN_ID=42 entrain run --elsewhere walker_sim     it runs on another host: docs/hosts.md
 """
-# Nodes that may run on another host. Not those that hold the torque and the record: Ctrl-C must
-# reach them without a network.
+# Nodes that may run on another host. Not those responsible for the torque and the record: Ctrl-C
+# must reach them without a network.
 DETACHABLE = ("walker_sim", "sensor_sim", "gait_detector", "gait_analyzer")
-# Whoever plays the walker: a program that is no node of this project (docs/person.md).
+# The walker's role, if a program that is no node of this project plays it (docs/person.md).
 ROLE = "walker"
 # What the end of a run needs, loaded while the walker walks.
 REPORT = "gait_entrainment_bringup.run_report"
@@ -68,24 +68,24 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def add_node_options(parser: argparse.ArgumentParser) -> None:
-    """Add which nodes are not started here, and the page."""
+    """Add the options for nodes that are not started here, and for the page."""
     parser.add_argument(
         "--elsewhere",
         action="append",
         choices=(*DETACHABLE, ROLE),
         default=[],
-        help="do not start this node: it runs on another host (entrain node); walker: a source of "
-        "events of your own; repeatable",
+        help="do not start this node: it runs on another host (entrain node); walker: your own "
+        "source of events; repeatable",
     )
     parser.add_argument("--page", action="store_true", help="show the run in a browser")
     add_page_options(parser)
 
 
 def check_nodes(options: argparse.Namespace, protocol: Protocol) -> None:
-    """Raise UsageError if nodes elsewhere could not be found, or a page not be shown."""
+    """Raise UsageError if nodes elsewhere could not be found, or the page could not be shown."""
     if options.elsewhere and "ROS_DOMAIN_ID" not in os.environ:
         raise UsageError("--elsewhere: set ROS_DOMAIN_ID, to the same number on every host")
-    check_heartbeat(options, protocol)  # of a page that may have been started before
+    check_heartbeat(options, protocol)  # the page may have been started before
     options.page_parameters = checked_page(options, protocol) if options.page else {}
 
 
@@ -121,7 +121,7 @@ def run_experiment(
     """
     Start the nodes, conduct the protocol, stop the nodes.
 
-    The bag keeps ``about`` beside what it says of every run.
+    The bag keeps ``about`` in addition to what it holds for every run.
     """
     with (
         closing(StopListener(RUN_CLIENT)) as early,
@@ -131,7 +131,7 @@ def run_experiment(
     ):
         given = chosen_parameters(protocol, bag, options)
         nodes, elsewhere = nodes_for(options.walker), {*options.elsewhere}
-        if ROLE in elsewhere:  # nothing is asked of it but the role
+        if ROLE in elsewhere:  # it only has to play the role
             player = given["experiment"]["walker"]
             given["experiment"]["participants"].remove(player)
             given["bag_recorder"]["publishers"].remove(player)
@@ -147,7 +147,7 @@ def run_experiment(
                 supervisor.start(node, arguments)
         if options.page:
             start_page(supervisor, arguments, options)
-        # Not at the top: it loads ROS, and a mistake in the options is answered without.
+        # Not at the top: it loads ROS, and errors in the options are reported without it.
         from gait_entrainment_bringup.run_client import SILENCE_TIMEOUT, conduct
 
         real = not find_driver(protocol.driver).simulated
@@ -162,7 +162,7 @@ def run_experiment(
             early=early,
         )
         supervisor.wait_for_record()
-        # No torque is left and the record is closed: in which order the rest ends does not matter.
+        # There is no torque any more and the record is closed: the rest may end in any order.
         supervisor.request_stop(nodes)
         (bag / "protocol.yaml").write_text(write_protocol(protocol))
         if once_recorded:
@@ -172,7 +172,7 @@ def run_experiment(
 def start_page(
     supervisor: Supervisor, arguments: Sequence[str], options: argparse.Namespace
 ) -> None:
-    """Start the operator's page, and tell where it is: its own words go to its log."""
+    """Start the operator's page and print its address, since its own output goes to its log."""
     supervisor.start(PAGE, arguments, "gait_entrainment_page")
     Access.of_environment(options.host).tell(options.page_parameters["port"])
 
@@ -188,7 +188,7 @@ def load_report(figures: bool) -> None:
     modules = (REPORT, *DRAWING) if figures else (REPORT,)
 
     def load() -> None:
-        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))  # this thread has time
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))  # not urgent
         for module in modules:
             importlib.import_module(module)
 
@@ -197,11 +197,11 @@ def load_report(figures: bool) -> None:
 
 def kept(bag: Path) -> str:
     """
-    Make what is left of a failed run readable, and say where it is.
+    Make what is left of a failed run readable; return a message that says where it is.
 
-    A recorder that was killed could not close the bag; what reached the file is rescued.
+    A recorder that was killed could not close the bag; what reached the file is recovered.
     """
-    if not any(bag.glob("*")):  # nor is there a folder if the disk was full
+    if not any(bag.glob("*")):  # if the disk was full, there is not even a folder
         return ""
     try:
         BagReader(bag).close()
@@ -212,6 +212,6 @@ def kept(bag: Path) -> str:
             recover(damaged, bag)
             shutil.rmtree(damaged)
         except (BagError, OSError) as error:
-            return f"; the bag was not closed and could not be rescued: {error}"
-        return f"; the bag was not closed, what could be rescued of it is {bag}"
+            return f"; the bag was not closed and could not be recovered: {error}"
+        return f"; the bag was not closed; what could be recovered is in {bag}"
     return f"; the bag of the run so far is {bag}"

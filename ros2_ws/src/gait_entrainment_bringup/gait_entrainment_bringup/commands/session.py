@@ -24,38 +24,38 @@ from gait_entrainment_sessions.tables import FORMATS, write_tables
 
 DESCRIPTION = (
     "Conduct the blocks of a session file, with rests between them, into one folder. The same "
-    "command resumes a session that was paused or broke off, at the block where it stopped; "
+    "command resumes a session that was paused or interrupted, at the block where it stopped; "
     "nothing is overwritten. At a terminal it asks before each block: Enter goes on, p REASON "
-    "pauses, r REASON repeats the block before, n TEXT notes something. With --page it is asked "
-    "there instead."
+    "pauses, r REASON repeats the block before, n TEXT adds a note. With --page this is done on "
+    "the page instead."
 )
 EXAMPLES = """examples:
-  entrain session session.yaml                 simulated, as fast as it goes: no rest is waited for
+  entrain session session.yaml                 simulated, as fast as possible, without rests
   entrain session session.yaml --real-time --arm
-  entrain session session.yaml --real-time --arm-later --page     pauses, repeats, arms from there
+  entrain session session.yaml --real-time --arm-later --page     pause, repeat and arm from there
   entrain session session.yaml --repeat 2 --reason "the treadmill stopped"
   entrain session unblind STUDY/sub-P01/ses-1  break the seal of a blinded session
-  entrain session export STUDY --out tables --format parquet    of all its sessions together
+  entrain session export STUDY --out tables --format parquet    all its sessions together
 """
 DESK = "session_desk"
-_ACTIONS = {"unblind": "break the seal", "export": "write tables over all runs in a folder"}
+_ACTIONS = {"unblind": "break the seal", "export": "write tables of all runs in a folder"}
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    told = "; ".join(f"{name}: {purpose}" for name, purpose in _ACTIONS.items())
-    parser.add_argument("action", nargs="?", choices=_ACTIONS, help=told)
+    text = "; ".join(f"{name}: {purpose}" for name, purpose in _ACTIONS.items())
+    parser.add_argument("action", nargs="?", choices=_ACTIONS, help=text)
     parser.add_argument(
-        "path", type=Path, metavar="SESSION.yaml", help="with an action a folder instead"
+        "path", type=Path, metavar="SESSION.yaml", help="with an action: a folder instead"
     )
     add_conduct_options(parser, "folder of the study, or of the tables; default sessions/<study>")
     add_node_options(parser)
     parser.add_argument("--repeat", type=int, metavar="BLOCK", help="repeat a block, from 1")
-    parser.add_argument("--reason", default="", help="why, for the ledger")
-    parser.add_argument("--note", default="", metavar="TEXT", help="write it into the ledger")
+    parser.add_argument("--reason", default="", help="why to repeat it, for the ledger")
+    parser.add_argument("--note", default="", metavar="TEXT", help="write this into the ledger")
     parser.add_argument("--no-rest", action="store_true", help="do not wait between blocks")
     parser.add_argument(
-        "--format", choices=FORMATS, default="tsv", help="of an export; default tsv"
+        "--format", choices=FORMATS, default="tsv", help="format of an export; default tsv"
     )
 
 
@@ -77,8 +77,8 @@ def run(options: argparse.Namespace) -> int:
 
 @contextmanager
 def _at_hand(folder: SessionFolder, domain: int, options: argparse.Namespace) -> Iterator[None]:
-    """Have the operator's side of a session in its domain: what takes requests, and the page."""
-    # Not as the process is named: its services are to be `session/pause` and the like.
+    """Run the operator's side of a session in its domain: the node `session`, and the page."""
+    # Not the name of the process: its services are to be `session/pause` and the like.
     given: Parameters = {"session": {"folder": str(folder.path.absolute())}}
     if options.page:
         given[PAGE] = {"record": str(folder.path), "use_sim_time": not options.real_time}
@@ -92,7 +92,7 @@ def _at_hand(folder: SessionFolder, domain: int, options: argparse.Namespace) ->
 
 
 def _conduct(session: Session, options: argparse.Namespace) -> int:
-    options.blinded |= session.blind  # what a page shows, too
+    options.blinded |= session.blind  # so that a page hides the condition too
     check_nodes(options, session.blocks[0].protocol)
     if options.repeat is not None and not options.reason:
         raise UsageError("--reason: missing; a repetition needs one")
@@ -103,7 +103,7 @@ def _conduct(session: Session, options: argparse.Namespace) -> int:
             with _at_hand(folder, domain, options):
                 SessionRun(session, folder, options, domain).conduct()
         except BaseException:
-            with suppress(BagError, OSError):  # why it ended is what counts
+            with suppress(BagError, OSError):  # the reason why it ended is what counts
                 _complete(folder)
             raise
         tables = _complete(folder)
