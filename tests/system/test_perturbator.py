@@ -109,10 +109,10 @@ def test_a_stranger_gets_no_pulses_that_are_not_of_the_protocol(tmp_path):
         conductor = Conductor(nodes)
         conductor.promise(0, 2)
         for changes, words in (
-            ({"torque": 5.1}, "torque: 5.1 is not of the protocol's pulses; allowed: at most 5"),
+            ({"torque": 5.1}, "torque: 5.1 exceeds the protocol's pulses; allowed: at most 5"),
             ({"torque": -5.1}, "torque"),
-            ({"duration": 0.21}, "duration: 0.21 is not of the protocol's"),
-            ({"count": 11}, "count: 11 is not"),
+            ({"duration": 0.21}, "duration: 0.21 exceeds the protocol's"),
+            ({"count": 11}, "count: 11 exceeds"),
             ({"count": 0}, "count: 0; allowed: 1 to 10000 at a time"),
             ({"key": "a stranger's"}, "key: not that of the run"),
         ):

@@ -35,7 +35,7 @@ def test_stop_from_the_command_line_ends_a_run(tmp_path):
         assert code == 0, out + err
         assert re.search(r"perturbator/\d+: the stop is latched", out)
         assert run.wait() == 1
-        assert "stopped: The stop was called." in run.text
+        assert "stopped: A stop was requested." in run.text
 
 
 def test_a_stop_is_not_forgotten_before_there_is_a_robot(tmp_path):

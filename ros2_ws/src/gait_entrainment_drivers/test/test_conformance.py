@@ -123,7 +123,7 @@ def test_a_driver_that_cannot_fall_silent_proves_nothing():
 
     driver = Driver("unprovable", Unprovable, MisbehavingOptions(rate=250.0, lateness=0.5))
     result = run_check(checks.silent_host, DriverBench(driver))
-    assert result.broken.startswith("not provable: this driver cannot let its host fall silent")
+    assert result.broken.startswith("not provable: this driver cannot silence its host")
 
 
 def test_a_simulated_robot_has_nothing_to_prove(capsys):

@@ -4,11 +4,11 @@
 r"""
 Ankle robot drivers by name, loaded only when chosen.
 
-A text names a driver, NAME or NAME:OPTION=VALUE,OPTION=VALUE, in the same way everywhere: in a
-protocol, on the command line, as a parameter of the perturbator. A value may contain anything; of
-a comma in it, and of a backslash before a comma or a backslash, ``\,`` and ``\\`` are written.
+A driver is written as NAME or NAME:OPTION=VALUE,OPTION=VALUE, with the same syntax everywhere: in
+a protocol, on the command line, as a parameter of the perturbator. A value may contain anything;
+write ``\,`` for a comma, and ``\\`` for a backslash before a comma or another backslash.
 An option of the robot on one ankle is written left.OPTION=VALUE or right.OPTION=VALUE.
-Drivers of other packages are found under the entry point ``gait_entrainment.drivers``.
+Other packages register drivers under the entry point ``gait_entrainment.drivers``.
 """
 
 import re
@@ -26,7 +26,7 @@ from gait_entrainment.robot.limits import DeviceLimits, Dose
 from gait_entrainment.settings import SettingError, settings_of
 
 ENTRY_POINTS = "gait_entrainment.drivers"
-# The simulated ones are named here, so that a simulation need not search all packages first.
+# The simulated drivers are listed here, so that a simulation need not search all packages.
 OWN_DRIVERS = {
     "ideal": "gait_entrainment.robot.ideal:IdealAnkleRobot",
     "emulated": "gait_entrainment_drivers.emulated:EmulatedAnkleRobot",
@@ -35,7 +35,7 @@ OWN_DRIVERS = {
 
 @dataclass(frozen=True)
 class Driver:
-    """A driver that has been chosen and loaded, with its options, not yet connected."""
+    """A chosen and loaded driver with its options, not yet connected."""
 
     name: str
     robot: type[AnkleRobot]
@@ -53,12 +53,12 @@ class Driver:
 
     @property
     def simulated(self) -> bool:
-        """Whether it lives in simulated time, so that it can run in lock-step."""
+        """Whether it runs in simulated time, and so can run in lock-step."""
         return self.robot(Side.LEFT, self.options, 0).capabilities.simulated
 
 
 def driver_names() -> dict[str, str]:
-    """Return where each driver is found, by name; nothing is loaded."""
+    """Return the location of each driver by name; nothing is loaded."""
     others = {point.name: point.value for point in entry_points(group=ENTRY_POINTS)}
     return dict(sorted({**others, **OWN_DRIVERS}.items()))
 
@@ -67,9 +67,9 @@ def make_robots(
     text: str, sides: Sequence[Side], limits: DeviceLimits, seed: int = 0, dose: Dose | None = None
 ) -> dict[Side, GuardedRobot]:
     """
-    Return the robots of some ankles, each as ``Driver.make``; what stops one stops both.
+    Return a robot for each ankle, as ``Driver.make`` does; what stops one stops both.
 
-    Raises as ``find_driver``, and LimitError if two ankles have one real robot between them.
+    Raises as ``find_driver`` does, and LimitError if two ankles would share one real robot.
     """
     dose = dose or Dose()
     drivers = {side: find_driver(text, side) for side in sides}
@@ -78,7 +78,7 @@ def make_robots(
     ):
         raise LimitError(
             f"driver: {text} is one robot, and the protocol perturbs both legs; allowed: options "
-            "of each robot, such as left.NAME=VALUE,right.NAME=VALUE, or blocks on one leg"
+            "for each robot, such as left.NAME=VALUE,right.NAME=VALUE, or blocks on one leg"
         )
     robots = {s: d.make(s, limits, seed + n, dose) for n, (s, d) in enumerate(drivers.items())}
     for side, robot in robots.items():
@@ -87,7 +87,7 @@ def make_robots(
 
 
 def driver_on(text: str, side: Side) -> str:
-    """Return the text that names the driver on one ankle, without the options of the other."""
+    """Return the driver text for one ankle, without the other ankle's options."""
     name, colon, options = text.partition(":")
     own, other = (f"{leg.name.lower()}." for leg in (side, side.other))
     parts = (part for part in split_options(options) if not part.startswith(other))
@@ -96,9 +96,9 @@ def driver_on(text: str, side: Side) -> str:
 
 def find_driver(text: str, side: Side = Side.RIGHT) -> Driver:
     """
-    Load the driver that a text names, for an ankle; options of the other one are checked too.
+    Load the driver named by a text, for one ankle; the other ankle's options are also checked.
 
-    Raises LimitError if there is none of that name, or an option is unknown or out of range;
+    Raises LimitError if the driver is unknown, or an option is unknown or out of range;
     DeviceError if the driver cannot be loaded.
     """
     name = text.partition(":")[0]
@@ -110,31 +110,31 @@ def find_driver(text: str, side: Side = Side.RIGHT) -> Driver:
     try:
         robot = EntryPoint(name, target, ENTRY_POINTS).load()
         if not (isinstance(robot, type) and issubclass(robot, AnkleRobot)):
-            raise LimitError(f"{whose} is no AnkleRobot: derive it from that class")
+            raise LimitError(f"{whose} is not an AnkleRobot: derive it from that class")
         texts = (driver_on(text, leg).partition(":")[2] for leg in Side)
         options = [read_options(f"driver: {name}", robot.Options, words) for words in texts]
         driver = Driver(name, robot, options[side])
-        _ = driver.simulated  # what cannot be made is told here, too
+        _ = driver.simulated  # a robot that cannot be made fails here
     except EntrainmentError:
         raise
-    except (Exception, SystemExit) as error:  # it is somebody else's package
+    except (Exception, SystemExit) as error:  # the package may be third-party
         raise DeviceError(f"{whose} cannot be loaded: {error!r}; install what it needs") from error
     return driver
 
 
 def split_options(text: str) -> list[str]:
-    """Return the parts of OPTION=VALUE,OPTION=VALUE, each as it is meant."""
+    """Return the parts of OPTION=VALUE,OPTION=VALUE, without escapes."""
     parts = re.findall(r"(?:\\[\\,]|[^,])+", text)
     return [re.sub(r"\\([\\,])", r"\1", part) for part in parts]
 
 
 def join_options(parts: Iterable[str]) -> str:
-    """Return the text that split_options takes apart into these parts."""
+    """Return the text that split_options splits into these parts."""
     return ",".join(re.sub(r"([\\,])", r"\\\1", part) for part in parts)
 
 
 def read_options(whose: str, options_type: type[Any], text: str) -> Any:
-    """Return options from OPTION=VALUE,OPTION=VALUE; LimitError says whose are wrong."""
+    """Return options from OPTION=VALUE,OPTION=VALUE; LimitError begins with ``whose``."""
     known = settings_of(options_type)
     values = {}
     for part in split_options(text):

@@ -2,14 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The safety envelope: the one way to an ankle robot, whatever its driver.
+The safety envelope: the only way to reach an ankle robot, whatever its driver.
 
 Nothing else holds the driver. Every train is checked against the limits before the driver sees it,
-every delivered torque afterwards, and every way out, an exception included, brings the torque to
-zero before the device is disabled. Any fault latches: torque stays at zero until ``close`` and
+and delivered torque is checked afterwards. Every exit path, exceptions included, brings the torque
+to zero before the device is disabled. Any fault latches: torque stays at zero until ``close`` and
 ``configure``.
 
-What this cannot do, being software on a system that is not real time, is said in docs/safety.md.
+docs/safety.md describes what software cannot guarantee on a system that is not real-time.
 """
 
 import atexit
@@ -28,16 +28,16 @@ from gait_entrainment.robot.limits import DeviceLimits, Dose
 from gait_entrainment.robot.profile import TorqueProfile
 from gait_entrainment.robot.pulse_train import Pulse, PulseTrain
 
-# How often the watchdog looks whether the experiment has fallen silent [s].
+# Period at which the watchdog checks for silence [s].
 _WATCH_PERIOD = 0.01
-# After so long without a pulse [ns] the next ones are another train, whose first ones rise anew.
+# After this long without a pulse [ns] the next pulses count as a new train, whose first ones rise.
 _PAUSE = 5 * NANOSECONDS_PER_SECOND
 
 _T = TypeVar("_T")
 
 
 class GuardedRobot:
-    """An ankle robot behind the safety envelope; nobody else may keep the driver."""
+    """An ankle robot behind the safety envelope; nothing else may keep the driver."""
 
     def __init__(
         self,
@@ -49,35 +49,35 @@ class GuardedRobot:
         self._robot, self.side = robot, side
         self.capabilities: Capabilities = robot.capabilities  # what the device can do
         self.limits = limits or DeviceLimits()
-        self.dose = dose or Dose()  # goes on from robot to robot, as the session does
-        self.train: PulseTrain | None = None  # what was scheduled in the run, as the driver has it
-        self.delivered = 0  # pulses of the run that have begun in what was promised
+        self.dose = dose or Dose()  # carried from robot to robot within a session
+        self.train: PulseTrain | None = None  # scheduled in the run, as given to the driver
+        self.delivered = 0  # pulses of the run that began before promised_until
         self.promised_until = 0  # everything before this instant is promised [ns]
         self.faults: tuple[Fault, ...] = ()  # what latched the torque at zero, in order
-        self.partner: GuardedRobot | None = None  # on the other ankle: one stops with the other
+        self.partner: GuardedRobot | None = None  # on the other ankle: both stop together
         self.enabled = False  # whether the device has been activated, latched or not
         self._configured = self._in_run = False
         self._begun = 0  # pulses scheduled since the latest pause
-        self._past: tuple[Pulse, ...] = ()  # of trains that were cancelled, what had begun
+        self._past: tuple[Pulse, ...] = ()  # pulses of cancelled trains that had begun
         self._read_until, self._unasked_since = -math.inf, math.inf  # stamps of states [ns]
-        # Measured torque must be below this, this long after the command has become zero.
+        # Measured torque must be below the first, once the command has been zero for the second.
         self._unasked = 0.12 * min(self.capabilities.peak_torque, self.limits.torque)
         self._fall_time = nanoseconds(0.15 + 0.5 / self.capabilities.torque_bandwidth)
-        self._offset = time.time_ns() - time.monotonic_ns()  # from steady time to a real run's
+        self._offset = time.time_ns() - time.monotonic_ns()  # from steady time to the wall clock
         self._armed_until = -math.inf  # steady time [s]
         self._delivered_torque = _DeliveredTorque(self.limits)
-        self._last_heard = self._news_at = math.inf  # the experiment, a new state: steady time [s]
-        self._called_at = math.inf  # the driver, if the call has not returned yet, steady time [s]
+        self._last_heard = self._news_at = math.inf  # experiment, new state: steady time [s]
+        self._called_at = math.inf  # start of a driver call under way, steady time [s]
         self._watching = threading.Event()
 
     @property
     def identity(self) -> str:
-        """What the device says of itself, such as its firmware; empty if it says nothing."""
+        """What the device reports about itself, such as its firmware; may be empty."""
         return str(self._robot.identity or "")
 
     @property
     def timing(self) -> LoopTiming:
-        """How the loop that streams torque is doing."""
+        """Timing of the loop that streams torque."""
         return self._robot.timing
 
     @property
@@ -85,12 +85,12 @@ class GuardedRobot:
         """Whether torque is allowed."""
         return time.monotonic() < self._armed_until
 
-    # Lifecycle. Each step raises DeviceError if it is not its turn or the driver fails.
+    # Lifecycle. Each step raises DeviceError if it is out of order or the driver fails.
 
     def configure(self) -> None:
-        """Connect to the device; releases what was latched."""
+        """Connect to the device; clears latched faults."""
         if self._configured:
-            raise DeviceError("the device is configured already; close it first")
+            raise DeviceError("the device is already configured; close it first")
         self.faults = ()
         try:
             self._call(self._robot.configure)
@@ -105,18 +105,18 @@ class GuardedRobot:
             raise DeviceError("the device is not configured; configure it first")
         self._refuse_latched()
         if self.enabled:
-            raise DeviceError("the device is active already; deactivate it first")
+            raise DeviceError("the device is already active; deactivate it first")
         self._call(self._robot.activate)
         self.enabled = True
         self.disarm()
         if not self.capabilities.simulated:
-            # The interpreter's end kills the threads of a driver: zero torque comes before it.
+            # Interpreter exit kills a driver's threads: bring the torque to zero before that.
             atexit.register(self.close)
             self._watching.set()
             threading.Thread(target=self._watch, name="experiment watchdog", daemon=True).start()
 
     def arm(self) -> None:
-        """Allow torque for a time: the step taken by a person who has seen that all is well."""
+        """Allow torque for a limited time: for a person who has checked that all is well."""
         self._refuse_latched()
         self._refuse_inactive()
         if not self.capabilities.simulated:
@@ -128,9 +128,9 @@ class GuardedRobot:
 
     def begin(self, start: int) -> None:
         """
-        Start the account of a run at an instant [ns]; the train of an earlier run is dropped.
+        Start a run at ``start`` [ns] and drop the train of an earlier run.
 
-        A latched device may begin too: there will be no torque.
+        A latched device may also begin: there will be no torque.
         """
         self._refuse_inactive()
         self._call(lambda: self._robot.begin(start))
@@ -144,9 +144,9 @@ class GuardedRobot:
 
     def deactivate(self) -> None:
         """
-        Bring the torque to zero, then disable the device; what fails becomes a fault.
+        Bring the torque to zero, then disable the device; errors become faults.
 
-        Promises may still be asked for, until the run is over.
+        Promises may still be requested until the run is over.
         """
         self.train = None
         self._watching.clear()
@@ -162,7 +162,7 @@ class GuardedRobot:
         atexit.unregister(self.close)
 
     def __enter__(self) -> "GuardedRobot":
-        """Return the robot; leaving the context closes it, however it is left."""
+        """Return the robot; leaving the context always closes it."""
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -172,16 +172,16 @@ class GuardedRobot:
     # Torque
 
     def heard(self) -> None:
-        """Note a sign of life of the experiment."""
+        """Record a sign of life from the experiment."""
         self._last_heard = time.monotonic()
 
     def schedule(self, train: PulseTrain) -> None:
         """
-        Accept a train of pulses; they follow those that were accepted before.
+        Accept a train of pulses that follows those accepted before.
 
-        Raises LimitError, and nothing changes, if the train is outside the limits, also together
-        with those before it, is for the other ankle, or begins before what was already promised;
-        DeviceError if the device is not active, not armed, latched, or cannot take the train.
+        Raises LimitError and changes nothing if the train, alone or with those before it, exceeds
+        the limits, is for the other ankle, or begins before ``promised_until``. Raises DeviceError
+        if the device is not active, not armed, latched, or cannot accept the train.
         """
         self._refuse_latched()
         self._refuse_inactive()
@@ -189,7 +189,7 @@ class GuardedRobot:
         if not self.armed:
             lapsed = math.isfinite(self._armed_until)
             why = f"was armed more than {self.limits.arming:g} s ago" if lapsed else "is not armed"
-            raise DeviceError(f"the device {why}; see that all is well, then arm it")
+            raise DeviceError(f"the device {why}; check that all is well, then arm it")
         before = self.train
         self.limits.check(train, (*self._past, *(before.pulses if before else ())))
         both = [(r.train.pulses, r.promised_until) for r in (self, self.partner) if r and r.train]
@@ -215,12 +215,12 @@ class GuardedRobot:
         self._begun += len(train.pulses)
         self.train = before.followed_by(train) if before else train
         self.heard()
-        if self.faults:  # a stop from another thread came in between
+        if self.faults:  # another thread has called stop in the meantime
             self.stop()
             self._refuse_latched()
 
     def cancel(self) -> None:
-        """Forget the train: torque is zero from now on."""
+        """Drop the train: torque is zero from now on."""
         if self.train is not None:
             self._past += self.train.until(self.promised_until)
             self.train = None
@@ -230,7 +230,7 @@ class GuardedRobot:
         """
         Bring the torque to zero and keep it there; from any thread and state, never raises.
 
-        A driver that raises here breaks the last promise there is, which is a fault of its own.
+        A driver that raises here breaks its last guarantee, which is a separate fault.
         """
         new = fault not in self.faults
         self._latch(fault)
@@ -246,8 +246,8 @@ class GuardedRobot:
         """
         Return the delivered torque from the last promise up to ``until`` [ns] at most.
 
-        It becomes binding. Delivered torque or impulse beyond the limits latches a fault; what
-        was delivered is reported all the same.
+        It becomes binding. Delivered torque or impulse beyond the limits latches a fault, but is
+        still returned.
 
         Raises ValueError if ``until`` lies before the last promise, DeviceError if no run is under
         way, or if the driver fails or breaks its contract.
@@ -257,7 +257,7 @@ class GuardedRobot:
             raise ValueError(f"a promise up to {until} ns would take back one up to {begin} ns")
         self._refuse_before_begin()
         profile = self._call(
-            lambda: self._robot.promise(until), lambda told: told.check(begin, until)
+            lambda: self._robot.promise(until), lambda answer: answer.check(begin, until)
         )
         self.delivered += len(profile.onsets)
         self.dose.pulses += len(profile.onsets)
@@ -266,13 +266,13 @@ class GuardedRobot:
         fault = self._delivered_torque.add(profile)
         behind = min(until, time.monotonic_ns() + self._offset) - self.promised_until
         if self.train and behind > nanoseconds(self.limits.silence):
-            fault = fault or faults.READINGS_OLD  # not so in simulated time: it promises all
+            fault = fault or faults.READINGS_OLD  # never in simulated time: it promises it all
         if fault is not None:
             self.stop(fault)
         return profile
 
     def read(self) -> Sequence[RobotState]:
-        """Return the states since the last call; a fault latches; DeviceError if one cannot be."""
+        """Return the states since the last call; faults latch, invalid ones raise DeviceError."""
         return self._call(lambda: tuple(self._robot.read()), self._watch_states)
 
     # Guarding
@@ -301,7 +301,7 @@ class GuardedRobot:
         *,
         may_refuse: bool = False,
     ) -> _T:
-        """Call the driver, check what it returns; whatever is raised, the torque ends first."""
+        """Call the driver and check its result; on any exception, end the torque, then raise."""
         self._called_at = time.monotonic()
         try:
             result = function()
@@ -319,7 +319,7 @@ class GuardedRobot:
             self._called_at = math.inf
 
     def _watch_states(self, states: Sequence[RobotState]) -> None:
-        """Latch what states tell; raises ValueError or what comes of it if one cannot be."""
+        """Latch faults that states report or show; an invalid state raises an exception."""
         able, until = self.capabilities, self.promised_until
         if not able.simulated:  # a device's clock may be a little ahead
             until = time.monotonic_ns() + self._offset + NANOSECONDS_PER_SECOND // 10
@@ -337,7 +337,7 @@ class GuardedRobot:
                     self.stop(fault)
             unasked = not state.commanded and abs(measured) > self._unasked
             self._unasked_since = min(self._unasked_since, state.stamp) if unasked else math.inf
-            # In simulated time it is a sensor with flaws that shows more than there is.
+            # In simulated time an excess is only an emulated sensor error.
             if abs(measured) > self._delivered_torque.most and not able.simulated:
                 self.stop(faults.TORQUE_EXCEEDED)
             if state.stamp - self._unasked_since > self._fall_time and not able.simulated:
@@ -347,18 +347,18 @@ class GuardedRobot:
             self.stop(faults.READINGS_OLD)
 
     def _quietly(self, function: Callable[[], None]) -> None:
-        """Call the driver on the way out: an error becomes a fault, and the way goes on."""
+        """Call the driver during shutdown: an error becomes a fault, and shutdown continues."""
         try:
             function()
         except Exception:
             self.stop(faults.DRIVER_FAILED)
 
     def _watch(self) -> None:
-        """Stop the torque if the experiment or a driver falls silent while torque may come."""
+        """Stop the torque if the experiment or a driver falls silent while torque is possible."""
         while self._watching.is_set():
             now, longest = time.monotonic(), self.limits.silence
             silent = self.train is not None and now - self._last_heard > longest
-            if silent or now - self._called_at > longest:  # a train may be the driver's already
+            if silent or now - self._called_at > longest:  # the driver may already have a train
                 blocked = now - min(r._called_at for r in (self, self.partner) if r) > longest / 2
                 self.stop(faults.DRIVER_BLOCKED if blocked else faults.EXPERIMENT_SILENT)
                 return
@@ -366,7 +366,7 @@ class GuardedRobot:
 
 
 class _DeliveredTorque:
-    """Watches the delivered torque, and its impulse within any time as long as a stride."""
+    """Watches the delivered torque, and its impulse within any window as long as a stride."""
 
     def __init__(self, limits: DeviceLimits) -> None:
         margin = 1 + limits.overshoot
@@ -396,5 +396,5 @@ class _DeliveredTorque:
 
 
 def _impulse(begin: int, end: int, torque: float) -> float:
-    """Return the magnitude of the angular impulse [N m s] of a torque between two instants."""
+    """Return the magnitude of the angular impulse [N m s] of a constant torque."""
     return abs(torque) * (end - begin) / NANOSECONDS_PER_SECOND

@@ -4,12 +4,12 @@
 """
 The ideal ankle robot: delivers exactly the commanded pulses, without delay.
 
-Square pulses are exact to the nanosecond. Any other is a staircase: each step has the torque that
-is asked for in its middle. So the torque is wrong by at most slope / (2 rate), and the impulse of
-a step of length h by at most h^3 / 24 times the curvature, or h^2 / 8 times a kink of the slope.
+Square pulses are exact to the nanosecond. Any other shape is a staircase: each step has the torque
+requested at its middle. The torque is thus off by at most slope / (2 rate), and the impulse of a
+step of length h by at most h^3 / 24 times the curvature, or h^2 / 8 times a kink of the slope.
 
 Not modelled: torque bandwidth, delay, jitter, noise, resolution, the robot's own inertia and
-friction, a lost command, and how the torque runs down after a stop.
+friction, a lost command, and how the torque decays after a stop.
 """
 
 import math
@@ -26,10 +26,10 @@ from gait_entrainment.settings import Checked, setting
 
 @dataclass(frozen=True)
 class IdealOptions(Checked):
-    """The one thing to choose; it matters for pulses that are not square."""
+    """The only option; it matters for pulses that are not square."""
 
     rate: float = setting(
-        1000.0, "steps of torque per second along a flank or a curve", "Hz", (10.0, 100_000.0)
+        1000.0, "torque steps per second along a flank or a curve", "Hz", (10.0, 100_000.0)
     )
 
 
@@ -50,7 +50,7 @@ class IdealAnkleRobot(SimulatedRobot):
         self._step = round(NANOSECONDS_PER_SECOND / options.rate)
 
     def promise(self, until: int) -> TorqueProfile:
-        """Return the torque up to ``until`` [ns]; there is a state for each change of it."""
+        """Return the torque up to ``until`` [ns]; each change of torque adds a state."""
         profile = super().promise(until)
         self._states += [
             RobotState(begin, torque, torque, math.nan) for begin, _, torque in profile.pieces
@@ -61,13 +61,13 @@ class IdealAnkleRobot(SimulatedRobot):
         train = self._train
         if train is None:
             return
-        # The pulse that began last may still be on at the beginning.
+        # The latest pulse may still be on at the beginning.
         for pulse in train.pulses[max(train.latest(begin), 0) : train.latest(until - 1) + 1]:
             if pulse.end > begin:
                 yield from self._steps(pulse)
 
     def _steps(self, pulse: Pulse) -> Iterator[tuple[int, float]]:
-        """Yield the changes of torque of one pulse: two if it is square, else one a step."""
+        """Yield the torque changes of one pulse: two if it is square, else one per step."""
         onset, end = pulse.onset, pulse.end
         step = max(end - onset, 1) if pulse.shape is Shape.SQUARE else self._step
         for instant in range(onset, end, step):

@@ -27,63 +27,63 @@ class Dose:
 
 @dataclass(frozen=True)
 class PlannedPulses(Checked):
-    """The pulses that the protocol under way may ask for; nobody else asks for more."""
+    """Bounds on the pulses of the protocol under way; requests for more are refused."""
 
     torque: float = setting(200.0, "magnitude of the protocol's pulses", "N m", (0.0, 200.0))
-    duration: float = setting(10.0, "their duration", "s", (0.0, 10.0))
-    count: int = setting(_NO_LIMIT, "their number", "1", (0, _NO_LIMIT))
+    duration: float = setting(10.0, "duration of the protocol's pulses", "s", (0.0, 10.0))
+    count: int = setting(_NO_LIMIT, "number of the protocol's pulses", "1", (0, _NO_LIMIT))
 
     def check(self, train: PulseTrain, before: int) -> None:
-        """Raise LimitError if a train, after so many pulses, goes beyond the protocol."""
-        asked = {
+        """Raise LimitError if a train, after ``before`` pulses, goes beyond the protocol."""
+        requested = {
             "torque": max((abs(pulse.torque) for pulse in train.pulses), default=0.0),
             "duration": max((pulse.duration for pulse in train.pulses), default=0.0),
             "count": before + len(train.pulses),
         }
-        for name, value in asked.items():
+        for name, value in requested.items():
             if not value <= (most := getattr(self, name)):
                 raise LimitError(
-                    f"{name}: {value:g} is not of the protocol's pulses; allowed: at most {most:g}"
+                    f"{name}: {value:g} exceeds the protocol's pulses; allowed: at most {most:g}"
                 )
 
 
 @dataclass(frozen=True)
 class DeviceLimits(Checked):
     """
-    What may be asked of an ankle robot, and when its silence counts as a fault.
+    What may be requested of an ankle robot, and when silence counts as a fault.
 
     The default torque lies above the 13.3 N m of the paper's pulse and near the 23 N m of the
     MIT Anklebot; it is a limit for the wearer, whatever the motor could do. The default impulse
-    is that of one pulse at both limits.
+    is that of one pulse at the default torque and duration.
     """
 
     torque: float = setting(30.0, "largest magnitude of a pulse", "N m", (0.0, 200.0))
     duration: float = setting(0.5, "longest duration of a pulse", "s", (0.001, 10.0))
     rate: float = setting(
-        0.0, "steepest flank; a square pulse gets such ones, if it is not 0", "N m/s", (0.0, 1e6)
+        0.0, "steepest flank; square pulses get this slope; 0: no limit", "N m/s", (0.0, 1e6)
     )
     impulse: float = setting(15.0, "largest angular impulse within a stride", "N m s", (0.0, 1e3))
     rising: int = setting(
-        0, "first pulses after a pause, which rise in equal steps to their height", "1", (0, 1000)
+        0, "number of pulses after a pause that rise in equal steps to full height", "1", (0, 1000)
     )
     pulses_per_minute: float = setting(
-        600.0, "most pulses in a minute, by the interval of two", "1/min", (1.0, 6000.0)
+        600.0, "most pulses per minute, by the interval between two", "1/min", (1.0, 6000.0)
     )
     session_pulses: int = setting(
-        _NO_LIMIT, "most pulses from when the node was started", "1", (0, _NO_LIMIT)
+        _NO_LIMIT, "most pulses since the node was started", "1", (0, _NO_LIMIT)
     )
     session_impulse: float = setting(
-        1e6, "largest sum of angular impulse from when the node was started", "N m s", (0.0, 1e6)
+        1e6, "largest total angular impulse since the node was started", "N m s", (0.0, 1e6)
     )
     arming: float = setting(
-        1800.0, "time after arming in which a train is accepted", "s", (1.0, 86_400.0)
+        1800.0, "time after arming during which a train is accepted", "s", (1.0, 86_400.0)
     )
     stride: float = setting(
-        1.0, "time that counts as a stride: no longer than the wearer's shortest", "s", (0.1, 10.0)
+        1.0, "time that counts as a stride: at most the wearer's shortest", "s", (0.1, 10.0)
     )
-    duty: float = setting(0.9, "largest share of the time with torque", "1", (0.0, 1.0))
+    duty: float = setting(0.9, "largest fraction of the time with torque", "1", (0.0, 1.0))
     overshoot: float = setting(
-        0.2, "share by which delivered torque and impulse may exceed their limits", "1", (0.0, 1.0)
+        0.2, "fraction by which delivered torque and impulse may exceed limits", "1", (0.0, 1.0)
     )
     silence: float = setting(
         1.0, "longest silence of the experiment under torque, in real time", "s", (0.05, 60.0)
@@ -91,9 +91,9 @@ class DeviceLimits(Checked):
 
     def check_pulse(self, pulse: Pulse) -> None:
         """
-        Raise LimitError if a pulse must not be delivered, wherever it comes.
+        Raise LimitError if a pulse must not be delivered, whatever its onset.
 
-        A protocol can be checked with this before anything is measured or moved.
+        A protocol can be checked with this before anything is measured or moves.
         """
         torque, duration = pulse.torque, pulse.duration
         if not math.isfinite(torque) or abs(torque) > self.torque:
@@ -113,7 +113,7 @@ class DeviceLimits(Checked):
         if pulse.shape is Shape.SQUARE and 2 * abs(torque) / self.rate > duration:
             raise LimitError(
                 f"rate: a pulse of {duration:g} s does not reach {torque:g} N m at "
-                f"{self.rate:g} N m/s; allowed: wider, lower, or a higher limits.rate"
+                f"{self.rate:g} N m/s; allowed: a wider or lower pulse, or a higher limits.rate"
             )
         if pulse.shape is not Shape.SQUARE and pulse.steepest > self.rate * (1 + 1e-9):
             raise LimitError(
@@ -122,7 +122,7 @@ class DeviceLimits(Checked):
 
     def check(self, train: PulseTrain, before: Sequence[Pulse] = ()) -> None:
         """Raise LimitError if a train must not be delivered after the pulses ``before`` it."""
-        if not 0 < (count := len(train.pulses)) <= 10_000:  # of more, checking would take long
+        if not 0 < (count := len(train.pulses)) <= 10_000:  # checking more takes too long
             raise LimitError(f"count: {count}; allowed: 1 to 10000 at a time")
         for shape in {replace(pulse, onset=0) for pulse in train.pulses}:
             self.check_pulse(shape)
@@ -135,7 +135,7 @@ class DeviceLimits(Checked):
             for pulse in [*before, *train.pulses]
             if pulse.end > first
         ]
-        # The largest is in a window that begins with a pulse, or in one that ends with one.
+        # The largest impulse is in a window that begins or ends with a pulse.
         mirrored = [(-end, -begin, *height) for begin, end, *height in reversed(spans)]
         self._check_impulse(max(_largest(spans, window), _largest(mirrored, window)))
 
@@ -152,7 +152,7 @@ class DeviceLimits(Checked):
                 f"duty: {pulse.duration / interval:.3g} of the time with torque; "
                 f"allowed: at most {self.duty:g}"
             )
-        # An onset is rounded to a nanosecond.
+        # Onsets are rounded to a nanosecond.
         if (interval + 1e-9) * self.pulses_per_minute < 60 * (1 - 1e-9):
             raise LimitError(
                 f"period: {interval:g} s; allowed: at least "
@@ -160,20 +160,20 @@ class DeviceLimits(Checked):
             )
 
     def check_dose(self, dose: Dose, coming: Sequence[Pulse]) -> None:
-        """Raise LimitError if pulses to come are too much after what was received already."""
-        asked = {
+        """Raise LimitError if pulses to come would take the dose beyond the session's limits."""
+        totals = {
             "session_pulses": dose.pulses + len(coming),
             "session_impulse": dose.impulse + sum(pulse.impulse for pulse in coming),
         }
-        for name, value in asked.items():
+        for name, value in totals.items():
             if value > (most := getattr(self, name)):
                 raise LimitError(f"{name}: {value:.6g} in all; allowed: at most {most:g}")
 
     def softened(self, train: PulseTrain, begun: int = 0) -> PulseTrain:
         """
-        Return a checked train with flanks no steeper than the limit and a gentle beginning.
+        Return a checked train with flanks no steeper than the limit and rising first pulses.
 
-        So many pulses were ``begun`` before, without a pause.
+        ``begun`` is the number of pulses before it without a pause.
         """
         pulses = []
         for number, pulse in enumerate(train.pulses, begun + 1):

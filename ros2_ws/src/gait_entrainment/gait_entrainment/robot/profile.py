@@ -23,7 +23,7 @@ class TorqueProfile:
 
     ``torques[i]`` [N m] holds on ``[times[i], times[i + 1])``, the last one up to
     ``valid_until`` [ns]. Profiles adjoin: ``times[0]`` is the ``valid_until`` of the one before.
-    A profile without length (``times == (valid_until,)``) says only that nothing new is known.
+    A profile without length (``times == (valid_until,)``) means that nothing new is known.
     """
 
     side: Side
@@ -44,8 +44,8 @@ class TorqueProfile:
         """
         Return a profile of [begin, until) from changes of torque, (instant [ns], torque [N m]).
 
-        The last change up to ``begin`` gives the torque that it begins with, zero without one;
-        changes from ``until`` on are left out.
+        The last change up to ``begin`` gives the initial torque, which is zero without one;
+        changes from ``until`` on are ignored.
         """
         times, torques = [begin], [0.0]
         for instant, torque in changes:
@@ -58,22 +58,22 @@ class TorqueProfile:
 
     @property
     def pieces(self) -> tuple[tuple[int, int, float], ...]:
-        """Begin [ns], end [ns] and torque [N m] of each stretch of constant torque, in order."""
+        """Begin [ns], end [ns] and torque [N m] of each interval of constant torque, in order."""
         ends = [*self.times[1:], self.valid_until]
         return tuple(zip(self.times, ends, self.torques, strict=True))
 
     @property
     def has_length(self) -> bool:
-        """Whether it says anything about the torque."""
+        """Whether it covers any time."""
         return self.times != (self.valid_until,)
 
     def check(self, begin: int, until: int | None = None) -> None:
         """
-        Hold the profile against the contract.
+        Check the profile against the contract.
 
-        Raises ProfileError if it does not adjoin the one before, which ends at ``begin`` [ns],
-        goes beyond ``until`` [ns], if that is known, its pieces are not ascending, finite and one
-        for each time, or its onsets not ascending within.
+        Raises ProfileError if it does not adjoin the one before, which ends at ``begin`` [ns]; if
+        it goes beyond ``until`` [ns]; if its times are not ascending, or its torques not finite or
+        not one per time; or if its onsets are not ascending within it.
         """
         if not self.times or len(self.times) != len(self.torques):
             raise ProfileError("a profile needs one torque for each time, and at least one")
@@ -83,13 +83,13 @@ class TorqueProfile:
             )
         if until is not None and self.valid_until > until:
             raise ProfileError(
-                f"a profile up to {self.valid_until} ns goes beyond the {until} ns asked for"
+                f"a profile up to {self.valid_until} ns goes beyond the requested {until} ns"
             )
         borders = [*self.times, self.valid_until]
         if self.has_length and any(a >= b for a, b in itertools.pairwise(borders)):
             raise ProfileError("the times of a profile are not ascending")
         begun = [begin - 1, *self.onsets, self.valid_until]
         if self.onsets and any(a >= b for a, b in itertools.pairwise(begun)):
-            raise ProfileError("the onsets of a profile are not ascending, or not in it")
+            raise ProfileError("the onsets of a profile are not ascending, or lie outside it")
         if not all(math.isfinite(torque) for torque in self.torques):
             raise ProfileError(f"the torques of a profile are not all finite: {self.torques}")

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What ankle robots in simulated time share: nothing to connect, and zero torque at once."""
+"""The common part of simulated ankle robots: no connection, and immediate zero torque."""
 
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
@@ -15,7 +15,7 @@ from gait_entrainment.robot.pulse_train import PulseTrain
 
 
 class SimulatedRobot(AnkleRobot):
-    """A device whose torque is computed as promises are asked for."""
+    """A device whose torque is computed when a promise is requested."""
 
     def __init__(self, side: Side, options: Any, seed: int) -> None:  # noqa: ARG002
         self._side = side
@@ -27,13 +27,13 @@ class SimulatedRobot(AnkleRobot):
     @abstractmethod
     def _changes(self, begin: int, until: int) -> Iterator[tuple[int, float]]:
         """
-        Yield the changes of torque in [begin, until): instant [ns] and torque from it on [N m].
+        Yield the changes of torque in [begin, until): instant [ns] and torque from then on [N m].
 
-        Without one at or before ``begin`` the torque is zero there.
+        Without a change at or before ``begin`` the torque is zero there.
         """
 
     def configure(self) -> None:
-        """Nothing to connect; a stop is over."""
+        """Clear a stop; there is nothing to connect."""
         self._halted = False
 
     def activate(self) -> None:
@@ -45,13 +45,13 @@ class SimulatedRobot(AnkleRobot):
         self.cancel()
 
     def schedule(self, train: PulseTrain) -> None:
-        """Take over a train."""
+        """Accept a train."""
         if self._halted:
             raise DeviceError("stopped: close and configure first")
         self._train = self._train.followed_by(train) if self._train else train
 
     def cancel(self) -> None:
-        """Drop the train; the torque is zero at once."""
+        """Drop the train; the torque is zero immediately."""
         self._train = None
 
     def promise(self, until: int) -> TorqueProfile:
@@ -67,7 +67,7 @@ class SimulatedRobot(AnkleRobot):
         return states
 
     def stop(self) -> None:
-        """Drop the train, and take no other."""
+        """Drop the train and accept no other."""
         self._halted = True
         self.cancel()
 

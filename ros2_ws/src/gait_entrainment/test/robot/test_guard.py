@@ -177,7 +177,7 @@ def test_a_flank_is_held_against_the_rate_whatever_the_shape():
 
 def test_each_activation_and_each_run_begins_anew():
     guard, driver = ready()
-    with pytest.raises(DeviceError, match="active already; deactivate"):
+    with pytest.raises(DeviceError, match="already active; deactivate"):
         guard.activate()
     assert driver.calls.count("activate") == 1
     guard.close()
@@ -233,7 +233,7 @@ def test_arming_expires(monkeypatch):
     now[0] += 59.0
     assert guard.armed
     now[0] += 2.0
-    with pytest.raises(DeviceError, match="armed more than 60 s ago; see that all is well"):
+    with pytest.raises(DeviceError, match="armed more than 60 s ago; check that all is well"):
         guard.schedule(train())
     assert "schedule" not in driver.calls
     guard.arm()
@@ -272,7 +272,7 @@ def test_only_the_pulses_of_the_protocol_are_asked_for():
     planned.check(train(), 0)
     planned.check(train(torque=-13.0, count=1), 3)
     for changes in ({"torque": -13.1}, {"duration": 0.11}, {"count": 5}, {"torque": math.nan}):
-        with pytest.raises(LimitError, match="not of the protocol's pulses; allowed: at most"):
+        with pytest.raises(LimitError, match="exceeds the protocol's pulses; allowed: at most"):
             planned.check(train(**changes), 0)
 
 

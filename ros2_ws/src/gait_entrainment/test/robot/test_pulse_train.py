@@ -143,7 +143,7 @@ def test_each_pulse_begins_and_ends_at_its_nanosecond(first, period, number, sha
 @pytest.mark.parametrize(
     ("shape", "words"),
     [
-        ({"shape": Shape.TRAPEZOID, "rise": 0.06, "fall": 0.05}, "rise: 0.06 s, and fall 0.05"),
+        ({"shape": Shape.TRAPEZOID, "rise": 0.06, "fall": 0.05}, "rise: 0.06 s, with fall 0.05"),
         ({"shape": Shape.TRAPEZOID, "rise": -0.01}, "rise"),
         ({"shape": Shape.SAMPLES, "samples": (1.0,)}, "samples"),
         ({"shape": Shape.SAMPLES, "samples": (0.0, math.nan, 0.0)}, "samples"),
