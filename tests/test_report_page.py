@@ -77,8 +77,8 @@ def test_a_run_is_told_from_its_soundness_to_its_origin(browser, pages):
     parts = [
         "verdict          entrained since stride 29",
         "Are the data sound?",
-        "measured off commanded by 0.00 N m",
-        "repeated: the same as live to the last bit",
+        "measured differs from commanded by 0.00 N m",
+        "repeated: identical to the live one, bit for bit",
         "Protocol as run",
         "period_offset: -0.05",
         "Stride period",
@@ -87,7 +87,7 @@ def test_a_run_is_told_from_its_soundness_to_its_origin(browser, pages):
         "Ankle torque stride by stride",
         "resultant length",
         "no proof of entrainment",
-        "Where it comes from",
+        "Origin",
         "SHA-256 of paper_example_0.mcap",
     ]
     places = [text.index(part) for part in parts]
@@ -148,6 +148,6 @@ def test_a_sealed_session_tells_only_whether_the_data_are_sound(browser, pages):
     text, _ = shown(browser, pages["sealed"], DESKTOP)
     assert "This session is sealed" in text
     assert "Are the data sound?" in text
-    telling = "first|second|entrained|messages|period_offset|stride period|off commanded|rate "
+    telling = "first|second|entrained|messages|period_offset|stride period|from commanded|rate "
     assert not re.search(telling, text)
     assert browser.find_elements("css selector", "svg") == []

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-A study's folder as a BIDS data set (bids.neuroimaging.io) with Motion-BIDS, as far as that goes.
+A study's folder as a BIDS data set (bids.neuroimaging.io) with Motion-BIDS, as far as possible.
 
-BIDS has places for joint angles (motion) and for events, and none for strides, pulses, blocks and
-bags: these are left out of it by ``.bidsignore``. Of a person no joint angles are recorded:
-then there are only events.
+BIDS covers joint angles (motion) and events, but not strides, pulses, blocks and bags, which
+``.bidsignore`` therefore excludes. No joint angles are recorded from a person, so a session with
+one has only events.
 """
 
 import json
@@ -32,13 +32,13 @@ _TASK = "entrainment"
 _IGNORED = "**/bags/**\nbags\nsub-*/ses-*/*.*\n*.html\ntables\n"
 _README = """A study with a robot at one ankle that delivers torque pulses near the stride period.
 
-sub-*/ses-*/motion holds joint angles and events in Motion-BIDS. Beside it, outside BIDS: bags
-(MCAP) with all that was recorded, the tables events, strides, pulses and blocks over the session,
-and ledger.tsv, what happened when. Written by gait_entrainment, an open testbed.
+sub-*/ses-*/motion holds joint angles and events in Motion-BIDS. Next to it, outside BIDS: bags
+(MCAP) with everything that was recorded, the session's tables of events, strides, pulses and
+blocks, and its log, ledger.tsv. Written by gait_entrainment, an open testbed.
 """
 _PARTICIPANTS = (
     Column("participant_id", "code of the person"),
-    Column("number", "place of the person in the study, for the order of blocks"),
+    Column("number", "number of the person in the study, which decides the order of blocks"),
     Column("mass", "mass", "kg"),
     Column("leg_length", "leg length", "m"),
 )
@@ -47,9 +47,9 @@ _CHANNELS = "name\tcomponent\ttype\ttracked_point\tunits\n"
 
 def complete(folder: SessionFolder) -> list[Path]:
     """
-    Write what follows from the bags of a session: its tables, and its part of the data set.
+    Write what is derived from a session's bags: its tables, and its part of the data set.
 
-    What is there from before is written anew. Returns the tables.
+    Existing files are replaced. Returns the paths of the tables.
     """
     runs = list(read_runs(folder.path))
     for placed in runs:
@@ -59,7 +59,7 @@ def complete(folder: SessionFolder) -> list[Path]:
 
 
 def _describe(study: Path) -> None:
-    """Write what the data set says about itself and its persons."""
+    """Write the data set's description and its list of persons."""
     plans = [folder.plan for folder in sessions_in(study)]
     about = {
         "Name": plans[0]["study"],
@@ -71,7 +71,7 @@ def _describe(study: Path) -> None:
     (study / "README").write_text(_README)
     (study / ".bidsignore").write_text(_IGNORED)
     persons = {plan["person"]["code"]: plan["person"] for plan in plans}
-    rows = [(f"sub-{code}", *list(one.values())[1:]) for code, one in sorted(persons.items())]
+    rows = [(f"sub-{code}", *list(p.values())[1:]) for code, p in sorted(persons.items())]
     write_tsv(study / "participants.tsv", _PARTICIPANTS, rows)
     write_sidecar(study / "participants.json", _PARTICIPANTS)
     write_sidecar(study / f"task-{_TASK}_events.json", TABLES["events"])
@@ -107,7 +107,7 @@ def _write_motion(out: Path, placed: PlacedRun) -> None:
 
 
 def _joint_angles(bag: Path, start: int) -> tuple[list[tuple[float, ...]], list[str]]:
-    """Return seconds and joint angles [rad] of each sample, and the names of the joints."""
+    """Return each sample's time [s] and joint angles [rad], and the names of the joints."""
     rows, names = [], list[str]()
     with BagReader(bag) as reader:
         for message in reader.messages_of(JOINT_STATES):

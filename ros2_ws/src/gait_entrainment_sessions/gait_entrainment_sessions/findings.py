@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the statistics say of one run, and of the runs of a study."""
+"""The statistics of one run, and of all runs of a study."""
 
 import math
 from collections import defaultdict
@@ -18,12 +18,12 @@ from gait_entrainment_sessions import statistics
 from gait_entrainment_sessions.runs import PlacedRun
 from gait_entrainment_sessions.statistics import Border, Direction, Estimate, Locking
 
-Rows = list[tuple[str, str]]  # what, and how it is, for people
+Rows = list[tuple[str, str]]  # name and value, as text
 
 
 @dataclass(frozen=True)
 class Findings:
-    """The statistics of one run, or of one block of its protocol if that has several."""
+    """The statistics of one run, or of one block of its protocol if it has several."""
 
     placed: PlacedRun
     part: JudgedBlock
@@ -36,7 +36,7 @@ class Findings:
 
     @classmethod
     def of(cls, placed: PlacedRun) -> list["Findings"]:
-        """Compute them, for each block of the protocol."""
+        """Compute the findings for each block of the protocol."""
         return [cls._of_part(placed, part) for part in placed.parts]
 
     @classmethod
@@ -67,19 +67,19 @@ class Findings:
 
     @property
     def name(self) -> str:
-        """Name of the block of the session, and of the protocol's if that has several."""
+        """Name of the session's block, and of the protocol's block if there are several."""
         name = self.placed.place.name
         return f"{name}: {self.part.name}" if self.part.name else name
 
     @property
     def torque(self) -> float:
-        """Largest magnitude of its pulses [N m], NaN if they were not announced."""
+        """Largest magnitude of the pulses' torque [N m]; NaN if they were not announced."""
         heights = (self.placed.timings[p.onset].torque for p in self.part.analysis.pulses)
         return max(map(abs, heights), default=0.0)
 
     @property
     def verdict(self) -> str:
-        """The verdict at its end."""
+        """The verdict at the end."""
         found = self.part.analysis.entrainments[-1:]
         return (found[0].verdict if found else Verdict.UNDECIDED).name.lower()
 
@@ -90,7 +90,7 @@ class Findings:
 
     @property
     def row(self) -> tuple[Any, ...]:
-        """The cells of the table of blocks."""
+        """The cells of its row in the table of blocks."""
         part, runs = self.part, self.locking.runs
         return (
             part.name or None,
@@ -122,31 +122,31 @@ class PersonFindings:
 
     @property
     def basin_percent(self) -> float:
-        """Width found, both sides together: at least so wide."""
+        """Width found, both sides together; the basin may be wider."""
         return self.slower.entrained - self.faster.entrained
 
 
 @dataclass(frozen=True)
 class StudyFindings:
-    """What the blocks of all persons say together."""
+    """The findings over the blocks of all persons."""
 
     persons: tuple[PersonFindings, ...]
-    entrained: Estimate  # share of the persons that entrained in some block
+    entrained: Estimate  # share of the persons who entrained in at least one block
     basin_mean: Estimate  # [% of the stride]
     basin_deviation: Estimate
     phases: tuple[float, ...]  # mean phase of each person's entrained blocks
     direction: Direction  # of these
-    rayleigh: float  # p that they have none
+    rayleigh: float  # p-value of their having none
 
     @classmethod
     def of(cls, findings: Sequence[Findings]) -> "StudyFindings":
-        """Compute them from the findings of all runs."""
+        """Combine the findings of all runs."""
         by_person = defaultdict[str, list[Findings]](list)
-        for one in findings:
-            by_person[one.placed.place.person].append(one)
+        for finding in findings:
+            by_person[finding.placed.place.person].append(finding)
         persons, phases = [], []
         for code, own in by_person.items():
-            # A basin is one of pulses of one height: without those of a sham.
+            # A basin belongs to one pulse height: lower pulses, such as a sham's, are left out.
             least = 0.99 * max(f.torque for f in own)
             offsets = [(f.offset_percent, f.verdict) for f in own if not f.torque < least]
             held = [f for f in own if f.verdict == "entrained"]
@@ -169,7 +169,7 @@ class StudyFindings:
 
     @property
     def rows(self) -> Rows:
-        """What is told of them, in words."""
+        """Names and values, as text."""
         phase = told(self.direction.phase, "{:.3f} of the stride")
         return [
             ("persons that entrained in some block", shown(self.entrained, "%", 100)),
@@ -182,12 +182,12 @@ class StudyFindings:
 
 
 def told(value: float, form: str) -> str:
-    """Return a value in a form of words, if it is known."""
+    """Return a value formatted as text, or a remark if it is unknown."""
     return "cannot be told" if math.isnan(value) else form.format(value)
 
 
 def shown(estimate: Estimate, unit: str, factor: float = 1.0) -> str:
-    """Return an estimate with its interval in words."""
+    """Return an estimate with its interval, as text."""
     value, low, high = (factor * number for number in estimate)
     interval = "" if math.isnan(low) else f" (95 %: {low:.3g} to {high:.3g})"
     return told(value, f"{{:.3g}} {unit}{interval}")

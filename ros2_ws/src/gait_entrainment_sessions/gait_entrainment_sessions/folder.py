@@ -2,16 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The folder of a session: what was planned, what happened, and the key of a blinded one.
+The folder of a session: its plan, its ledger, its bags, and its key if it is blinded.
 
     STUDY/sub-P01/ses-1/session.yaml    the session file as it was when the session began
-                        session.json    what a resumption has to match
+                        session.json    the plan, which must match when the session is resumed
                         key.json        only if blinded: which block is which
-                        ledger.tsv      what happened, a line each; only ever appended to
-                        bags/           a bag per run
+                        ledger.tsv      what happened, one line each; only ever appended to
+                        bags/           one bag per run
 
-Nothing is overwritten. A block that is repeated has another bag; the latest one that ended well
-stands for it.
+Nothing is overwritten: a repeated block gets another bag, and the latest that ended well counts.
 """
 
 import fcntl
@@ -31,7 +30,7 @@ from typing import Any, NamedTuple
 from gait_entrainment_bags import BagReader
 from gait_entrainment_sessions.session_file import Session, SessionError
 
-KEY_HASH = "session_key"  # what a bag's custom data call it
+KEY_HASH = "session_key"  # its name in a bag's custom data
 PLAN = "session.json"
 _KEY, _LEDGER, _COPY, _PART = "key.json", "ledger.tsv", "session.yaml", "session.part"
 
@@ -48,16 +47,17 @@ class Entry(NamedTuple):
 
 @dataclass(frozen=True)
 class SessionFolder:
-    """A session that was begun."""
+    """A session that has started."""
 
     path: Path
 
     @classmethod
     def begin(cls, study: Path, session: Session) -> "SessionFolder":
         """
-        Make the folder of a session in that of its study, or find it as this session left it.
+        Create a session's folder in its study's folder, or return it if the session has started.
 
-        Raises SessionError if another session is there, or this one was changed meanwhile.
+        Raises SessionError if the folder holds something else, the session was changed since it
+        started, or the person's number is not unique.
         """
         person = f"sub-{session.person.code}"
         folder = cls(study / person / f"ses-{session.session}")
@@ -68,16 +68,16 @@ class SessionFolder:
             left = {file.name for file in folder.path.glob("*")}
             if left - {_KEY, _LEDGER, _COPY, _PART}:
                 raise SessionError(
-                    f"{folder.path}: holds something else; nothing is overwritten: give --out"
+                    f"{folder.path}: holds something else, and nothing is overwritten; give --out"
                 )
             cls._check_number(study, session)
-            for name in left:  # of a beginning that a crash cut short
+            for name in left:  # by a start that a crash cut short
                 (folder.path / name).unlink()
             folder._begin(session)
         return folder
 
     def _begin(self, session: Session) -> None:
-        """Write what was planned."""
+        """Write the plan, the session file, the empty ledger and, if blinded, the key."""
         self.path.mkdir(parents=True, exist_ok=True)
         names = [block.name for block in session.ordered]
         key = self._seal(session, names) if session.blind else ""
@@ -95,29 +95,29 @@ class SessionFolder:
         }
         _write(self.path / _COPY, session.text)
         _write(self.path / _LEDGER, "\t".join(Entry._fields) + "\n")
-        # The last of all, and at once: without it the session has not begun.
+        # Written last, and atomically: without it the session has not started.
         _write(self.path / _PART, json.dumps(plan, indent=1) + "\n")
         (self.path / _PART).rename(self.path / PLAN)
 
     @cached_property
     def plan(self) -> dict[str, Any]:
-        """What was planned; raises SessionError if this is no session."""
+        """The plan; raises SessionError if this is not a session."""
         try:
             return dict(json.loads((self.path / PLAN).read_text(encoding="utf-8")))
         except (OSError, ValueError):
-            raise SessionError(f"{self.path}: no session: no readable {PLAN} in it") from None
+            raise SessionError(f"{self.path}: not a session: no readable {PLAN} in it") from None
 
     @property
     def ledger(self) -> list[Entry]:
-        """What happened so far."""
+        """What has happened so far."""
         text = (self.path / _LEDGER).read_text(encoding="utf-8", errors="replace")
         lines = text.splitlines()[1:]
-        # A line that a crash cut short says nothing.
+        # A line that a crash cut short is ignored.
         entries = (line.split("\t") for line in lines)
         return [Entry(*cells) for cells in entries if len(cells) == len(Entry._fields)]
 
     def note(self, what: str, block: int = 0, bag: str = "", text: str = "") -> None:
-        """Append a line to the ledger, safe on the disk when this returns."""
+        """Append a line to the ledger; it is safely on disk when this returns."""
         now = datetime.now(timezone.utc).isoformat(timespec="milliseconds")
         cells = (now, what, str(block or ""), bag, " ".join(text.split()))
         ledger = self.path / _LEDGER
@@ -128,7 +128,7 @@ class SessionFolder:
             os.fsync(file.fileno())
 
     def runs(self) -> dict[int, Path]:
-        """Return the bag that stands for each block that is done."""
+        """Return the bag that counts for each block that is done."""
         ledger = self.ledger
         repeated = {entry.bag for entry in ledger if entry.what == "repeat"}
         done = {
@@ -140,9 +140,9 @@ class SessionFolder:
 
     def repeat(self, reason: str, block: int = 0) -> int:
         """
-        Have a block that is done walked again, or the one that was begun last; return its number.
+        Have a completed block, or the one started last, walked again; return its number.
 
-        Raises SessionError if there is no such block, it failed, or it is to be repeated already.
+        Raises SessionError if there is no such block, it failed, or it is already to be repeated.
         """
         ledger, done = self.ledger, self.runs()
         begun = [entry for entry in ledger if entry.what == "begun"]
@@ -153,7 +153,7 @@ class SessionFolder:
         ended = {entry.bag for entry in ledger if entry.what in ("failed", "repeat")}
         if not bag or bag in ended:
             allowed = ", ".join(map(str, done)) or "none yet"
-            what = f"block {block} is not done" if block else "no block has begun"
+            what = f"block {block} is not done" if block else "no block has started"
             raise SessionError(f"repeat: {what}; allowed: {allowed}")
         if not reason:
             raise SessionError("repeat: a repetition needs a reason")
@@ -162,26 +162,26 @@ class SessionFolder:
 
     @property
     def paused(self) -> str | None:
-        """Why the operator has the session wait before its next block; None if it goes on."""
+        """Why the operator paused the session before its next block; None if it is not paused."""
         last = self._last("pause", "go on")
         return last.text if last is not None and last.what == "pause" else None
 
     def standing(self) -> str:
-        """Return how the session stands, in words."""
+        """Return the state of the session, as text."""
         last, paused = self._last("begun", "done", "failed", "rest"), self.paused
-        goes_on = last is not None and last.what == "begun"
-        number = int(last.block) if last is not None and goes_on else self.next_block()
+        running = last is not None and last.what == "begun"
+        number = int(last.block) if last is not None and running else self.next_block()
         name = f"block {number} of {self.plan['count']}" if number else "the end"
         if number and not self.plan["blind"]:
             name += f" ({self.plan['blocks'][number - 1]})"
-        if goes_on:
+        if running:
             return name if paused is None else f"{name}, then a pause: {paused}"
         if paused is not None:
             return f"paused before {name}: {paused}"
         if last is not None and last.what == "rest":
             passed = datetime.now(timezone.utc) - datetime.fromisoformat(last.time)
             rest = float(last.text.split()[0])
-            left = min(max(rest - passed.total_seconds(), 0), rest)  # the clock may be set back
+            left = min(max(rest - passed.total_seconds(), 0), rest)  # a clock may be set back
             return f"rest before {name}: {left:.0f} s"
         return f"next: {name}"
 
@@ -194,7 +194,7 @@ class SessionFolder:
         return min(left, default=None)
 
     def new_bag(self, block: int) -> Path:
-        """Return where the next run of a block is recorded."""
+        """Return the path of the bag for the next run of a block."""
         path, number = self.path / "bags" / f"block-{block:02d}", 1
         while path.exists():
             number += 1
@@ -203,35 +203,35 @@ class SessionFolder:
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """Keep other processes from conducting this session; SessionError if one does."""
+        """Keep other processes from conducting this session; SessionError if one already does."""
         with (self.path / _LEDGER).open("a") as file:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 raise SessionError(
-                    f"{self.path}: another entrain session conducts it; end that one first"
+                    f"{self.path}: another entrain session is conducting it; end that one first"
                 ) from None
             yield
 
     @property
     def sealed(self) -> bool:
-        """Whether it is not to be told yet which block is which."""
+        """Whether it must stay hidden which block is which."""
         return self.plan["blind"] and all(entry.what != "unblinded" for entry in self.ledger)
 
     def names(self) -> list[str]:
-        """Return the names of the blocks in their order; neutral ones while it is sealed."""
+        """Return the blocks' names in order; neutral ones while the session is sealed."""
         if self.sealed:
             return [f"block {number + 1}" for number in range(self.plan["count"])]
         return list(self._key()["blocks"] if self.plan["blind"] else self.plan["blocks"])
 
     def unblind(self) -> list[str]:
         """
-        Break the seal; return the names of the blocks in their order.
+        Break the seal; return the blocks' names in order.
 
-        Raises SessionError if it is not blinded, or the key is not the one that each bag names.
+        Raises SessionError if the session is not blinded, or the key does not match every bag.
         """
         if not self.plan["blind"]:
-            raise SessionError(f"{self.path}: not blinded: {PLAN} says which block is which")
+            raise SessionError(f"{self.path}: not blinded: {PLAN} names the blocks")
         names = list(self._key()["blocks"])
         if self.sealed:
             self.note("unblinded")
@@ -243,20 +243,20 @@ class SessionFolder:
             data = key.read_bytes()
         except OSError as error:
             raise SessionError(f"{key}: cannot be read: {error.strerror}") from None
-        found, told = hashlib.sha256(data).hexdigest(), {str(self.path / PLAN): self.plan["key"]}
+        found, hashes = hashlib.sha256(data).hexdigest(), {str(self.path / PLAN): self.plan["key"]}
         for bag in self.runs().values():
             with BagReader(bag) as reader:
-                told[str(bag)] = reader.custom_data.get(KEY_HASH, "")
-        for place, expected in told.items():
+                hashes[str(bag)] = reader.custom_data.get(KEY_HASH, "")
+        for place, expected in hashes.items():
             if found != expected:
                 raise SessionError(
-                    f"{key}: its SHA-256 is {found[:12]}..., not {expected[:12] or 'any'}... as "
-                    f"{place} says; allowed: the key as it was sealed"
+                    f"{key}: its SHA-256 starts with {found[:12]}, but {place} has "
+                    f"{expected[:12] or 'none'}; allowed: the key as it was sealed"
                 )
         return dict(json.loads(data))
 
     def _seal(self, session: Session, names: list[str]) -> str:
-        """Write the key, which nobody can guess from its hash; return that."""
+        """Write the key, which cannot be guessed from its hash; return the hash."""
         key = {
             "person": session.person.code,
             "session": session.session,
@@ -270,7 +270,7 @@ class SessionFolder:
 
     @classmethod
     def _check_number(cls, study: Path, session: Session) -> None:
-        """Raise SessionError if another person has this number: orders would not be balanced."""
+        """Raise SessionError if another person has this number, which would unbalance orders."""
         for file in sorted(study.glob(f"sub-*/ses-*/{PLAN}")):
             other, person = cls(file.parent).plan["person"], session.person
             if (other["code"] == person.code) != (other["number"] == person.number):
@@ -281,7 +281,7 @@ class SessionFolder:
 
     def _check_same(self, session: Session) -> None:
         copy = self.path / _COPY
-        why = "allowed: no change in a session that was begun; another needs another label"
+        why = "allowed: no change to a session that has started; give a new session a new label"
         then, now = copy.read_text(encoding="utf-8").splitlines(), session.text.splitlines()
         for line, (old, new) in enumerate(zip_longest(then, now, fillvalue=""), start=1):
             if old != new:
@@ -295,13 +295,13 @@ class SessionFolder:
             if found != expected:
                 raise SessionError(
                     f"{block.place}: protocol: that of {block.name} is not what it was when the "
-                    f"session began, by its file or by another version of this program; {why}"
+                    f"session began: its file or the version of this program has changed; {why}"
                 )
 
 
 @contextmanager
 def _alone_in(folder: Path) -> Iterator[None]:
-    """Let no other process begin a session in the folder of a study meanwhile."""
+    """Keep other processes from starting a session in the folder of a study."""
     folder.mkdir(parents=True, exist_ok=True)
     handle = os.open(folder, os.O_RDONLY)
     try:
@@ -312,7 +312,7 @@ def _alone_in(folder: Path) -> Iterator[None]:
 
 
 def _write(path: Path, text: str) -> None:
-    """Write a new file, safe on the disk when this returns."""
+    """Write a new file; it is safely on disk when this returns."""
     with path.open("x", encoding="utf-8") as file:
         file.write(text)
         file.flush()

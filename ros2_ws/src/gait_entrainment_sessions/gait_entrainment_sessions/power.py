@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-How many pulses give which chance of a right verdict: the verdict itself, on drawn walks.
+Chance of a correct verdict after a number of pulses, found by judging simulated walks.
 
 A walk has long-range correlated stride periods (fractional Gaussian noise), and either ignores the
-pulses or makes good a share of the distance to its locked phase in each stride, up to a limit. No
-walker of the model is walked: what a person does in between, nobody knows before.
+pulses or corrects a share of the distance to its locked phase in each stride, up to a limit. The
+model's walker is not used: how a person responds, between these two, is not known beforehand.
 """
 
 from collections.abc import Sequence
@@ -22,52 +22,52 @@ from gait_entrainment_sessions.statistics import Estimate, Floats, share
 from gait_entrainment_studies.cohort.population import step_noise
 from gait_entrainment_studies.cohort.study import events_of
 
-# Toe-off within the stride, and its scatter [s]; those of docs/analysis.md.
+# Toe-off as a share of the stride, and its scatter [s]; both from docs/analysis.md.
 _TOE_OFF, _SCATTER = 0.68, 0.005
 COUNTS = (10, 20, 25, 30, 40, 50, 60, 80)
 
 
 @dataclass(frozen=True)
 class PowerPlan(Checked):
-    """What is known, or presumed, before a session."""
+    """What is known or assumed before a session."""
 
     variation: float = setting(
         0.02, "coefficient of variation of the stride period", "1", (0.0, 0.2)
     )
     hurst: float = setting(
-        0.75, "its correlation: 0.5 white, to below 1", "1", (0.5, 1.0), most_excluded=True
+        0.75, "its correlation: 0.5 is white noise", "1", (0.5, 1.0), most_excluded=True
     )
     stride: float = setting(1.1, "stride period", "s", (0.3, 5.0))
     baseline: int = setting(15, "strides before the pulses", "1", (2, 1000))
     gain: float = setting(
-        0.5, "share of the way to its lock that a walker makes good in a stride", "1", (0.01, 1.0)
+        0.5, "share of the distance to its lock corrected in each stride", "1", (0.01, 1.0)
     )
-    limit: float = setting(0.08, "the same, at most, as a share of the stride", "1", (0.001, 1.0))
+    limit: float = setting(0.08, "largest correction, as a share of the stride", "1", (0.001, 1.0))
     trials: int = setting(100, "walks of each kind", "1", (20, 100_000))
     seed: int = setting(0, "seed", "1", (0, 2**63 - 1))
 
 
 @dataclass(frozen=True)
 class Power:
-    """Chances after so many pulses."""
+    """Chances of the verdicts after a number of pulses."""
 
     pulses: int
-    entrained: Estimate  # that a walker that locks is called entrained
-    drifting: Estimate  # that one that ignores the pulses is called drifting
-    wrongly: Estimate  # that one that ignores them is called entrained
+    entrained: Estimate  # a walker that locks is judged entrained
+    drifting: Estimate  # a walker that ignores the pulses is judged drifting
+    wrongly: Estimate  # a walker that ignores the pulses is judged entrained
 
 
 def power(plan: PowerPlan, offset: float, counts: Sequence[int] = COUNTS) -> list[Power]:
     """
     Return the chances of the verdict after each number of pulses, ascending.
 
-    ``offset`` is the pulse period minus the stride period [s]. Raises UsageError for one at which
-    no walk of the plan could lock.
+    ``offset`` is the pulse period minus the stride period [s]. Raises UsageError if no walk of the
+    plan could lock at it.
     """
     if not abs(offset) < plan.limit * plan.stride:
         raise UsageError(
             f"period_offset: {offset:g} s; allowed: within {plan.limit * plan.stride:g} s, the "
-            "limit of what a walker makes good in a stride: beyond it nobody locks"
+            "largest correction in a stride: beyond it no walker locks"
         )
     longest = max(counts)
     found: dict[bool, list[dict[int, Verdict]]] = {True: [], False: []}
@@ -95,8 +95,8 @@ def power(plan: PowerPlan, offset: float, counts: Sequence[int] = COUNTS) -> lis
 
 
 def enough_of(found: Sequence[Power], chance: float) -> int | None:
-    """Return the pulses from which on both walkers are judged right so often; None if never."""
-    right = [min(one.entrained.value, one.drifting.value) >= chance for one in found]
+    """Return the number of pulses from which on both chances are high enough; None if never."""
+    right = [min(row.entrained.value, row.drifting.value) >= chance for row in found]
     first = max((n for n, enough in enumerate(right, start=1) if not enough), default=0)
     return found[first].pulses if first < len(found) else None
 
@@ -104,7 +104,7 @@ def enough_of(found: Sequence[Power], chance: float) -> int | None:
 def _verdicts(events: Sequence[GaitEvent], onsets: Sequence[int]) -> dict[int, Verdict]:
     """Return the verdict after each pulse, by its number."""
     analysis = analyze(events, onsets, Side.RIGHT)
-    at = {one.stride: one.verdict for one in analysis.entrainments}
+    at = {judged.stride: judged.verdict for judged in analysis.entrainments}
     return {p.number: at[p.stride] for p in analysis.pulses if p.stride in at}
 
 
@@ -118,15 +118,15 @@ def walk(
     generator: np.random.Generator,
 ) -> tuple[list[GaitEvent], list[int]]:
     """
-    Return events and pulse onsets [ns] of one experiment, of the right leg.
+    Return the events and the pulse onsets [ns] of one experiment on the right leg.
 
-    ``free`` are the stride periods [s] without pulses, ``offset`` is that of the pulse period [s];
-    the first pulse has a random phase.
+    ``free`` are the stride periods [s] without pulses; the pulse period is their mean in the
+    baseline plus ``offset`` [s]. The first pulse has a random phase.
     """
     measured = float(np.mean(free[: plan.baseline]))
     period = measured + offset
     first = float(np.sum(free[: plan.baseline])) + generator.uniform() * measured
-    locked = generator.uniform(-0.1, 0.0) * plan.stride  # lag of the lock
+    locked = generator.uniform(-0.1, 0.0) * plan.stride  # lag at which it locks
     scatter = _SCATTER * generator.standard_normal(len(free))
     strikes, toe_offs = [0.0], []
     for k, alone in enumerate(free):
@@ -141,7 +141,7 @@ def walk(
         strikes.append(start + stride)
         toe_offs.append(start + _TOE_OFF * stride + float(scatter[k]))
     onsets = [nanoseconds(first) + nanoseconds(n * period) for n in range(pulses)]
-    # The left leg strikes in the middle of a stride, and leaves the ground in a quarter of it.
+    # The left leg strikes halfway through a stride, and lifts off a quarter of the way through.
     steps = np.interp(np.arange(2 * len(free) + 1) / 2, np.arange(len(strikes)), strikes)
     offs = np.stack([(steps[:-1:2] + steps[1::2]) / 2, toe_offs], axis=1)
     return events_of(steps, offs.ravel()), onsets

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-A study rehearsed: the blocks of a session file on simulated persons, judged as real ones.
+Rehearsal of a study: a session file's blocks on simulated persons, judged like real ones.
 
-Each person is a walker of the model with a body, a peak torque and a variation of its own, and
-walks each block from a fresh start: no order of blocks matters to them, and none gets tired. An
-ideal robot stands for a real one.
+Each person is a walker of the model with its own body, peak torque and variation. Every block is a
+fresh start, so their order has no effect and no person gets tired. A real robot is replaced by an
+ideal one.
 """
 
 from collections.abc import Iterator
@@ -28,9 +28,9 @@ def rehearse(
     session: Session, subjects: Subjects, *, seed: int, hurst: float, jobs: int
 ) -> Iterator[PlacedRun]:
     """
-    Give each block of a session on each subject, in ``jobs`` processes, in any order.
+    Yield each block of a session on each subject, from ``jobs`` processes, in any order.
 
-    Raises LimitError for a block that a subject must not or cannot get, as a run of it does.
+    Raises LimitError for a block that the limits forbid for a subject, as a run of it does.
     """
     conduct = partial(_conduct, session, subjects, seed, hurst)
     numbers = range(len(subjects.walkers) * len(session.blocks))

@@ -19,7 +19,7 @@ from gait_entrainment_sessions.folder import PLAN, SessionFolder
 
 @dataclass(frozen=True)
 class Place:
-    """Where a run is, and of whom and which block it is."""
+    """Where a run is stored, and which person and block it belongs to."""
 
     bag: Path
     study: str = ""
@@ -31,7 +31,7 @@ class Place:
 
     @property
     def sealed(self) -> bool:
-        """Whether nothing may be told yet by which the block would be known."""
+        """Whether anything that identifies the block must stay hidden."""
         return self.folder is not None and self.folder.sealed
 
 
@@ -44,20 +44,20 @@ class PlacedRun:
 
     @property
     def start(self) -> int:
-        """The instant from which its tables count [ns]."""
+        """The stamp from which its tables count [ns]."""
         first = [s.start for s in self.run.strides[:1]] or [e.stamp for e in self.run.events]
         return min(first, default=0)
 
     @cached_property
     def timings(self) -> dict[int, PulseTiming]:
-        """The pulses by their onset [ns], be it the commanded or the measured one."""
+        """The pulses by onset [ns], under both the commanded and the measured one."""
         return {
             at: timing for timing in self.run.timings for at in (timing.onset, timing.commanded)
         }
 
     @property
     def parts(self) -> tuple[JudgedBlock, ...]:
-        """The blocks of its protocol, each judged by itself; of a protocol without, all of it."""
+        """The blocks of its protocol, each judged separately; without blocks, the whole run."""
         run, strides = self.run, self.run.strides
         side, end = (strides[-1].side, strides[-1].end) if strides else (Side.RIGHT, math.inf)
         periods = run.measured_period, run.pulse_period
@@ -65,19 +65,19 @@ class PlacedRun:
 
 
 def is_sealed(bag: Path) -> bool:
-    """Whether a bag, or a file of it, lies in a session of which nothing is to be told yet."""
+    """Whether a bag, or a file of it, belongs to a session that is still sealed."""
     folder = _session_around(bag)
     return folder is not None and folder.sealed
 
 
 def sessions_in(path: Path) -> list[SessionFolder]:
-    """Return the sessions in a folder, which may be one itself."""
+    """Return the sessions in a folder, which may itself be one."""
     found = sorted(path.rglob(PLAN)) if path.is_dir() else []
     return [SessionFolder(file.parent) for file in found]
 
 
 def _session_around(path: Path) -> SessionFolder | None:
-    """Return the session that a path lies in, if it lies in one."""
+    """Return the session that contains a path, if any."""
     around = (parent for parent in path.resolve().parents if (parent / PLAN).exists())
     return next(map(SessionFolder, around), None)
 
@@ -86,7 +86,7 @@ def places_in(path: Path) -> list[Place]:
     """
     Return the runs of a bag, a session, a study or a folder of bags, in order.
 
-    Of a session those that stand for its blocks. Raises BagError if there are none.
+    Of a session, only the runs that count for its blocks. Raises BagError if there are no runs.
     """
     sessions = sessions_in(path)
     places = [place for folder in sessions for place in _of_session(folder)]
@@ -98,13 +98,13 @@ def places_in(path: Path) -> list[Place]:
             for n, bag in enumerate(bags, start=1)
         ]
     if not places:
-        why = "no block of it is done yet" if sessions else "a bag, a session, or a folder of them"
-        raise BagError(f"{path}: no recorded run: {why}")
+        why = "no block is done yet" if sessions else "give a bag, a session, or a folder of them"
+        raise BagError(f"{path}: no recorded run; {why}")
     return places
 
 
 def read_runs(path: Path) -> Iterator[PlacedRun]:
-    """Read the runs of places_in one by one, without the torques that figures show."""
+    """Yield the runs of places_in one by one, without the torques, which only figures show."""
     for place in places_in(path):
         yield PlacedRun(place, read_run(place.bag, torques=False))
 

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Statistics of pulse phases beside the verdict: within a run, over blocks, across persons.
+Statistics of pulse phases in addition to the verdict: within a run, over blocks, across persons.
 
-Each is defined, with its source and with what it cannot show, in docs/analysis.md. None enters the
-verdict. Intervals are of 95 %.
+Each is defined in docs/analysis.md, with its source and with what it cannot show. None of them
+enters the verdict. Intervals are 95 % intervals.
 """
 
 import math
@@ -23,15 +23,15 @@ from gait_entrainment_studies.cohort.locked import locked_runs
 
 Floats = NDArray[np.float64]
 CONFIDENCE = 0.95
-# Pulses whose slope is taken, and whose phases give direction and concentration: the literature's
+# How many of the last pulses give the slope, and the direction and concentration: the literature's
 # "last ten or so", and the shortest window of the verdict.
 SLOPE_PULSES, DIRECTION_PULSES = 10, 20
-# A pulse this near to where most of them are counts as locked, as a share of the stride.
+# A pulse this close to where most of them are counts as locked; a share of the stride.
 LOCKED_WITHIN = 0.05
 
 
 class Estimate(NamedTuple):
-    """A value with its 95 % interval; NaN where it cannot be told."""
+    """A value with its 95 % interval; NaN if unknown."""
 
     value: float
     low: float
@@ -43,26 +43,26 @@ UNKNOWN = Estimate(math.nan, math.nan, math.nan)
 
 @dataclass(frozen=True)
 class Direction:
-    """Where in the stride pulses fall, and how close together."""
+    """Where in the stride the pulses lie, and how close together."""
 
     count: int
     phase: float  # mean direction, in strides since heel strike, 0 to below 1
     resultant: float  # mean resultant length, 0 to 1
-    kappa: float  # concentration (von Mises); infinite if all are equal, NaN of one
+    kappa: float  # concentration (von Mises); infinite if all are equal, NaN for a single one
 
 
 @dataclass(frozen=True)
 class Locking:
-    """How much of a run was locked, wherever that is."""
+    """How much of a run was locked, at whatever lag."""
 
-    lag: float  # around which most lags lie [s]
-    share: float  # of the pulses, within the tolerance of it
+    lag: float  # where most lags lie [s]
+    share: float  # share of the pulses within the tolerance of it
     runs: tuple[int, ...]  # lengths of the spans of locked pulses
 
 
 @dataclass(frozen=True)
 class Border:
-    """Where entrainment ends on one side: between two of the offsets that were tried."""
+    """Where entrainment ends on one side: between two of the offsets tried."""
 
     entrained: float  # largest offset found entrained [% of the stride], with its sign; 0 if none
     beyond: float  # next larger offset found not entrained; infinite if none was tried
@@ -70,7 +70,7 @@ class Border:
 
 
 def last_pulses(analysis: Analysis) -> tuple[PulsePhase, ...]:
-    """Return the pulses with a lag of the last stretch: of one train, after the latest hole."""
+    """Return the pulses with a lag in the last stretch: of one train, after the latest hole."""
     placed = [pulse for pulse in analysis.pulses if not math.isnan(pulse.phase_lag)]
     if analysis.entrainments:
         last = analysis.entrainments[-1].stretch
@@ -83,12 +83,12 @@ def slope(strides: Sequence[float], lags: Sequence[float]) -> Estimate:
     """
     Return the least-squares slope of lags [s] over stride numbers, with Student's interval.
 
-    NaN for fewer than three points or strides that are all the same.
+    NaN if there are fewer than three points or all strides are the same.
     """
     if len(lags) < 3 or len(set(strides)) < 2:
         return UNKNOWN
     fitted = stats.linregress(strides, lags)
-    # Of lags that are all the same it divides zero by zero.
+    # If all lags are the same, linregress divides zero by zero.
     error = fitted.stderr if np.ptp(lags) else 0.0
     half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, len(lags) - 2)) * error
     return Estimate(float(fitted.slope), float(fitted.slope - half), float(fitted.slope + half))
@@ -102,7 +102,7 @@ def direction(phases: Sequence[float]) -> Direction:
     vector = stats.directional_stats(np.column_stack([np.cos(angles), np.sin(angles)]))
     resultant = min(float(vector.mean_resultant_length), 1.0)
     phase = math.atan2(*vector.mean_direction[::-1]) / (2 * math.pi) % 1.0 % 1.0
-    # Of equal angles the likelihood grows without end.
+    # If all angles are equal, the likelihood grows without bound.
     alike = math.inf if len(phases) > 1 else math.nan
     kappa = alike if 1.0 - resultant < 1e-12 else float(stats.vonmises.fit(angles, fscale=1)[0])
     return Direction(len(phases), phase, resultant, kappa)
@@ -110,11 +110,11 @@ def direction(phases: Sequence[float]) -> Direction:
 
 def convergence(numbers: Sequence[float], lags: Sequence[float]) -> Estimate:
     """
-    Return the time constant, in pulses, of an exponential approach of the lags to a last one.
+    Return the time constant, in pulses, of an exponential approach of the lags to a final value.
 
-    Least squares of L + A exp(-n / tau); the interval is that of log(tau) by the covariance of the
-    fit. NaN if no approach can be told: A is not shown to differ from zero, the interval goes
-    beyond the pulses, so that a lag that drifts would do as well, or a lag is not known.
+    Least squares fit of L + A exp(-n / tau); the interval is that of log(tau), from the covariance
+    of the fit. NaN if no approach is shown: A may be zero, the interval extends beyond the pulses
+    (a drifting lag would fit as well), a lag is unknown, or there are fewer than eight.
     """
     if len(lags) < 8 or math.isnan(sum(lags)):
         return UNKNOWN
@@ -124,7 +124,7 @@ def convergence(numbers: Sequence[float], lags: Sequence[float]) -> Estimate:
     guess = [last / scale, (y[0] - last) / scale, math.log(max(n[-1] / 5, 1.0))]
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # no covariance: found below
+            warnings.simplefilter("ignore")  # a missing covariance is handled below
             fitted, covariance = optimize.curve_fit(_approach, n, y / scale, p0=guess, maxfev=2000)
     except RuntimeError:  # it does not converge
         return UNKNOWN
@@ -144,14 +144,14 @@ def locking(pulses: Sequence[PulsePhase], stride: float) -> Locking:
     """
     Return how many pulses lie within 5 % of the stride [s] of where most of them lie.
 
-    Runs end at a pulse that is missing. By chance, that is of pulses that run through the stride
-    evenly, the share is 10 %.
+    Runs end at a missing pulse. By chance, for pulses that run evenly through the stride, the
+    share is 10 %.
     """
     lags = np.array([pulse.phase_lag for pulse in pulses])
     if not lags.size or not stride > 0:
         return Locking(math.nan, math.nan, ())
     reach = LOCKED_WITHIN * stride
-    # Each lag counts those near it: of a thousand pulses that is soon done.
+    # Each lag counts those near it, which is quick even for a thousand pulses.
     near = [int((np.abs(_wrapped(lags - lag, stride)) <= reach).sum()) for lag in lags]
     lag = float(lags[int(np.argmax(near))])
     around = _wrapped(lags - lag, stride)
@@ -169,10 +169,10 @@ def _wrapped(lags: Floats, stride: float) -> Floats:
 
 def border(offsets: Iterable[tuple[float, str]], sign: int) -> Border:
     """
-    Return where entrainment ends among blocks (offset [% of the stride], verdict) of one side.
+    Return where entrainment ends on one side, from blocks (offset [% of the stride], verdict).
 
     ``sign`` is +1 for pulses slower than the walker, -1 for faster ones. Only "entrained",
-    "drifting" and "lost" say anything; any other verdict leaves the interval as wide as it is.
+    "drifting" and "lost" count; any other verdict does not narrow the interval.
     """
     side = [(abs(o), v) for o, v in offsets if o * sign > 0]
     held = max((o for o, v in side if v == "entrained"), default=0.0)
@@ -200,7 +200,7 @@ def mean(values: Sequence[float]) -> Estimate:
 
 
 def deviation(values: Sequence[float]) -> Estimate:
-    """Return their standard deviation, with the interval of the chi-square distribution."""
+    """Return the standard deviation of such values, with the chi-square interval."""
     n = len(values)
     if n < 2:
         return UNKNOWN
@@ -211,14 +211,14 @@ def deviation(values: Sequence[float]) -> Estimate:
 
 def rayleigh(phases: Sequence[float]) -> float:
     """
-    Return Rayleigh's p that phases, one of each person, come from no direction in particular.
+    Return the p-value of Rayleigh's test that phases, one per person, have no common direction.
 
-    Not of the pulses of one run: they are periodic, so that it finds a direction in any few.
+    Not meant for the pulses of one run: they are periodic, so any few of them show a direction.
     """
     n = len(phases)
     if n < 2:
         return math.nan
-    # Zar, Biostatistical Analysis, 5th ed., eq. 27.4. The series of other libraries falls below
-    # zero for few phases that are close together, as those of persons that entrain are.
+    # Zar, Biostatistical Analysis, 5th ed., eq. 27.4. The series that other libraries use falls
+    # below zero for a few phases close together, such as those of persons who entrain.
     spread = n**2 * (1 - direction(phases).resultant ** 2)
     return math.exp(math.sqrt(1 + 4 * n + 4 * spread) - (1 + 2 * n))

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Tidy tables over runs, for statistics software: a row per event, stride, pulse and block.
+Tidy tables of runs, for statistics software: one row per event, stride, pulse or block.
 
-Each begins with person, session and block. As TSV with a JSON file beside it that says what each
-column is and in which unit, as BIDS has it; or as Parquet with that in the columns' metadata.
+Each row starts with person, session and block. A table is written as TSV with a JSON sidecar of
+each column's meaning and unit, as in BIDS, or as Parquet with these in the columns' metadata.
 """
 
 import json
@@ -25,12 +25,12 @@ from gait_entrainment_sessions.findings import Findings
 from gait_entrainment_sessions.runs import PlacedRun
 
 FORMATS = ("tsv", "parquet")
-Row = tuple[Any, ...]  # a cell per column; NaN and None are n/a
+Row = tuple[Any, ...]  # one cell per column; NaN and None are n/a
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column: its name, what it says, its unit, and the words that it may hold."""
+    """A column: its name, meaning and unit, and the words that it may hold."""
 
     name: str
     meaning: str
@@ -42,18 +42,18 @@ _SIDES = tuple(side.name.lower() for side in Side)
 _PLACE = (
     Column("person", "code of the person"),
     Column("session", "label of the session"),
-    Column("block", "place of the block in the session, from 1"),
+    Column("block", "number of the block in the session, from 1"),
     Column("name", "name of the block; only its number while the session is blinded"),
 )
-_BLOCK = Column("part", "block of the protocol, if that has several")
+_BLOCK = Column("part", "block of the protocol, if it has several")
 _FROM_START = "since the first heel strike of the perturbed leg"
 TABLES: dict[str, tuple[Column, ...]] = {
     "events": (
-        Column("onset", f"instant {_FROM_START}", "s"),
-        Column("duration", "how long it lasted", "s"),
-        Column("trial_type", "what happened", words=("heel_strike", "toe_off", "pulse")),
+        Column("onset", f"time {_FROM_START}", "s"),
+        Column("duration", "duration of the event", "s"),
+        Column("trial_type", "kind of event", words=("heel_strike", "toe_off", "pulse")),
         Column("side", "leg", words=_SIDES),
-        Column("number", "step of a gait event, number of a pulse"),
+        Column("number", "step of a gait event, or number of a pulse"),
     ),
     "strides": (
         Column("stride", "number of the stride of the perturbed leg, from 1"),
@@ -63,16 +63,16 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("period", "stride period", "s"),
         Column("first_step", "its first step, to the other leg's heel strike", "s"),
         Column("second_step", "its second step", "s"),
-        Column("pulses", "pulses that began in it"),
+        Column("pulses", "number of pulses that began in it"),
     ),
     "pulses": (
         _BLOCK,
-        Column("pulse", "its number in the run, or in such a block, from 1"),
+        Column("pulse", "number of the pulse in the run, or in such a block, from 1"),
         Column("stride", "stride in which it began"),
         Column("side", "the perturbed leg", words=_SIDES),
         Column("onset", f"commanded onset {_FROM_START}", "s"),
-        Column("torque", "height asked for; 0 of a sham and of a pulse left out", "N m"),
-        Column("phase", "place of the onset in its stride, 0 to below 1", "1"),
+        Column("torque", "height requested; 0 for a sham and for a catch pulse", "N m"),
+        Column("phase", "phase of the onset in its stride, from 0 to below 1", "1"),
         Column(
             "phase_lag", "onset minus the nearest toe-off (heel strike if none was detected)", "s"
         ),
@@ -84,8 +84,8 @@ TABLES: dict[str, tuple[Column, ...]] = {
         _BLOCK,
         Column("verdict", "verdict at the end", words=[v.name.lower() for v in Verdict]),
         Column("stride_period", "mean stride period before the pulses", "s"),
-        Column("pulse_period", "pulse period as planned", "s"),
-        Column("offset", "pulse period minus stride period, of the stride period", "percent"),
+        Column("pulse_period", "planned pulse period", "s"),
+        Column("offset", "pulse period minus stride period, over the stride period", "percent"),
         Column("variation", "coefficient of variation of the stride before the pulses", "percent"),
         Column("slope", "slope of the lag over the last 10 pulses", "s"),
         Column("slope_low", "lower end of its 95 % interval", "s"),
@@ -93,23 +93,23 @@ TABLES: dict[str, tuple[Column, ...]] = {
         Column("phase", "mean direction of the last 20 pulses, in strides", "1"),
         Column("resultant", "their mean resultant length", "1"),
         Column("kappa", "their concentration (von Mises)", "1"),
-        Column("time_constant", "of an exponential approach of the lag, in pulses", "1"),
+        Column("time_constant", "that of the lag's exponential approach, in pulses", "1"),
         Column("time_constant_low", "lower end of its 95 % interval", "1"),
         Column("time_constant_high", "upper end", "1"),
         Column("locked", "share of the pulses within 5 % of the stride of most of them", "1"),
         Column("mean_run", "mean length of the spans of such pulses", "1"),
-        Column("holes", "holes of the record"),
+        Column("holes", "number of holes in the record"),
     ),
 }
 
-_TELLING = ("pulses", "blocks")  # tables in which the condition of a run can be read
+_TELLING = ("pulses", "blocks")  # tables that reveal the condition of a run
 
 
 def rows_of(placed: PlacedRun, kind: str) -> Iterator[Row]:
     """
-    Return the rows of a run in one of TABLES, without person, session and block.
+    Yield the rows of a run in one of TABLES, without person, session and block.
 
-    Of a sealed run there is no pulse in them, and nothing that follows from pulses.
+    For a sealed run they contain no pulse, and nothing that is derived from pulses.
     """
     run, start, sealed = placed.run, placed.start, placed.place.sealed
 
@@ -133,11 +133,11 @@ def rows_of(placed: PlacedRun, kind: str) -> Iterator[Row]:
             yield seconds(stamp), *rest
     elif kind == "strides":
         for s, part, count in _strides_of(placed):
-            told = (None, None) if sealed else (part, count)
-            place = s.side.name.lower(), seconds(s.start), s.period, *s.step_periods
-            yield s.number, told[0], *place, told[1]
+            ends = (None, None) if sealed else (part, count)
+            cells = s.side.name.lower(), seconds(s.start), s.period, *s.step_periods
+            yield s.number, ends[0], *cells, ends[1]
     elif kind == "pulses":
-        for block, p in ((one, p) for one in placed.parts for p in one.analysis.pulses):
+        for block, p in ((part, p) for part in placed.parts for p in part.analysis.pulses):
             timing = placed.timings[p.onset]
             yield (
                 block.name or None,
@@ -152,17 +152,17 @@ def rows_of(placed: PlacedRun, kind: str) -> Iterator[Row]:
                 *(_seconds_late(timing, kind) for kind in ("sent", "measured")),
             )
     else:
-        yield from (one.row for one in Findings.of(placed))
+        yield from (findings.row for findings in Findings.of(placed))
 
 
 def _strides_of(placed: PlacedRun) -> list[tuple[Stride, str, int]]:
-    """Return the strides in their order, each with its part and its number of pulses."""
+    """Return the strides in order, each with its part and its number of pulses."""
     found = []
     blocks = list[tuple[float, float]]()  # [ns]
-    for one in placed.parts:
-        strides = [s for s in one.analysis.strides if s.end <= one.end]
+    for block in placed.parts:
+        strides = [s for s in block.analysis.strides if s.end <= block.end]
         blocks += [(strides[0].start, strides[-1].end)] if strides else []
-        given = Counter(pulse.stride for pulse in one.analysis.pulses)
+        given = Counter(pulse.stride for pulse in block.analysis.pulses)
         first, last = min(given, default=math.inf), max(given, default=math.inf)
         for s in strides:
             part = "pulses" if first <= s.number <= last else "washout"
@@ -178,7 +178,7 @@ def _seconds_late(timing: PulseTiming, kind: str) -> float:
 
 def write_tables(runs: Iterable[PlacedRun], out: Path, format_name: str = "tsv") -> list[Path]:
     """
-    Write each of TABLES over all runs into a folder; files of these names are replaced.
+    Write each of TABLES over all runs into a folder, replacing existing files.
 
     Returns the paths. Raises BagError if pyarrow is missing for Parquet.
     """
@@ -202,7 +202,7 @@ def write_tables(runs: Iterable[PlacedRun], out: Path, format_name: str = "tsv")
 
 
 def write_tsv(path: Path, columns: Sequence[Column], rows: Iterable[Row]) -> None:
-    """Write a table as BIDS has it: a head, tabs, n/a for what is not known."""
+    """Write a table as in BIDS: a header line, tabs, n/a for unknown values."""
     with path.open("w", encoding="utf-8") as file:
         file.write("\t".join(column.name for column in columns) + "\n")
         for row in rows:
@@ -210,7 +210,7 @@ def write_tsv(path: Path, columns: Sequence[Column], rows: Iterable[Row]) -> Non
 
 
 def write_sidecar(path: Path, columns: Sequence[Column]) -> None:
-    """Write what a table's columns mean."""
+    """Write the meanings of a table's columns."""
     path.write_text(json.dumps({c.name: _about(c) for c in columns}, indent=1) + "\n")
 
 

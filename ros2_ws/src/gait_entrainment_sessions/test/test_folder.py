@@ -126,7 +126,7 @@ def test_two_do_not_conduct_it_at_once(begun):
 
 def test_a_block_is_repeated_while_it_goes_on_or_once_it_is_done(begun):
     folder = begun()
-    with pytest.raises(SessionError, match="no block has begun; allowed: none yet"):
+    with pytest.raises(SessionError, match="no block has started; allowed: none yet"):
         folder.repeat("why")
     folder.note("begun", 1, "block-01")
     with pytest.raises(SessionError, match="needs a reason"):
@@ -212,7 +212,8 @@ def test_a_key_that_is_not_the_sealed_one_is_refused(begun):
     content["blocks"].reverse()
     key.chmod(0o600)
     key.write_text(json.dumps(content))
-    with pytest.raises(SessionError, match=r"key.json: its SHA-256 is \w{12}..., not \w{12}"):
+    message = r"key.json: its SHA-256 starts with \w{12}, but .* has \w{12};"
+    with pytest.raises(SessionError, match=message):
         folder.unblind()
     assert folder.sealed
     key.unlink()
@@ -222,7 +223,7 @@ def test_a_key_that_is_not_the_sealed_one_is_refused(begun):
 
 def test_a_bag_that_names_another_key_is_told(done):
     folder = done(BLIND)  # of bags that name none
-    with pytest.raises(SessionError, match=r"not any... as .*block-01 says"):
+    with pytest.raises(SessionError, match=r"but .*block-01 has none;"):
         folder.unblind()
 
 
@@ -232,5 +233,5 @@ def test_a_session_that_is_not_blinded_has_no_seal(begun):
 
 
 def test_what_is_no_session_is_told(tmp_path):
-    with pytest.raises(SessionError, match=r"no session: no readable session.json"):
+    with pytest.raises(SessionError, match=r"not a session: no readable session.json"):
         SessionFolder(tmp_path).next_block()

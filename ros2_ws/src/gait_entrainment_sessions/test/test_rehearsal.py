@@ -64,4 +64,4 @@ def test_the_command_tells_what_would_have_been_found(write, tmp_path, capsys):
     assert "persons that entrained in some block" in outcome["study"]
     assert {"blocks.tsv", "blocks.json", "verdicts.svg"} <= {p.name for p in out.iterdir()}
     assert main([*arguments[:2], "--torque", "5"]) == 2
-    assert "torque: the session file says it" in capsys.readouterr().err
+    assert "torque: given by the session file" in capsys.readouterr().err

@@ -71,7 +71,7 @@ MISTAKES = [
     ("torque: 9.0", "torque: 16", 10, "torque: 16 N m is outside the limit"),
     ("torque_fraction: 0.1", "width: 0.6", 15, "width: 0.6 s is outside the limit"),
     ("side: left", "driver: emulatd", 7, "driver: 'emulatd' is unknown; allowed: "),
-    ("side: left", "limits: {torque: 4}", 7, "limits.torque: limits are the person's"),
+    ("side: left", "limits: {torque: 4}", 7, "limits.torque: limits belong to the person"),
     ("code: P01", "code: P 01", 3, "person.code: 'P 01'; allowed: letters and digits"),
     ("number: 2, ", "nmber: 2, ", 3, "person.nmber: unknown field; allowed: code, leg_length"),
     ("mass: 72, ", "", 3, "person.mass: missing; allowed: 5 to 500 kg"),

@@ -136,7 +136,7 @@ def test_each_block_of_a_protocol_has_a_row_of_its_own_and_its_parts(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("given", "finding"), [(0, "none was asked for"), (1, "1 of 1 pulses compared")]
+    ("given", "finding"), [(0, "none was requested"), (1, "1 of 1 pulses compared")]
 )
 def test_torque_is_compared_where_some_was_asked_for(bag, given, finding):
     run = read_run(bag)
@@ -156,10 +156,10 @@ def test_what_cannot_be_told_is_not_told_as_a_number(text, tmp_path):
 
 
 def test_a_folder_without_runs_is_told(done, tmp_path):
-    with pytest.raises(BagError, match="no recorded run: a bag, a session"):
+    with pytest.raises(BagError, match="no recorded run; give a bag, a session"):
         places_in(tmp_path)
     folder = done()
     folder.repeat("why", 1)
     folder.repeat("why", 2)
-    with pytest.raises(BagError, match="no block of it is done yet"):
+    with pytest.raises(BagError, match="no recorded run; no block is done yet"):
         places_in(folder.path)

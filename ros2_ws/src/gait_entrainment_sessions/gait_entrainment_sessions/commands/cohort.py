@@ -39,8 +39,8 @@ from gait_entrainment_studies.sweep.engine import JOBS, chosen_jobs
 DESCRIPTION = (
     "Draw subjects, give each its own stride-to-stride variability, conduct the experiment on "
     "each at several pulse periods relative to its measured stride period, and judge each "
-    "trial as a real one. Not in the paper: an extension. With a session file the subjects walk "
-    "its blocks instead: the rehearsal of a study, with what would have been found."
+    "trial as a real one. An extension: not in the paper. With a session file, the subjects walk "
+    "its blocks instead: a rehearsal of the study, with the results that it would have found."
 )
 EXAMPLES = """examples:
   entrain cohort --out cohort               19 subjects, nine pulse periods
@@ -64,9 +64,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     experiment = parser.add_argument_group("experiment")
     cli.add_setting(experiment, "subjects", _SUBJECTS, "19")
     cli.add_settings(experiment, StudyPlan)
-    shown = f"{' '.join(_OFFSETS)}; may be given again"
-    told = _PERIOD_OFFSET
-    cli.add_setting(experiment, "period_offset", told, shown=shown, action="append")
+    shown = f"{' '.join(_OFFSETS)}; may be repeated"
+    cli.add_setting(experiment, "period_offset", _PERIOD_OFFSET, shown=shown, action="append")
     drawn = parser.add_argument_group("distributions of the subjects")
     for item in fields(SubjectDistributions):
         mean, deviation = getattr(SubjectDistributions, item.name)
@@ -107,11 +106,11 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _rehearse(options: argparse.Namespace, distributions: SubjectDistributions) -> int:
-    said = [name for name in settings_of(StudyPlan) if getattr(options, name) is not None]
+    given = [name for name in settings_of(StudyPlan) if getattr(options, name) is not None]
     if options.period_offset:
-        said.append("period_offset")
-    if other := [name for name in said if name not in ("seed", "hurst")]:
-        raise UsageError(f"{other[0]}: the session file says it; leave the option out")
+        given.append("period_offset")
+    if other := [name for name in given if name not in ("seed", "hurst")]:
+        raise UsageError(f"{other[0]}: given by the session file; leave the option out")
     plan = cli.chosen(options, StudyPlan)
     session = read_session(options.session)
     count = _SUBJECTS.parse("subjects", options.subjects)
@@ -122,27 +121,27 @@ def _rehearse(options: argparse.Namespace, distributions: SubjectDistributions) 
     total = count * len(session.blocks)
     runs = sorted(
         tqdm(rehearsed, total=total, unit="block", disable=None, leave=False),
-        key=lambda one: (one.place.block, one.place.person),
+        key=lambda placed: (placed.place.block, placed.place.person),
     )
-    findings = [one for placed in runs for one in Findings.of(placed)]
+    findings = [finding for placed in runs for finding in Findings.of(placed)]
     study = StudyFindings.of(findings)
     blocks: dict[str, Any] = {}
     lines = ["| block | verdicts | pulses locked* |", "| --- | --- | --- |"]
-    for name in dict.fromkeys(one.name for one in findings):
-        own = [one for one in findings if one.name == name]
-        verdicts = Counter(one.verdict for one in own)
-        runs_of = [one.placed for one in own]
-        fell = len({one.place.person for one in runs_of if getattr(one.run, "ending", None)})
-        shares = [one.locking.share for one in own if not np.isnan(one.locking.share)]
+    for name in dict.fromkeys(finding.name for finding in findings):
+        own = [finding for finding in findings if finding.name == name]
+        verdicts = Counter(finding.verdict for finding in own)
+        runs_of = [finding.placed for finding in own]
+        fell = len({run.place.person for run in runs_of if getattr(run.run, "ending", None)})
+        shares = [f.locking.share for f in own if not np.isnan(f.locking.share)]
         locked = float(np.mean(shares)) if shares else None
         blocks[name] = {"verdicts": dict(verdicts), "locked": locked, "ended_early": fell}
-        told = ", ".join(f"{number} {verdict}" for verdict, number in sorted(verdicts.items()))
-        told += f"; {fell} fell or flew off" if fell else ""
-        lines.append(f"| {name} | {told} | {'-' if locked is None else f'{100 * locked:.0f} %'} |")
+        cell = ", ".join(f"{number} {verdict}" for verdict, number in sorted(verdicts.items()))
+        cell += f"; {fell} fell or flew off" if fell else ""
+        lines.append(f"| {name} | {cell} | {'-' if locked is None else f'{100 * locked:.0f} %'} |")
     outcome = {"subjects": count, "blocks": blocks, "study": dict(study.rows)}
     lines += [
         "",
-        "* within 5 % of the stride of most of them; mean over the subjects",
+        "* within 5 % of the stride of where most of them are; mean over the subjects",
         *(f"{name}: {value}" for name, value in study.rows),
     ]
 
@@ -194,7 +193,7 @@ def _spread(values: Floats) -> list[float]:
 
 
 def _of(found: int, count: int) -> str:
-    """Return how many, with the 95 % interval of the share by Wilson's score."""
+    """Return the count with Wilson's 95 % interval of the share."""
     _, low, high = share(found, count)
     return f"{found} of {count}, 95 % interval {100 * low:.0f} to {100 * high:.0f} %"
 
@@ -206,9 +205,9 @@ def _summary(outcome: dict[str, Any]) -> str:
         return "-" if value is None else form.format(value * factor)
 
     lines = [
-        f"subjects         {count}, {outcome['redrawn_for_want_of_a_gait']} drawn again for want"
-        f" of a gait; measured stride period {shown(outcome['mean_stride_period'], '{:.4f}')} s on"
-        " average",
+        f"subjects         {count}, {outcome['redrawn_for_want_of_a_gait']} drawn again because"
+        " they had no gait; measured stride period"
+        f" {shown(outcome['mean_stride_period'], '{:.4f}')} s on average",
         "",
         "| offset [ms] | verdicts | strides locked* | mean run* | lag of the entrained [ms] |",
         "| --- | --- | --- | --- | --- |",
@@ -222,7 +221,7 @@ def _summary(outcome: dict[str, Any]) -> str:
             f" {shown(row['lag_of_entrained'], '{:.1f}', 1e3)} |"
         )
     lines.append(
-        "\n* within 5 % of the stride of the lock without noise; over the subjects that have one"
+        "\n* within 5 % of the stride of the noise-free lock; over the subjects that have one"
     )
     for row in outcome["periods"]:
         if row["period_offset"] == _HEADLINE:
@@ -237,14 +236,14 @@ def _summary(outcome: dict[str, Any]) -> str:
         shortest, longest = outcome["basin_ends_percent"]
         lines.append(
             f"basin without noise, solved: {mean:.2f} +/- {deviation:.2f} % of the stride,"
-            f" from {shortest:+.2f} to {longest:+.2f} % on average (human: 6.7 +/- 3.6 %, to both"
+            f" from {shortest:+.2f} to {longest:+.2f} % on average (human: 6.7 +/- 3.6 %, on both"
             " sides)"
         )
     mean, deviation = outcome["basin_measured_percent"]
     lines.append(
         f"furthest period found entrained: {mean:.2f} +/- {deviation:.2f} %\n"
-        "Fed in: body sizes, peak torque, variability and its correlation, the pulse. Predicted:"
-        " who entrains, the locked phase, the mean basin. The spread of the basin is mostly fed"
-        " in."
+        "Inputs: body sizes, peak torque, variability and its correlation, the pulse. Predicted:"
+        " who entrains, the locked phase, the mean basin. The spread of the basin comes mostly"
+        " from the inputs."
     )
     return "\n".join(lines)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""entrain plan: how many pulses give which chance of a right verdict."""
+"""entrain plan: the chance of a correct verdict by number of pulses."""
 
 import argparse
 import json
@@ -14,8 +14,8 @@ from gait_entrainment_sessions.power import COUNTS, PowerPlan, enough_of, power
 from gait_entrainment_sessions.statistics import Estimate
 
 DESCRIPTION = (
-    "Say, for a variation of the stride and a pulse period, after how many pulses the verdict is "
-    "right with which chance: by walks that lock or ignore the pulses, judged as real ones."
+    "Estimate the chance of a correct verdict after each number of pulses, for a variation of the "
+    "stride and a pulse period, from walks that lock or ignore the pulses, judged as real ones."
 )
 EXAMPLES = """examples:
   entrain plan                                     2 % variation, pulses 50 ms faster
@@ -44,25 +44,26 @@ def run(options: argparse.Namespace) -> int:
     found = power(plan, offset, counts)
     enough = enough_of(found, _ENOUGH)
     if options.json:
-        rows: list[Any] = [asdict(one) for one in found]
+        rows: list[Any] = [asdict(chances) for chances in found]
         plain = {"plan": asdict(plan), "period_offset": offset, "chances": rows, "enough": enough}
         print(json.dumps(plain))
         return 0
     print(
-        "| pulses | one that locks is called entrained | one that ignores them drifting |"
-        " one that ignores them entrained |\n| --- | --- | --- | --- |"
+        "| pulses | locks, judged entrained | ignores them, judged drifting |"
+        " ignores them, judged entrained |\n| --- | --- | --- | --- |"
     )
-    for one in found:
-        cells = " | ".join(_shown(e) for e in (one.entrained, one.drifting, one.wrongly))
-        print(f"| {one.pulses} | {cells} |")
-    told = f"from {enough} pulses on" if enough else "with none of these numbers"
-    print(f"\nboth right with a chance of {100 * _ENOUGH:.0f} %: {told}")
+    for row in found:
+        cells = " | ".join(_shown(e) for e in (row.entrained, row.drifting, row.wrongly))
+        print(f"| {row.pulses} | {cells} |")
+    answer = f"from {enough} pulses on" if enough else "with none of these numbers"
+    print(f"\nboth right with a chance of {100 * _ENOUGH:.0f} %: {answer}")
     print(
-        f"95 % intervals, {plan.trials} walks of each kind. Assumed: one that locks makes good"
-        f" {100 * plan.gain:g} % of its distance in a stride, at most {100 * plan.limit:g} % of it"
+        f"95 % intervals, {plan.trials} walks of each kind. Assumed: a walker that locks corrects"
+        f" {100 * plan.gain:g} % of its distance in each stride, at most {100 * plan.limit:g} % of"
+        " the stride"
     )
     return 0
 
 
-def _shown(one: Estimate) -> str:
-    return f"{100 * one.value:.0f} % ({100 * one.low:.0f} to {100 * one.high:.0f})"
+def _shown(chance: Estimate) -> str:
+    return f"{100 * chance.value:.0f} % ({100 * chance.low:.0f} to {100 * chance.high:.0f})"

@@ -10,9 +10,9 @@ from gait_entrainment.errors import UsageError
 from gait_entrainment_sessions.report import write_report
 
 DESCRIPTION = (
-    "Write one HTML page about a run, a session or a study: the protocol as run, whether the data "
-    "are sound, then the results, with statistics. It needs nothing from elsewhere, for a phone "
-    "as for paper (A4)."
+    "Write a self-contained HTML page about a run, a session or a study: whether the data are "
+    "sound, the protocol as run, then the results with statistics. It is laid out for phones and "
+    "for A4 paper."
 )
 EXAMPLES = """examples:
   entrain report bags/paper_example                 into bags/paper_example/report.html
@@ -23,7 +23,7 @@ EXAMPLES = """examples:
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    parser.add_argument("path", type=Path, metavar="FOLDER", help="bag, session, study")
+    parser.add_argument("path", type=Path, metavar="FOLDER", help="bag, session or study")
     parser.add_argument(
         "--out", type=Path, metavar="FILE", help="default: report.html in the folder"
     )
@@ -34,7 +34,7 @@ def run(options: argparse.Namespace) -> int:
     path = options.path
     out = options.out or (path if path.is_dir() else path.parent) / "report.html"
     if not out.parent.is_dir():
-        raise UsageError(f"--out: {out.parent} is no folder; allowed: a file in a folder")
+        raise UsageError(f"--out: {out.parent} is not a folder; allowed: a file in a folder")
     write_report(path, out)
     print(f"report           {out}")
     return 0

@@ -39,7 +39,7 @@ def svg_of(figure: Any, name: str) -> str:
 
 
 def _thinned(path: str) -> str:
-    """Return a path in hundredths of a point, without the points inside level lines."""
+    """Return a path in hundredths of a point, without the points inside horizontal lines."""
     lines = re.sub(r"(\.\d\d)\d+", r"\1", path).strip().split("\n")
     words = [line.split() for line in lines]
     level = [word[0] == "L" and word[2:] for word in words]
@@ -51,7 +51,7 @@ def _thinned(path: str) -> str:
 
 
 def draw_circle(findings: Findings) -> Any:
-    """Draw the phase of each pulse, the first in the middle, the last at the rim."""
+    """Draw the phase of each pulse, from the first in the centre to the last at the rim."""
     figure, axes = _new_circle(findings.direction)
     pulses = findings.part.analysis.pulses
     angles = 2 * np.pi * np.array([pulse.phase for pulse in pulses])
@@ -71,7 +71,7 @@ def draw_directions(study: StudyFindings) -> Any:
 
 
 def _new_circle(direction: Direction) -> tuple[Any, Any]:
-    """Return a figure, and its axes with the stride around them and an arrow to a mean phase."""
+    """Return a figure and its polar axes: the stride around them, an arrow to a mean phase."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(4.6, 4.6), layout="constrained")
@@ -92,15 +92,15 @@ def _new_circle(direction: Direction) -> tuple[Any, Any]:
 
 
 def draw_verdicts(findings: Sequence[Findings]) -> Any:
-    """Draw the verdict of each run over its pulse period, a line per person."""
-    persons = sorted({one.placed.place.person for one in findings})
+    """Draw the verdict of each run over its pulse period, one line per person."""
+    persons = sorted({finding.placed.place.person for finding in findings})
     figure, axes = drawing.new_figure(size=(7.2, 1.6 + 0.28 * len(persons)))
     axes.axvline(0, color=GREY, ls="--", lw=1.2)
-    for one in findings:
-        verdict = one.verdict
+    for finding in findings:
+        verdict = finding.verdict
         axes.plot(
-            one.offset_percent,
-            persons.index(one.placed.place.person),
+            finding.offset_percent,
+            persons.index(finding.placed.place.person),
             _MARKERS[verdict],
             color=COLOURS[verdict],
             label=verdict,

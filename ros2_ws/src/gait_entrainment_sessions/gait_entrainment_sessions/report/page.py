@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The page: what is told of each run, of a study, and the template that shows it."""
+"""The page: what it shows of each run and of a study, rendered by the template."""
 
 import math
 import multiprocessing
@@ -33,13 +33,13 @@ _TITLES = {
     "pulse_timing": "Timing of the pulses",
     "ankle_torque": "Torque per stride",
 }
-# Of more runs than this the page would be too heavy for a phone with the figures of each.
+# With more runs than this, the figures of each would make the page too heavy for a phone.
 DRAWN_AT_MOST = 12
 
 
 @dataclass(frozen=True)
 class RunSection:
-    """What the page tells of one run."""
+    """What the page shows of one run."""
 
     place: Place
     checks: list[Check]
@@ -59,7 +59,7 @@ class RunSection:
 
     @property
     def title(self) -> str:
-        """Whose and which block it is."""
+        """Person, session and block."""
         place = self.place
         whose = f"{place.person}, session {place.session}, " if place.person else ""
         return f"{whose}{place.block}: {place.name}" if whose else place.name
@@ -75,7 +75,7 @@ def write_report(path: Path, out: Path) -> None:
     section = partial(_section, drawn=len(places) <= DRAWN_AT_MOST)
     with ProcessPoolExecutor(mp_context=multiprocessing.get_context("fork")) as pool:
         sections = list((pool.map if len(places) > 1 else map)(section, places))
-    findings = [one for section in sections for one in section.findings]
+    findings = [finding for section in sections for finding in section.findings]
     study = StudyFindings.of(findings) if len(findings) > 1 else None
     content = {
         "title": sections[0].place.study or path.resolve().name,
@@ -111,19 +111,19 @@ def _section(place: Place, *, drawn: bool) -> RunSection:
         origin=origin,
         sealed=False,
         findings=findings,
-        protocol="not told" if run.protocol is None else write_protocol(run.protocol),
+        protocol="not recorded" if run.protocol is None else write_protocol(run.protocol),
         outcome=summary(outcome_of(run)),
-        statistics=[(one.part.name, statistics_of(one)) for one in findings],
+        statistics=[(finding.part.name, statistics_of(finding)) for finding in findings],
         figures=_drawn(run, findings) if drawn else [],
     )
 
 
 def _drawn(run: RecordedRun, findings: list[Findings]) -> list[tuple[str, str]]:
     drawn = [*run_figures(run).items()]
-    for one in findings:
-        if one.part.analysis.pulses:
-            name = f": {one.part.name}" if one.part.name else ""
-            drawn.append((f"circle{name}", figures.draw_circle(one)))
+    for finding in findings:
+        if finding.part.analysis.pulses:
+            name = f": {finding.part.name}" if finding.part.name else ""
+            drawn.append((f"circle{name}", figures.draw_circle(finding)))
     salt = f"{findings[0].placed.place.bag}"
     return [
         (title + name.removeprefix(key), figures.svg_of(figure, f"{salt}{number}{name}"))
@@ -146,7 +146,7 @@ def _overview(findings: Sequence[Findings], study: StudyFindings | None) -> list
 
 
 def statistics_of(findings: Findings) -> Rows:
-    """Return the statistics of a run, or of a block of its protocol, in words."""
+    """Return the statistics of a run, or of a block of its protocol, as text."""
     where, locking = findings.direction, findings.locking
     runs = locking.runs
     lengths = "none"
@@ -155,21 +155,21 @@ def statistics_of(findings: Findings) -> Rows:
     kappa = "above a million" if where.kappa > 1e6 else told(where.kappa, "{:.3g}")
     return [
         (
-            "variation of the stride before the pulses",
+            "variation of the stride period before the pulses",
             told(findings.variation_percent, "{:.2f} %"),
         ),
         ("slope of the lag, last 10 pulses", shown(findings.slope, "ms per stride", 1e3)),
         (f"mean direction, last {where.count} pulses", told(where.phase, "{:.3f} of the stride")),
         ("resultant length", told(where.resultant, "{:.3f}")),
         ("concentration (von Mises kappa)", kappa),
-        ("time constant of the approach", shown(findings.time_constant, "pulses")),
+        ("time constant of the lag's approach", shown(findings.time_constant, "pulses")),
         ("pulses within 5 % of the stride of most of them", told(100 * locking.share, "{:.0f} %")),
         ("spans of such pulses", lengths),
     ]
 
 
 def _border(border: Border) -> str:
-    """Return where entrainment ends on one side, in words."""
+    """Return where entrainment ends on one side, as text."""
     beyond = "no larger one tried" if math.isinf(border.beyond) else f"not at {border.beyond:+.2f}"
     held = f"{border.entrained:+.2f}" if border.entrained else "none"
     odd = "" if border.consistent else "; a smaller one did not entrain"
