@@ -2,18 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The command line ``entrain``: a table of commands, each loaded only when it is asked for.
+The command line ``entrain``: a table of commands, each loaded only when it is requested.
 
 A package adds commands by the entry point ``gait_entrainment.commands``. It names a module with
-``COMMANDS``, a mapping from name to what the command is for. The command itself is the module of
-that name in the same package:
+``COMMANDS``, a mapping from command name to purpose. The command itself is the module of that
+name in the same package:
 
-    DESCRIPTION, EXAMPLES     what ``entrain NAME --help`` says
+    DESCRIPTION, EXAMPLES     text of ``entrain NAME --help``
     add_options(parser)       adds the options
-    run(options) -> int       does it and returns the exit code; a command of several actions has
-                              none, but sets it as a default of each action's parser
+    run(options) -> int       runs it and returns the exit code; a command with several actions
+                              has no run, but sets it as a default of each action's parser
 
-Whatever a command raises as an EntrainmentError is printed here, in one line.
+An EntrainmentError that a command raises is printed here, in one line.
 """
 
 import argparse
@@ -33,20 +33,20 @@ ENTRY_POINTS = "gait_entrainment.commands"
 COMMANDS = {
     "simulate": "the experiment in one process, without ROS",
 }
-# Where to look first: to search all packages takes longer than these commands, and stop hurries.
+# Where to look first: searching all packages takes longer than these commands; stop is urgent.
 _FOUND_AT_ONCE = {"simulate": __name__, "stop": "gait_entrainment_drivers.commands"}
-# Whatever ends these takes the same path as Ctrl-C, from their very beginning: torque first, then
-# the rest. Suspended, a robot would stay enabled.
+# From the very start, whatever ends these takes the same path as Ctrl-C: torque first, then the
+# rest. If they were suspended, a robot would stay enabled.
 _WITH_NODES_OR_ROBOT = ("driver", "node", "page", "preflight", "replay", "run", "session")
 _DESCRIPTION = "Rehearse, run and analyze entrainment experiments."
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; return 0 if it is done, 1 if it failed, 2 for wrong usage."""
+    """Run one command; return 0 if it succeeded, 1 if it failed, 2 for wrong usage."""
     if isinstance(sys.stdout, io.TextIOWrapper):  # None if it is closed
-        sys.stdout.reconfigure(errors="backslashreplace")  # what a terminal has no character for
-    os.environ.pop("MPLBACKEND", None)  # of windows, perhaps one not known here: figures are files
-    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it does without a cache folder, too
+        sys.stdout.reconfigure(errors="backslashreplace")  # characters that a terminal lacks
+    os.environ.pop("MPLBACKEND", None)  # for windows, maybe unknown here: figures are files
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it works without a cache folder
     words = sys.argv[1:] if arguments is None else list(arguments)
     name = words[0] if words else ""
     prog = f"entrain {name}"
@@ -56,13 +56,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options = make_parser(name).parse_args(words)
         prog = options.prog
         code = int(options.run(options))
-        print(end="", flush=True)  # what was printed and cannot be written is an error, too
+        print(end="", flush=True)  # printed text that cannot be written is an error too
         return code
     except EntrainmentError as error:
-        # One line, whatever names it holds, and behind it, indented, the end of a node's log.
+        # One line, whatever names it contains, followed by the indented end of a node's log.
         reason, indented, log = str(error).partition("\n  ")
-        told = (c if c.isprintable() else repr(c)[1:-1] for c in reason)
-        _tell(f"{prog}: {''.join(told)}{indented}{log}")
+        printable = (c if c.isprintable() else repr(c)[1:-1] for c in reason)
+        _tell(f"{prog}: {''.join(printable)}{indented}{log}")
         return error.exit_code
     except ModuleNotFoundError as error:
         package = (error.name or "").partition(".")[0]
@@ -83,13 +83,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _tell(line: str) -> None:
-    """Print a line on standard error; where that cannot be, the exit code alone tells."""
+    """Print a line on standard error; if that is impossible, there is only the exit code."""
     with suppress(OSError):
         print(line, file=sys.stderr)
 
 
 def forget_unwritable_output() -> None:
-    """Keep Python from writing again at its end what was refused, and from ending with 120."""
+    """Keep Python from writing refused output again at exit, and from exiting with 120."""
     try:
         print(end="", flush=True)
     except OSError:
@@ -98,10 +98,10 @@ def forget_unwritable_output() -> None:
 
 class _Parser(argparse.ArgumentParser):
     """
-    A parser whose actions refuse by themselves what they do not know, with their own usage.
+    A parser whose actions reject unknown arguments themselves, with their own usage.
 
-    argparse hands it up to the first parser, whose usage helps nobody. ``prog`` of the options is
-    the innermost parser's. Help that cannot be written is an error, which argparse passes over.
+    argparse leaves that to the top-level parser, whose usage is no help. The options' ``prog`` is
+    the innermost parser's. Failing to write help is an error here; argparse ignores it.
     """
 
     def print_help(self, file: Any = None) -> None:
@@ -144,8 +144,8 @@ def add_command(parser: argparse.ArgumentParser, module_name: str) -> None:
 
 
 def _find_packages() -> dict[str, dict[str, str]]:
-    """Return the commands with their purposes, by the package that they are in."""
-    # Loaded here: what is found at once does without.
+    """Return the commands and their purposes by package."""
+    # Not at the top: commands that are found without a search do not need it.
     from importlib.metadata import entry_points
 
     points = sorted(entry_points(group=ENTRY_POINTS), key=lambda point: point.name)
@@ -153,7 +153,7 @@ def _find_packages() -> dict[str, dict[str, str]]:
     for point in points:
         try:
             packages[point.value] = dict(point.load().COMMANDS)
-        except (Exception, SystemExit) as error:  # of somebody else; the other ones work
-            told = f"entrain: the commands of {point.value} cannot be loaded: {error!r}"
-            print(told, file=sys.stderr)
+        except (Exception, SystemExit) as error:  # not this project's; the other ones work
+            message = f"entrain: the commands of {point.value} cannot be loaded: {error!r}"
+            print(message, file=sys.stderr)
     return packages

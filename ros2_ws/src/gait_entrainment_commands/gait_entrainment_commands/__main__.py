@@ -13,10 +13,10 @@ import gait_entrainment_commands
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code."""
-    # What a command loads lives as long as it does. To search all of it for garbage, over and over
-    # while it is loaded and once more at the end, takes a sixth of a short command.
+    # What a command loads lives as long as the command. Searching it for garbage, again and again
+    # during loading and once more at the end, takes a sixth of the time of a short command.
     gc.set_threshold(100_000)
-    while (place := os.open(os.devnull, os.O_RDWR)) <= 2:  # what is closed, a file would take
+    while (place := os.open(os.devnull, os.O_RDWR)) <= 2:  # a file would take a closed number
         os.set_inheritable(place, True)
     os.close(place)
     sys.stdout, sys.stderr = sys.stdout or os.fdopen(1, "w"), sys.stderr or os.fdopen(2, "w")

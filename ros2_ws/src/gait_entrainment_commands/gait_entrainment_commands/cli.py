@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What commands share: options made from settings, and the forms of an answer."""
+"""Shared by commands: options made from settings, and output formats."""
 
 import argparse
 import json
@@ -39,28 +39,28 @@ def add_setting(
 
 def add_settings(group: Group, owner: type) -> None:
     """Add an option for each setting of a dataclass."""
-    for name, told in settings_of(owner).items():
+    for name, setting in settings_of(owner).items():
         default = getattr(owner, name)
-        add_setting(group, name, told, shown=None if default is None else f"{default:g}")
+        add_setting(group, name, setting, shown=None if default is None else f"{default:g}")
 
 
 def chosen(options: argparse.Namespace, owner: type[Chosen], **rest: Any) -> Chosen:
     """Return the dataclass that the options describe; raises SettingError."""
     given = {
-        name: told.parse(name, text)
-        for name, told in settings_of(owner).items()
+        name: setting.parse(name, text)
+        for name, setting in settings_of(owner).items()
         if (text := getattr(options, name)) is not None
     }
     return owner(**given, **rest)
 
 
 def add_json_option(parser: argparse.ArgumentParser) -> None:
-    """Add the option for an answer that machines read."""
+    """Add the option for machine-readable output."""
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
 def add_onset_option(parser: argparse.ArgumentParser, onset: str | None = "commanded") -> None:
-    """Add how the onset of a pulse is taken; None as default is that of the recorded run."""
+    """Add the choice of pulse onset; None as default takes that of the recorded run."""
     parser.add_argument(
         "--onset",
         choices=("commanded", "measured"),
@@ -73,7 +73,7 @@ def add_onset_option(parser: argparse.ArgumentParser, onset: str | None = "comma
 def add_output_options(
     parser: argparse.ArgumentParser, out: str, default: Path | None = None
 ) -> None:
-    """Add the folder of figures, which `out` describes, and the form of the answer."""
+    """Add the options for the folder of figures, which `out` describes, and for JSON output."""
     parser.add_argument("--out", type=Path, default=default, metavar="DIR", help=out)
     add_dpi_option(parser)
     add_json_option(parser)
@@ -86,7 +86,7 @@ def answer(
     write: Callable[[Path], list[Path]],
     label: str = "figure           ",
 ) -> int:
-    """Print the answer, write its files if a folder is given and print their paths; return 0."""
+    """Print the outcome; if a folder is given, write files there, print their paths; return 0."""
     print(json.dumps(without_nan(outcome)) if options.json else text)
     if options.out is None:
         return 0

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Figures of the questions asked of the model: one size, one look, PNG and SVG."""
+"""Figures: one size, one look, as PNG and SVG."""
 
 import argparse
 from contextlib import AbstractContextManager
@@ -18,7 +18,7 @@ SKY, YELLOW, PINK, BLACK = "#56B4E9", "#E69F00", "#CC79A7", "#000000"
 COLOURS = (BLUE, ORANGE, GREEN, PINK, YELLOW, SKY)
 DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 2)))
 
-# Where a legend goes that would hide something inside the axes.
+# Places for a legend that would hide something inside the axes.
 BESIDE = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
 BELOW = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.13)}
 
@@ -31,13 +31,13 @@ def new_figure(
     layout: Literal["constrained"] | None = "constrained",
     **options: Any,
 ) -> tuple[Any, Any]:
-    """Return a matplotlib figure, of this layout, and its axes as `subplots` gives them."""
+    """Return a matplotlib figure with this layout, and its axes as `subplots` returns them."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=size, layout=layout)
     axes = figure.subplots(*shape, **options)
-    for one in np.atleast_1d(axes).ravel():
-        one.spines[["top", "right"]].set_visible(False)
+    for single in np.atleast_1d(axes).ravel():
+        single.spines[["top", "right"]].set_visible(False)
     return figure, axes
 
 
@@ -60,9 +60,9 @@ def mark_instant(axes: Any, place: float, name: str, height: float = 0.0, lift: 
 
 def save_figure(figure: Any, folder: Path, name: str) -> list[Path]:
     """
-    Write a figure as PNG and SVG into a folder, made if need be; return the paths.
+    Write a figure as PNG and SVG into a folder, created if necessary; return the paths.
 
-    The PNG has 130 dots per inch, or as many as matplotlib's ``savefig.dpi`` says.
+    The PNG has 130 dots per inch, unless matplotlib's ``savefig.dpi`` is set.
     """
     from matplotlib import rcParams
 
@@ -70,22 +70,22 @@ def save_figure(figure: Any, folder: Path, name: str) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     paths = [folder / (name + ending) for ending in (".png", ".svg")]
     for path in paths:
-        path.unlink(missing_ok=True)  # what a link leads to is somebody else's
+        path.unlink(missing_ok=True)  # do not write through a link
         figure.savefig(path, dpi=130 if given == "figure" else given)
     return paths
 
 
 def add_dpi_option(parser: argparse.ArgumentParser) -> None:
     """Add the option for the resolution of figures, for `chosen_dpi`."""
-    told = "of figures as PNG, default 130; beside each is an SVG"
-    parser.add_argument("--dpi", metavar="INT", help=told)
+    text = "resolution of figures as PNG, default 130; each is also written as SVG"
+    parser.add_argument("--dpi", metavar="INT", help=text)
 
 
 def chosen_dpi(options: argparse.Namespace) -> AbstractContextManager[None]:
     """
-    Return a context in which figures have the resolution of the option, if that is given.
+    Return a context in which figures have the resolution of the option, if given.
 
-    Raises SettingError if it is not allowed.
+    Raises SettingError if the resolution is not allowed.
     """
     from matplotlib import rc_context
 

@@ -18,25 +18,25 @@ from gait_entrainment.robot import PulseTiming
 from gait_entrainment.run import Run
 from gait_entrainment_commands.timing import late_ms, lateness_ms, quantile
 
-# Pulses whose lags make up the final one: the paper's locked gait repeats itself exactly.
+# Number of last pulses whose lags give the final one: the paper's locked gait repeats exactly.
 FINAL_PULSES = 5
-# What a verdict other than entrained, or the reason for claiming nothing, says to a person.
+# What a verdict other than entrained, or the reason for claiming nothing, means to a person.
 MEANINGS = {
-    "drifting": "the pulses run through the stride",
+    "drifting": "the pulses drift through the stride",
     "lost": "the gait followed the pulses, then drifted",
     "few_pulses": "neither locked nor drifting for certain: too few pulses yet",
     "hole": "the record has a hole, and too few pulses follow it",
-    "unclear": "neither locked nor drifting for certain; more pulses may tell",
-    "creeping": "the lag creeps: a slow passage or an unfinished approach; more pulses tell",
+    "unclear": "neither locked nor drifting for certain; more pulses may decide it",
+    "creeping": "the lag creeps: a slow passage or an unfinished approach; more pulses will tell",
     "too_close": "pulse period and stride period are too close to tell them apart",
-    "baseline_unknown": "fewer than two complete strides before the first pulse to compare with",
-    "not_one_to_one": "only pulses at about one a stride are analyzed",
+    "baseline_unknown": "fewer than two complete strides to compare with before the first pulse",
+    "not_one_to_one": "only pulses at about one per stride are analyzed",
     "by_phase": "pulses by phase follow the gait, whatever it does",
 }
 
 
 def outcome_of(run: Run) -> dict[str, Any]:
-    """Return what ``--json`` prints; times in seconds, None for what is not known."""
+    """Return what ``--json`` prints; times in seconds, None for what is unknown."""
     analysis, strides = run.analysis, run.strides
     start = (strides or analysis.strides)[0].start if analysis.strides else 0
 
@@ -83,12 +83,12 @@ def outcome_of(run: Run) -> dict[str, Any]:
             }
             for block in run.blocks
         ]
-    told: dict[str, Any] = without_nan(outcome)
-    return told
+    cleaned: dict[str, Any] = without_nan(outcome)
+    return cleaned
 
 
 def _judgement(analysis: Analysis, events: Sequence[GaitEvent]) -> dict[str, Any]:
-    """Return the last verdict, since when it has held, and where the pulses came to lie."""
+    """Return the last verdict, since when it has held, and where the pulses finally lie."""
     last = analysis.entrainments[-1] if analysis.entrainments else None
     verdict = last.verdict if last else Verdict.UNDECIDED
     reason = last.reason if last else Reason.FEW_PULSES
@@ -119,36 +119,36 @@ def _placed(analysis: Analysis) -> list[PulsePhase]:
 
 
 def from_strikes(analysis: Analysis) -> bool:
-    """Whether lags count from heel strikes, since no toe-offs were detected."""
+    """Whether lags are measured from heel strikes, since no toe-offs were detected."""
     return any(p.toe_off is None for p in _placed(analysis))
 
 
 def _parameters(protocol: Protocol) -> dict[str, Any]:
-    """Return a protocol with its torque in N m, however it was given."""
+    """Return a protocol with its torque in N m, in whatever unit it was given."""
     parameters = content_of(protocol)
-    for said, block in zip(parameters.get("blocks", [parameters]), protocol.sequence, strict=True):
-        said["pulses"]["torque"] = block.torque(protocol.walker)
+    for plan, block in zip(parameters.get("blocks", [parameters]), protocol.sequence, strict=True):
+        plan["pulses"]["torque"] = block.torque(protocol.walker)
     return parameters
 
 
 def holes_of(run: Run) -> list[Hole]:
     """
-    Return what the record of a run lacks; its last strides too, whether walked or not.
+    Return what the record of a run lacks, including its last strides, walked or not.
 
-    Between blocks, where nothing is analyzed, a stride of events or more that is missing.
+    Between blocks, where nothing is analyzed, a hole is at least one stride of missing events.
     """
     holes, strides = list(run.analysis.holes), run.analysis.strides
     if run.protocol is not None:
         end, number = (strides[-1].end, strides[-1].number) if strides else (0, 0)
         missing = run.protocol.strides - number
-        if run.blocks:  # how many strides there would be is not known before
+        if run.blocks:  # the number of strides is not known in advance
             ended = [block.last_stride for block in run.blocks]
             complete = len(ended) == len(run.protocol.sequence) and ended[-1] is not None
             missing = 0 if complete else max(missing, 1)
         for a, b in pairwise(sorted(run.events, key=lambda event: event.place)):
-            told = any(hole.start < b.stamp and a.stamp < hole.end for hole in holes)
+            known = any(hole.start < b.stamp and a.stamp < hole.end for hole in holes)
             lost = b.place - a.place - 1
-            if lost >= PLACES and a.stamp < b.stamp and not told:
+            if lost >= PLACES and a.stamp < b.stamp and not known:
                 holes.append(Hole(a.stamp, b.stamp, f"{lost} gait events"))
         if missing > 0:
             holes.append(Hole(end, end, f"the last {missing} strides"))
@@ -168,8 +168,8 @@ def summary(outcome: dict[str, Any]) -> str:
         if strides and not outcome["holes"]:
             lines[0] += "; the train is longer than the run: add washout strides"
     if "blocks" in outcome:
-        for number, (block, said) in enumerate(zip(outcome["blocks"], plans, strict=False), 1):
-            lines += _block_lines(number, block, said)
+        for number, (block, planned) in enumerate(zip(outcome["blocks"], plans, strict=False), 1):
+            lines += _block_lines(number, block, planned)
         return "\n".join([*lines, *_doubt_lines(outcome)])
     if strides:
         measured = "not measured" if unperturbed is None else f"{unperturbed:.4f} s"
@@ -178,7 +178,7 @@ def summary(outcome: dict[str, Any]) -> str:
         return "\n".join([*lines, "pulses           none", *_doubt_lines(outcome)])
     if timing := _timing(outcome, plan or {}):
         shape = f"{plan['torque']:.2f} N m for {plan['width']:g} s" if plan else ""
-        timing = (timing if plan else timing.lstrip()) + _besides(plans[0])
+        timing = (timing if plan else timing.lstrip()) + _remarks(plans[0])
         lines.append(f"pulses           {shape}{timing}")
     lines.append(f"verdict          {_verdict(outcome, plan or {})}")
     for stretch in outcome["stretches"][:-1]:
@@ -194,7 +194,7 @@ def summary(outcome: dict[str, Any]) -> str:
 
 
 def _verdict(judged: dict[str, Any], plan: dict[str, Any]) -> str:
-    """Return the verdict with since when it has held, or why nothing is claimed."""
+    """Return the verdict and since when it has held, or why nothing is claimed."""
     if judged["entrained"]:
         return f"{judged['verdict']} since stride {judged['entrained_since_stride']}"
     why = judged["reason"] or judged["verdict"]
@@ -203,30 +203,30 @@ def _verdict(judged: dict[str, Any], plan: dict[str, Any]) -> str:
     return f"{judged['verdict']}: {MEANINGS[why]}"
 
 
-def _block_lines(number: int, block: dict[str, Any], said: dict[str, Any]) -> list[str]:
-    """Return what was done in a block of which the protocol has ``said`` what, and the outcome."""
-    plan = said["pulses"]
+def _block_lines(number: int, block: dict[str, Any], planned: dict[str, Any]) -> list[str]:
+    """Return what was done in a block, as ``planned`` in the protocol, and the outcome."""
+    plan = planned["pulses"]
     last = block["last_stride"] or "the end"
-    told = f"block {number:<11}{block['name']}: strides {block['first_stride']} to {last}"
+    line = f"block {number:<11}{block['name']}: strides {block['first_stride']} to {last}"
     if "side" in block:
-        told += f" of the {block['side']} leg"
+        line += f" of the {block['side']} leg"
     if not plan["count"]:
-        return [f"{told}, no pulses"]
+        return [f"{line}, no pulses"]
     pulses = f"{block['pulses']} pulses of {plan['torque']:.2f} N m{_timing(block, plan)}"
-    return [f"{told}, {pulses}{_besides(said)}", f"{'':17}{_verdict(block, plan)}"]
+    return [f"{line}, {pulses}{_remarks(planned)}", f"{'':17}{_verdict(block, plan)}"]
 
 
-def _besides(said: dict[str, Any]) -> str:
-    """Say that the other leg got its pulses too, if it did, and how many were left out."""
-    plan = said.get("pulses", {})
+def _remarks(planned: dict[str, Any]) -> str:
+    """Return whether the other leg got pulses too, and how many pulses were left out."""
+    plan = planned.get("pulses", {})
     left_out = len(set(plan.get("catch_pulses", "").replace(",", " ").split()))
     left_out += round(plan.get("catch_share", 0.0) * plan.get("count", 0))
-    other = ", the other leg in between" if said.get("both_legs") else ""
+    other = ", the other leg in between" if planned.get("both_legs") else ""
     return other + (f", {left_out} of them left out" if left_out else "")
 
 
 def _timing(judged: dict[str, Any], plan: dict[str, Any]) -> str:
-    """Return when the pulses of a run or a block came, after a blank; empty if that is unknown."""
+    """Return when the pulses of a run or a block came, after a space; empty if unknown."""
     unperturbed, period = judged["unperturbed_stride_period"], judged["perturbation_period"]
     if plan.get("phase") is not None:
         return f" at phase {plan['phase']:g}"
@@ -239,7 +239,7 @@ def _timing(judged: dict[str, Any], plan: dict[str, Any]) -> str:
 
 
 def _doubt_lines(outcome: dict[str, Any]) -> list[str]:
-    """Return what the record lacks, and what of it was not believed."""
+    """Return what the record lacks, and which of its gait events are doubtful."""
     lines = []
     if holes := [f"{hole['missing']} at {hole['start']:.1f} s" for hole in outcome["holes"]]:
         more = f", {len(holes) - 3} more" if len(holes) > 3 else ""
@@ -251,7 +251,7 @@ def _doubt_lines(outcome: dict[str, Any]) -> list[str]:
 
 
 def _place(lag: float, double_stance: float | None) -> str:
-    """Say where in the gait cycle a phase lag [s] lies."""
+    """Return where in the gait cycle a phase lag [s] lies."""
     if lag >= 0:
         return "after toe-off"
     if double_stance is None or -lag > double_stance:
@@ -269,7 +269,7 @@ def _double_stance(events: Sequence[GaitEvent], toe_off: int | None) -> float:
 
 
 def without_nan(value: Any) -> Any:
-    """Replace NaN and infinities, which JSON does not have, by None."""
+    """Replace NaN and infinities, which JSON lacks, by None."""
     if isinstance(value, dict):
         return {key: without_nan(item) for key, item in value.items()}
     if isinstance(value, list):
@@ -292,9 +292,9 @@ def distribution(
     timings: Sequence[PulseTiming], kind: str, stride: float
 ) -> dict[str, Any] | None:
     """
-    Return how late the "sent" or "measured" onsets came; None if no pulse shows one.
+    Return how late the "sent" or "measured" onsets came; None if no pulse has one.
 
-    Percentages are of a stride [s], None if that is NaN: unknown.
+    Percentages are of a stride [s]; None if the stride is NaN, that is, unknown.
     """
     late = lateness_ms(timings, kind)
     if not late:
@@ -310,7 +310,7 @@ def distribution(
 
 
 def timing_summary(outcome: dict[str, Any]) -> list[str]:
-    """Return lines for people; none if every pulse came at its instant."""
+    """Return lines for people; no lines if every pulse came on time."""
     lines = []
     for kind in ("sent", "measured"):
         figures = outcome[kind]

@@ -22,10 +22,10 @@ def _option(field: str) -> str:
 
 def add_protocol_options(parser: argparse.ArgumentParser) -> None:
     """Add the protocol file and the options that override its fields."""
-    told = "default: the paper's example"
-    parser.add_argument("protocol", nargs="?", type=Path, metavar="PROTOCOL.yaml", help=told)
+    text = "default: the paper's example"
+    parser.add_argument("protocol", nargs="?", type=Path, metavar="PROTOCOL.yaml", help=text)
     fields = parser.add_argument_group("fields of the protocol")
-    limits = parser.add_argument_group("limits of what the person may get")
+    limits = parser.add_argument_group("limits on what the person may receive")
     for field, setting in FIELDS.items():
         group = limits if field.startswith("limits.") else fields
         unit = f" [{setting.unit}]" if setting.unit not in ("", "1") else ""
@@ -40,7 +40,7 @@ def add_protocol_options(parser: argparse.ArgumentParser) -> None:
 
 def _default_text(field: str) -> str:
     default = attrgetter(field)(DEFAULT_PROTOCOL)
-    if default is None:  # another field says the same
+    if default is None:  # another field sets the same
         return ""
     if isinstance(default, Enum):
         default = default.name.lower()

@@ -1,14 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Signals that stop what drives a robot: whatever a terminal, a shell or a system sends."""
+"""Signals that stop a process that drives a robot: from a terminal, a shell or the system."""
 
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-# Ctrl-C, kill, a closed terminal, Ctrl-Z and Ctrl-\. A suspended run would go on pushing with
-# nobody to stop it, so Ctrl-Z stops it too.
+# Ctrl-C, kill, a closed terminal, Ctrl-Z and Ctrl-\. A suspended run would keep pushing with
+# nothing to stop it, so Ctrl-Z stops it too.
 STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP, signal.SIGQUIT)
 
 
@@ -16,7 +16,7 @@ def stop_on_signals() -> None:
     """
     Raise KeyboardInterrupt at any of them.
 
-    Also at SIGINT, which a shell has its background jobs ignore.
+    This includes SIGINT, which a shell makes its background jobs ignore.
     """
     for number in STOPPING:
         signal.signal(number, signal.default_int_handler)
@@ -24,10 +24,10 @@ def stop_on_signals() -> None:
 
 def end_once() -> None:
     """
-    Raise KeyboardInterrupt at the first of them alone.
+    Raise KeyboardInterrupt only at the first of them.
 
-    For a process that gets it both from a terminal and from its parent: the second must not break
-    into the end that the first began.
+    For a process that gets one from a terminal and one from its parent: the second must not
+    interrupt the shutdown that the first started.
     """
 
     def interrupt(_number: int, _frame: object) -> None:
@@ -41,7 +41,7 @@ def end_once() -> None:
 
 @contextmanager
 def undisturbed() -> Iterator[None]:
-    """Let none of them break in: for what is about to end."""
+    """Ignore all of them, for work that is about to end."""
     handlers = {number: signal.signal(number, signal.SIG_IGN) for number in STOPPING}
     try:
         yield

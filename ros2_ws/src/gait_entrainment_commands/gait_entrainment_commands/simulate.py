@@ -29,7 +29,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Simulate and print; 1 if the walker falls or flies off."""
+    """Simulate and print; return 1 if the walker falls or flies off."""
     protocol = chosen_protocol(options)
     simulation = simulate(
         protocol, timings_of=timings_of, measured_onsets=options.onset == "measured"

@@ -5,7 +5,7 @@
 When a pulse really came: commanded, sent and measured onset, from the device's own states.
 
 The commanded onset was planned. The sent onset is the stamp of the first state in which the device
-has been asked for the pulse. The measured onset is the instant at which the measured torque
+has been commanded the pulse. The measured onset is the instant at which the measured torque
 crosses a fraction of the pulse's height, interpolated between two states.
 """
 
@@ -17,13 +17,13 @@ from operator import attrgetter
 from gait_entrainment.conventions import nanoseconds
 from gait_entrainment.robot import Pulse, PulseTiming, RobotState
 
-# Half the height: noise has to reach that far to be mistaken, and the instant does not depend on
-# where the flank starts to be seen.
+# Half the height: only noise that large can be mistaken for it, and the instant does not depend on
+# where the flank becomes visible.
 CROSSING = 0.5
-# States further apart [ns] are those of a torque that jumped at the later one: there is nothing
-# to interpolate over.
+# If states are further apart [ns], the torque is taken to have jumped at the later one: there is
+# nothing to interpolate.
 LONGEST_GAP = 20_000_000
-# A device this late after the end of a pulse did not deliver it [s].
+# A device that is this late after the end of a pulse did not deliver it [s].
 LATEST = 0.2
 _STAMP = attrgetter("stamp")
 
@@ -34,11 +34,11 @@ def measured_onset(
     """
     Find where a torque first rises through a fraction of a pulse's height.
 
-    ``stamps`` [ns] ascend from before the pulse on, ``torques`` [N m] are measured at them, NaN if
-    none was. A negative ``height`` [N m] is crossed downwards; ``fraction`` is in (0, 1).
+    ``stamps`` [ns] ascend and start before the pulse; ``torques`` [N m] are measured at them, NaN
+    if missing. A negative ``height`` [N m] is crossed downwards; ``fraction`` is in (0, 1).
 
-    Returns the index of the first state past the crossing, and the instant of the crossing [ns],
-    interpolated linearly between two states; None if the torque never gets there, or is over the
+    Returns the index of the first state past the crossing and the instant of the crossing [ns],
+    interpolated linearly between two states. None if the torque never gets there, or exceeds the
     threshold from the first state on.
     """
     before: tuple[int, float] | None = None
@@ -61,13 +61,13 @@ class MeasuredOnsets:
     Times each pulse once everything that it depends on is known, in a run or from its record.
 
     A robot reports its pulses in three streams, each of which may be ahead of the others: promises
-    name the onsets, announcements give height and width, states show the torque. A pulse is judged
-    by the states up to LATEST after its end, or up to the onset of the next pulse. So the timings
-    are those of the whole run at once, however the streams interleave. (A stop is not bound by
-    this: it happens when it happens.)
+    give the onsets, announcements height and width, states the torque. A pulse is judged by the
+    states up to LATEST after its end, or up to the onset of the next pulse. So the timings do not
+    depend on how the streams interleave; they are those of the whole run processed in one go. (A
+    stop is an exception: it takes effect when it happens.)
 
-    Each ``add`` returns the onsets that have become known, with the instant before which none
-    will follow: what ``GaitAnalyzer.add_promise`` takes.
+    Each ``add`` returns the onsets that have become known and the instant before which no more
+    will follow, as ``GaitAnalyzer.add_promise`` takes them.
     """
 
     def __init__(self) -> None:
@@ -79,7 +79,7 @@ class MeasuredOnsets:
         self._states: list[RobotState] = []  # ascending; those of pulses not judged yet
 
     def add_promise(self, onsets: Sequence[int], valid_until: int) -> tuple[list[int], int]:
-        """Take the onsets of pulses [ns], and the promise that no others lie before an instant."""
+        """Take the onsets of pulses [ns] and the promise that no others lie before an instant."""
         self._named += onsets
         self._promised = valid_until
         return self._judge_what_is_known()
@@ -96,12 +96,12 @@ class MeasuredOnsets:
         return self._judge_what_is_known()
 
     def stop(self, stamp: int) -> None:
-        """Take a stop [ns]: pulses that begin from it on were promised and never came."""
+        """Take a stop [ns]: pulses from that time on were promised but never came."""
         self._promised = min(self._promised, stamp)
         self._named = [onset for onset in self._named if onset < stamp]
 
     def finish(self) -> list[int]:
-        """End the run; returns the remaining onsets. One never announced is as commanded."""
+        """End the run; return the remaining onsets. One never announced is as commanded."""
         onsets, _ = self._judge_what_is_known(ended=True)
         return onsets
 
@@ -123,7 +123,7 @@ class MeasuredOnsets:
         return end < self.states_until and (bool(later) or end <= self._promised)
 
     def _judge(self) -> PulseTiming:
-        """Take the next pulse from those named, and return its timing."""
+        """Remove the next pulse from those named, and return its timing."""
         onset = self._named.pop(0)
         announced = height, width = self._announced.pop(onset, (math.nan, math.nan))
         if height == 0 or math.isnan(height):
@@ -139,7 +139,7 @@ class MeasuredOnsets:
             return PulseTiming(onset, sent, None, *announced)
         index, measured = found
         if seen[index].measured == seen[index].commanded:
-            # Equal to the last bit: not measured but computed, and known at each of its jumps.
+            # Equal to the last bit: computed rather than measured, and known at each jump.
             measured = seen[index].stamp
         return PulseTiming(onset, sent, measured, *announced)
 
@@ -166,7 +166,7 @@ def timings_of(pulses: Sequence[Pulse], states: Sequence[RobotState]) -> list[Pu
 
 
 def late_ms(timing: PulseTiming, kind: str) -> float | None:
-    """By how many ms the "sent" or "measured" onset came after the command."""
+    """Return by how many ms the "sent" or "measured" onset came after the command."""
     onset: int | None = getattr(timing, kind)
     return None if onset is None else (onset - timing.commanded) / 1e6
 
@@ -177,5 +177,5 @@ def lateness_ms(timings: Sequence[PulseTiming], kind: str) -> list[float]:
 
 
 def quantile(ascending: Sequence[float], share: float) -> float:
-    """Return the value below or at which a share of the values lies (nearest rank)."""
+    """Return the value at or below which a share of the values lies (nearest rank)."""
     return ascending[max(math.ceil(share * len(ascending)) - 1, 0)]
