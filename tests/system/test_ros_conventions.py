@@ -97,7 +97,7 @@ def assert_in_order(parameters):
         elif value.type == ParameterType.PARAMETER_INTEGER:
             beyond = [ranges[0].to_value + 1, ranges[0].from_value - 1]
             wrong += [(name, ParameterValue(type=value.type, integer_value=v)) for v in beyond]
-        elif descriptor.additional_constraints not in ("", "a text"):
+        elif descriptor.additional_constraints not in ("", "any text"):
             wrong.append((name, ParameterValue(type=value.type, string_value="elsewhere")))
         named += [name] * (len(wrong) - len(named))
         wrong.append((name, ParameterValue(type=ParameterType.PARAMETER_BYTE_ARRAY)))

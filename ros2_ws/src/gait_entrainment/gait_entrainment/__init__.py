@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Entrainment of walking to an ankle robot: the ROS-free core. README.md says where to begin."""
+"""Entrainment of walking to an ankle robot: the ROS-free core. README.md says where to start."""
 
 import importlib
 from typing import TYPE_CHECKING, Any
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from gait_entrainment.robot import find_driver
     from gait_entrainment.simulation import simulate
 
-# What an outsider needs first is loaded when it is asked for: a command needs only some of it.
+# The main entry points are loaded on first use, because a command needs only some of them.
 _MODULES = {"analyze": "gait", "WalkerParameters": "parameters", "find_driver": "robot"}
 _MODULES |= {"Protocol": "protocol", "read_protocol": "protocol", "simulate": "simulation"}
 

@@ -6,15 +6,15 @@
 
 class EntrainmentError(Exception):
     """
-    Something that cannot be done; the message says which field, what is allowed, what to do.
+    Something cannot be done; the message says which field, what is allowed and what to do.
 
-    The command line prints the message and ends with the exit code.
+    The command line prints the message and exits with the exit code.
     """
 
     exit_code = 1
 
 
 class UsageError(EntrainmentError, ValueError):
-    """The command, an option or a file says something that cannot be meant."""
+    """The command, an option or a file is invalid."""
 
     exit_code = 2

@@ -4,12 +4,11 @@
 """
 The conductor of an experiment: a pure function from received stamps to pulses and promises.
 
-It is told which gait events happened and up to which instant all of them are known, and answers
-with a horizon, the promise to request no pulse that begins earlier. Pulses at a period it plans
-one stride ahead, at the strike that starts the last baseline stride; a pulse by phase at the
-strike that starts its stride, whose length it predicts. So a robot has its lead time, and a
-walker that never computes past the promises is never held back by the very event that everybody
-is waiting for.
+It receives gait events and the instant up to which all of them are known, and returns a horizon:
+the promise to request no pulse that begins earlier. It plans pulses at a period one stride ahead,
+at the strike that starts the last baseline stride, and a pulse by phase at the strike that starts
+its stride, whose length it predicts. This gives a robot its lead time, and a walker that never
+computes past the promises is never held back by the very event that the experiment awaits.
 """
 
 import enum
@@ -27,15 +26,14 @@ from gait_entrainment.gait.strides import PLACES
 from gait_entrainment.protocol import Block, Protocol, ProtocolError
 from gait_entrainment.robot import Pulse, PulseTrain
 
-# A stride is predicted to last as long as the mean of so many before it, as the timing of
-# exoskeletons by heel strikes does: more would follow a change of the gait too slowly.
+# The predicted length of a stride is the mean of this many before it, as in exoskeletons timed by
+# heel strikes: more would follow a change of the gait too slowly.
 PREDICTED_FROM = 5
-# Strides whose coefficient of variation says whether a gait is steady, and how many may go by
-# before it has to be.
+# The number of strides whose coefficient of variation decides whether a gait is steady, and how
+# many may pass before it has to be.
 STEADY_STRIDES = 10
 _MOST_UNSTEADY = 200
-# Pulses requested at once, an hour's: a message of more would hold up who sends it, and who takes
-# it.
+# Most pulses in one request: a longer message would block its sender and its receiver.
 PART_PULSES = 2000
 
 
@@ -60,23 +58,23 @@ class Horizon:
 
 
 class GaitError(EntrainmentError):
-    """The gait is not one that torque may follow; the message says why, with the figures."""
+    """The gait is not fit for torque; the message says why, with figures."""
 
 
 @dataclass
 class BlockRun:
-    """One block as it is conducted."""
+    """The state of one block as it is conducted."""
 
     plan: Block
     number: int  # from 1
-    ankles: tuple[Side, ...]  # that get its pulses, that of the leg whose strides count first
+    ankles: tuple[Side, ...]  # that get its pulses; the first is of the leg whose strides count
     start: int | None = None  # heel strike that starts its first stride [ns]
     strides_before: int = 0  # of its leg in the run
-    doubted_before: int = 0  # events that were not believed
-    baseline: int = 0  # strides that it lasted; 0 while it does
+    doubted_before: int = 0  # events of its leg that were not believed
+    baseline: int = 0  # strides of the baseline; 0 until it is over
     planned: Counter[Side] = field(default_factory=Counter)  # pulses so far, by ankle
-    first_onset: int | None = None  # of the pulses that are planned [ns]
-    pulses_end: int = 0  # of the last one that is planned [ns]
+    first_onset: int | None = None  # of the planned pulses [ns]
+    pulses_end: int = 0  # end of the last planned pulse [ns]
     trains: dict[Side, PulseTrain] = field(default_factory=dict)  # requested so far
     # Mean stride period over the baseline [s] and its standard error; NaN if not measured.
     measured_period: float = math.nan
@@ -91,16 +89,16 @@ class BlockRun:
 
     @property
     def train(self) -> PulseTrain | None:
-        """The pulses on its leg that are requested so far."""
+        """The pulses requested on its leg so far."""
         return self.trains.get(self.leg)
 
     def pulses_left(self, side: Side) -> int:
-        """Pulses on an ankle that are not planned yet."""
+        """Number of pulses on an ankle that are not planned yet."""
         return self.plan.pulses.count - self.planned[side]
 
 
 class _Leg:
-    """The strides of one leg, as they come."""
+    """The strides of one leg, as they arrive."""
 
     def __init__(self, side: Side, limits: GaitLimits) -> None:
         self.side = side
@@ -119,7 +117,7 @@ class Conductor:
 
     ``longest_lookahead`` [s] bounds how far ahead it promises. In lock-step that is a stride,
     which is where the speed comes from; in real time a short one leaves more to be decided late.
-    ``limits`` say which strides can be believed, of a person; for a walker of another size they
+    ``limits`` define which strides of a person are believed; for a walker of another size they
     are scaled by sqrt(L / g).
     """
 
@@ -140,7 +138,7 @@ class Conductor:
         self._longest_promise = self._lookahead = min(self._shortest, longest_lookahead)
         self._promised = 0  # up to this instant [ns]
         self._heights: list[float] = []  # of the pulses of the block [N m]
-        # By ankle: pulses planned and not requested yet, and the promise not made before they are.
+        # By ankle: pulses planned but not requested yet, and the promise that must wait for them.
         self._rest: dict[Side, Iterator[Pulse]] = {side: iter(()) for side in self._legs}
         self._next_part_at = dict.fromkeys(self._legs, 0)  # [ns]
         self._resting_until: int | None = None  # between two blocks [ns]
@@ -148,17 +146,17 @@ class Conductor:
 
     @property
     def block(self) -> BlockRun:
-        """The block under way, or the one before a rest."""
+        """The block under way; in a rest, the one before it."""
         return self.blocks[-1]
 
     @property
     def strides(self) -> int:
-        """Strides of the protocol's leg completed so far."""
+        """Number of strides of the protocol's leg completed so far."""
         return max(self._legs[self.protocol.side].tracker.stride_in_progress - 1, 0)
 
     @property
     def _leg(self) -> _Leg:
-        """The leg whose strides count: of the block under way, in a rest of the next one."""
+        """The leg whose strides count: the current block's, or in a rest the next block's."""
         number = self.block.number - (self._resting_until is None)
         return self._legs[self.protocol.leg(self.protocol.sequence[number])]
 
@@ -178,10 +176,10 @@ class Conductor:
 
     def add_event(self, event: GaitEvent, now: float = math.inf) -> None:
         """
-        Take one gait event, and plan the pulses that it lets be planned.
+        Take one gait event, and plan the pulses that can be planned from it.
 
-        One stamped after ``now`` [ns] is not believed. Raises ProtocolError if they would overlap
-        at the resulting period, GaitError if the baseline is not one to measure a period by.
+        One stamped after ``now`` [ns] is not believed. Raises ProtocolError if pulses would
+        overlap at the resulting period, GaitError if the baseline is unfit to measure a period.
         """
         for leg in self._legs.values():
             strike, stride = leg.tracker.latest_strike, leg.tracker.add(event, now)
@@ -213,7 +211,7 @@ class Conductor:
         """
         Return pulses to request before the horizon at ``known_until`` [ns], if there are any.
 
-        Of many, a part: the next one is due before a promise reaches the middle of this one.
+        Many are split: the next part is due before a promise reaches the middle of this one.
         """
         for side, rest in self._rest.items():
             if self._until(known_until) < self._next_part_at[side]:
@@ -227,34 +225,34 @@ class Conductor:
 
     def horizon(self, known_until: int) -> Horizon:
         """
-        Return how far to promise, all events up to ``known_until`` [ns] having been added.
+        Return how far to promise once all events up to ``known_until`` [ns] have been added.
 
-        Pulses that are due by then have been requested.
+        Pulses that are due by then must have been requested.
 
         The first onset lies (1 + P) measured periods after a strike that was not yet known when
-        the promise before was made, and no lookahead is longer than the shortest stride that
-        entered the measured period: so no promise covers an onset that is not yet planned. If the
-        latest stride was that short and changes the mean, the onset is put off to the promise's
-        end. A pulse by phase lies so many predicted periods after the strike at which it is
-        planned, and no lookahead is longer than the least that this can be, as far as strides are
-        believed at all.
+        the previous promise was made, and no lookahead is longer than the shortest stride that
+        entered the measured period, so no promise covers an onset that is not yet planned. If the
+        latest stride was that short and changes the mean, the onset is postponed to the end of
+        the promise. A pulse by phase lies ``after_strike`` predicted periods after the strike at
+        which it is planned, and no lookahead is longer than the shortest time that this can be
+        for strides that are believed.
 
-        The run ends at a fixed distance after its closing strike, which no promise made before
-        that strike can have passed: the end does not depend on how the run was cut into grants.
+        The run ends a fixed time after its closing strike, which no promise made before that
+        strike can have passed, so the end does not depend on how the run was cut into grants.
 
-        Raises GaitError if pulses are planned and nobody walks any more.
+        Raises GaitError if pulses are planned and the gait has stopped.
         """
         until, last = self._until(known_until), self._closing_strike is not None
         if not last:
             walking = self.block.first_onset is not None and self._resting_until is None
-            told = self._leg.tracker.watch.stopped(known_until, self.block.pulse_period)
-            if walking and told:
-                raise GaitError(told)
+            stopped = self._leg.tracker.watch.stopped(known_until, self.block.pulse_period)
+            if walking and stopped:
+                raise GaitError(stopped)
             self._promised = max(self._promised, until)
         return Horizon(until, last)
 
     def _until(self, known_until: int) -> int:
-        """Return how far the promise at an instant goes, both [ns]."""
+        """Return how far a promise made at an instant reaches, both [ns]."""
         if self._closing_strike is not None:
             return self._closing_strike + nanoseconds(self._longest_promise)
         by_phase = map(self._lookahead_by_phase, self._legs.values())
@@ -289,7 +287,7 @@ class Conductor:
         return True
 
     def _begin_block(self, strike: int | None = None) -> None:
-        """Begin the next block, with a strike [ns] of its leg if one has come."""
+        """Begin the next block, at a strike [ns] of its leg if there is one."""
         plan = self.protocol.sequence[len(self.blocks)]
         ankles = self.protocol.ankles(plan)
         tracker = self._legs[ankles[0]].tracker
@@ -308,8 +306,8 @@ class Conductor:
         steady = self._is_steady(plan.baseline_steady)
         if not steady and started > _MOST_UNSTEADY:
             raise GaitError(
-                f"baseline: not steady after {started} strides; allowed: a higher baseline_steady "
-                f"than {plan.baseline_steady:g}"
+                f"baseline: not steady after {started} strides; allowed: a baseline_steady "
+                f"above {plan.baseline_steady:g}"
             )
         return steady
 
@@ -328,7 +326,7 @@ class Conductor:
         return self._is_steady(plan.washout_steady) or washout > _MOST_UNSTEADY
 
     def _is_steady(self, most: float) -> bool:
-        """Whether the latest strides vary by at most a share of their mean; 0 asks nothing."""
+        """Whether the latest strides vary by at most a fraction of their mean; 0 allows any."""
         recent = self._leg.recent
         if most == 0:
             return True
@@ -338,27 +336,27 @@ class Conductor:
     # Pulses
 
     def _due_by_phase(self, leg: _Leg) -> bool:
-        """Whether a pulse by phase comes in each of a leg's strides to come."""
+        """Whether each coming stride of a leg gets a pulse by phase."""
         block = self.block
         by_phase = block.plan.pulses.phase is not None and leg.side in block.ankles
         return by_phase and block.pulses_left(leg.side) > 0
 
     def _lookahead_by_phase(self, leg: _Leg) -> float:
-        """Return how far [s] a promise may go, so that it covers no pulse by phase to come."""
+        """Return how far [s] a promise may reach without covering an unplanned pulse by phase."""
         if not self._due_by_phase(leg):
             return math.inf
         after = self.block.plan.pulses.after_strike
         periods = leg.predicted_from or [self._shortest]
-        # The next stride, as short as can be believed, changes the mean by its share.
+        # The next stride, if as short as is believed, changes the mean by its share.
         change, share = self._limits.stride_change, 1 / min(len(periods) + 1, PREDICTED_FROM)
         lookahead = after * min(periods) * (1 - change * share)
         if self.block.baseline or after >= 1:
             return lookahead
-        # The strike that ends the baseline is not known: a whole stride lies before the pulse.
+        # The strike that ends the baseline is not known yet: a full stride precedes the pulse.
         return max(lookahead, (1 + after) * min(periods) * (1 - change))
 
     def _plan_by_phase(self, leg: _Leg, strike: int) -> None:
-        """Plan a leg's next pulse by phase at a strike of it [ns]."""
+        """Plan a leg's next pulse by phase at its strike [ns]."""
         block, plan = self.block, self.block.plan.pulses
         period = statistics.fmean(leg.predicted_from or [block.measured_period])
         onset = max(strike + nanoseconds(plan.after_strike * period), self._promised)
@@ -383,13 +381,13 @@ class Conductor:
         self._require_plausible_baseline()
         if self._periods:
             stride = block.measured_period = statistics.fmean(self._periods)
-        elif plan.period is not None:  # the best guess if no complete stride was asked for
+        elif plan.period is not None:  # the best guess if no complete stride is required
             stride = plan.period
         elif plan.count == 0:
             return
         else:
             raise ProtocolError(
-                "baseline: no complete stride was seen from which period_offset could be measured"
+                "baseline: no complete stride was seen to measure period_offset from"
             )
         if len(self._periods) > 1:
             spread = statistics.stdev(self._periods, block.measured_period)
@@ -405,7 +403,7 @@ class Conductor:
         delay = nanoseconds((1 + plan.initial_phase) * stride)
         if self._periods:
             # The stamps of a constant gait are rounded, so its next stride can be a nanosecond
-            # longer than the mean: a pulse at phase 0 is not to come before the strike. As a
+            # longer than the mean, but a pulse at phase 0 must not come before the strike. As a
             # double, the product is off by less than a thousandth of a nanosecond.
             exact = (1 + plan.initial_phase) * stride * NANOSECONDS_PER_SECOND
             delay = math.floor(exact + 1e-3) + 1
@@ -419,13 +417,13 @@ class Conductor:
     def _require_plausible_baseline(self) -> None:
         """Raise GaitError if the baseline's strides are not those of one gait."""
         periods = self._periods
-        # By a stride's worth of events.
+        # The implausible events, as a number of strides.
         events = self._leg.tracker.counts.implausible - self.block.doubted_before
         doubted = math.ceil(events / PLACES)
         if doubted > len(periods):
             raise GaitError(
-                f"baseline: {doubted} of {doubted + len(periods)} strides cannot be: check the "
-                "sensor, or whether the person stood still"
+                f"baseline: {doubted} of {doubted + len(periods)} strides are implausible: check "
+                "the sensor, or whether the person stood still"
             )
         if len(periods) < 3:
             return
@@ -440,10 +438,10 @@ class Conductor:
 
 def _shortest_stride(protocol: Protocol) -> float:
     """
-    Return a period [s] that no stride undercuts, for promises made before one is measured.
+    Return a period [s] that no stride is shorter than, for promises before one is measured.
 
     A foot stays on the ground only while the leg turns slower than sqrt(g / L), and a stride
-    turns it by 4 alpha. An absolute pulse period stands in if nothing will be measured.
+    turns it by 4 alpha. An absolute pulse period is a bound too: then nothing may be measured.
     """
     walker = protocol.walker
     stride = 4 * walker.leg_angle * math.sqrt(walker.leg_length / walker.gravity)

@@ -20,21 +20,21 @@ def settings_for(
     plans: Sequence[Block], settings: VerdictSettings | None = None
 ) -> VerdictSettings | None:
     """
-    Return the settings of a verdict about pulses that some blocks plan.
+    Return the verdict settings for the pulses that some blocks plan.
 
-    Pulses by phase follow the gait: that their lag stays put shows nothing, whatever their period.
+    Pulses by phase follow the gait, so their constant lag shows nothing, whatever their period.
     """
     pulses = [plan.pulses for plan in plans]
     irregular = max((4 * p.jitter + abs(p.sweep) for p in pulses), default=0.0)
-    told: dict[str, Any] = {"irregularity": irregular} if irregular else {}
+    changes: dict[str, Any] = {"irregularity": irregular} if irregular else {}
     if any(p.phase is not None for p in pulses):
-        told["smallest_difference"] = 1.0
-    return replace(settings or VerdictSettings(), **told) if told else settings
+        changes["smallest_difference"] = 1.0
+    return replace(settings or VerdictSettings(), **changes) if changes else settings
 
 
 @dataclass(frozen=True)
 class JudgedBlock:
-    """One block of a run, analyzed by itself, against its own baseline."""
+    """One block of a run, analyzed by itself against its own baseline."""
 
     name: str
     side: Side  # the leg whose strides count
@@ -55,10 +55,10 @@ def analyze_blocks(
     unknown: Sequence[tuple[Side, int, int]] = (),
 ) -> tuple[Analysis, tuple[JudgedBlock, ...]]:
     """
-    Analyze a run, and each of its blocks, unless its protocol is one of fixed length.
+    Analyze a run and each of its blocks, unless it is a single block of fixed length.
 
-    As ``analyze``, on each leg for itself; ``blocks`` are those of a conductor that has seen the
-    events. With blocks, pulses, verdicts and holes of the run are those of its blocks.
+    As ``analyze``, for each leg separately; ``blocks`` are those of a conductor that has seen the
+    events. With blocks, the run's pulses, verdicts and holes are those of its blocks.
     """
     plans = [block.plan for block in blocks]
 
@@ -67,9 +67,9 @@ def analyze_blocks(
         return [onset for s, onset in onsets if s is leg and start <= onset < end], holes
 
     own, missing = on(side)
-    whole = analyze(events, own, side, settings_for(plans, settings), missing)
+    overall = analyze(events, own, side, settings_for(plans, settings), missing)
     if len(blocks) <= 1 and not any(block.plan.open_ended for block in blocks):
-        return whole, ()
+        return overall, ()
     judged = []
     for block in blocks:
         start = block.start or 0
@@ -101,24 +101,24 @@ def analyze_blocks(
         tuple(chain.from_iterable(getattr(part, name) for part in parts))
         for name in ("pulses", "entrainments", "holes")
     )
-    return replace(whole, pulses=pulses, entrainments=entrainments, holes=holes), tuple(judged)
+    return replace(overall, pulses=pulses, entrainments=entrainments, holes=holes), tuple(judged)
 
 
 @dataclass(frozen=True)
 class Run:
     """What a simulated and a recorded run have in common; stamps are integer nanoseconds."""
 
-    protocol: Protocol | None  # None if nobody told it
-    events: tuple[GaitEvent, ...]  # in the order in which they came
+    protocol: Protocol | None  # None if unknown
+    events: tuple[GaitEvent, ...]  # in order of arrival
     delivered: tuple[tuple[Side, PulseTiming], ...]  # pulses, ankle by ankle
     measured_period: float  # mean stride period before the pulses [s]; NaN if unknown
-    pulse_period: float  # as planned, without a protocol as seen [s]; NaN if unknown
+    pulse_period: float  # as planned, or as seen without a protocol [s]; NaN if unknown
     analysis: Analysis
-    blocks: tuple[JudgedBlock, ...]  # none if the protocol is one of a fixed number of strides
+    blocks: tuple[JudgedBlock, ...]  # empty for a single block of fixed length
 
     @property
     def strides(self) -> list[Stride]:
-        """The strides of the protocol, which more may follow; without a protocol, all."""
+        """The strides of the protocol, without any that follow; all if there is no protocol."""
         if self.blocks:
             return [s for s in self.analysis.strides if s.end <= self.blocks[-1].end]
         last = math.inf if self.protocol is None else self.protocol.strides

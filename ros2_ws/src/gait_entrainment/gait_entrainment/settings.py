@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What can be set, and to what: one type for every number, word and switch that a user may choose.
+Settings and what they allow: one type for every number, word and switch that a user may choose.
 
 A field of a frozen dataclass made by ``setting`` carries its meaning, unit and range. Protocol
 files, command-line options, driver options and ROS parameters are all read by ``Setting.check`` or
-``Setting.parse``, so that the same mistake gets the same answer everywhere.
+``Setting.parse``, so that the same mistake gives the same message everywhere.
 """
 
 import contextlib
@@ -24,7 +24,7 @@ class SettingError(UsageError):
 
 @dataclass(frozen=True)
 class Setting:
-    """What may be set: a number within bounds, a whole number, a switch, a choice or a text."""
+    """One setting: a number within bounds, a whole number, a switch, a choice or text."""
 
     meaning: str
     kind: type = float  # float, int, bool, str or an enumeration
@@ -33,8 +33,8 @@ class Setting:
     most: float = math.inf
     least_excluded: bool = False
     most_excluded: bool = False
-    choices: tuple[str, ...] = ()  # the texts that are allowed; empty allows any
-    plain: bool = False  # whether the text must do as the name of a folder
+    choices: tuple[str, ...] = ()  # the allowed texts; empty allows any
+    plain: bool = False  # whether the text must be usable as the name of a folder
     optional: bool = False  # whether None is allowed
 
     @property
@@ -47,7 +47,7 @@ class Setting:
         if self.kind is bool:
             return "true, false"
         if self.kind is str:
-            return "a plain name" if self.plain else "a text"
+            return "a plain name" if self.plain else "any text"
         number = "a whole number " if self.kind is int else ""
         unit = f" {self.unit}" if self.unit not in ("", "1") else ""
         return number + self._bounds() + unit
@@ -65,13 +65,13 @@ class Setting:
 
     def check(self, name: str, value: object) -> Any:
         """
-        Return a value as the setting's kind; whole numbers pass for real ones.
+        Return a value as the setting's kind; whole numbers are accepted for real ones.
 
         Raises SettingError if it is of another kind, not finite, or out of range.
         """
         if value is None and self.optional:
             return None
-        switch = isinstance(value, bool)  # which Python takes for a whole number
+        switch = isinstance(value, bool)  # which Python counts as a whole number
         if self.kind is float and isinstance(value, int | float) and not switch:
             try:
                 value = float(value)
@@ -83,7 +83,7 @@ class Setting:
         return value
 
     def parse(self, name: str, text: str) -> Any:
-        """Return the value that a text stands for; raises SettingError as ``check`` does."""
+        """Return the value that a text represents; raises SettingError as ``check`` does."""
         kind: Any = self.kind
         value: Any = None
         if kind is str:
@@ -103,7 +103,7 @@ class Setting:
     def _within(self, value: Any) -> bool:
         if self.choices:
             return value in self.choices
-        if self.plain:  # no separator, not hidden, nothing that cannot be seen
+        if self.plain:  # no separator, not hidden, nothing invisible
             return bool(value.isprintable() and value.strip()) and not (
                 "/" in value or value.startswith(".")
             )
@@ -121,7 +121,7 @@ def setting(
     within: tuple[float, float] = (-math.inf, math.inf),
     **more: Any,
 ) -> Any:
-    """Return a field of a dataclass that can be set; ``more`` are further fields of Setting."""
+    """Return a dataclass field with a setting; ``more`` are further fields of Setting."""
     least, most = within
     kind = more.pop("kind", type(default))
     rule = Setting(meaning, kind, unit, least, most, **more)
@@ -129,7 +129,7 @@ def setting(
 
 
 def settings_of(dataclass_type: Any) -> dict[str, Setting]:
-    """Return what can be set of a dataclass, by the names of its fields."""
+    """Return the settings of a dataclass by field name."""
     return {
         f.name: f.metadata["setting"] for f in fields(dataclass_type) if "setting" in f.metadata
     }
@@ -139,6 +139,6 @@ class Checked:
     """A frozen dataclass of settings that are checked when it is made; raises SettingError."""
 
     def __post_init__(self) -> None:
-        """Check every setting; whole numbers for real ones become such."""
+        """Check every setting; whole numbers become real ones if that is the setting's kind."""
         for name, rule in settings_of(type(self)).items():
             object.__setattr__(self, name, rule.check(name, getattr(self, name)))

@@ -4,8 +4,8 @@
 """
 The whole experiment in one process, without ROS: the same parts in the same chain of promises.
 
-Conductor, ankle robot and walker are the objects that the nodes hold, driven in the order in
-which a lock-step run drives them. So both give the same events to the nanosecond.
+Conductor, ankle robot and walker are the objects that the nodes hold, driven in the same order as
+in a lock-step run. So both give the same events to the nanosecond.
 """
 
 from collections.abc import Callable, Sequence
@@ -32,10 +32,10 @@ TimingsOf = Callable[[Sequence[Pulse], Sequence[RobotState]], Sequence[PulseTimi
 
 @dataclass(frozen=True)
 class Simulation(Run):
-    """What came of a simulated experiment; stamps count from its start."""
+    """The outcome of a simulated experiment; stamps count from its start."""
 
     protocol: Protocol
-    train: PulseTrain | None  # as requested in the last block; None if nobody walked so far
+    train: PulseTrain | None  # as requested in the last block; None if the walk ended earlier
     ending: Ending | None  # fall or fly-off; None if every stride was walked
 
 
@@ -49,9 +49,9 @@ def simulate(
     """
     Conduct a protocol on the simulated walker.
 
-    ``timings_of`` says when the pulses on an ankle began, by them and the states of the robot
-    (gait_entrainment_commands.timing does); with ``measured_onsets`` the analysis takes its word,
-    instead of that of the command.
+    ``timings_of`` finds when the pulses on an ankle began, from them and the robot's states (see
+    gait_entrainment_commands.timing); with ``measured_onsets`` the analysis uses the onsets that
+    it finds, instead of the commanded ones.
 
     Raises LimitError if the driver is unknown or the pulses are outside the protocol's limits,
     ProtocolError if the pulses would overlap at the measured period.
@@ -80,7 +80,7 @@ def simulate(
             robots[train.side].schedule(train)
         ended = horizon.last or walker.ending is not None
     timings_of = timings_of or (
-        lambda of, _: [PulseTiming(p.onset, None, None, p.torque, p.duration) for p in of]
+        lambda sent, _: [PulseTiming(p.onset, None, None, p.torque, p.duration) for p in sent]
     )
     delivered = [(s, t) for s in robots for t in timings_of(pulses[s], states[s])]
     onsets = [(s, t.onset if measured_onsets else t.commanded) for s, t in delivered]
@@ -102,7 +102,7 @@ def begun_robots(protocol: Protocol) -> dict[Side, GuardedRobot]:
     """
     Return the simulated robots of a protocol, at the start of a run.
 
-    Raises LimitError if the driver is unknown or a real robot's, or the pulses are outside the
+    Raises LimitError if the driver is unknown or for a real robot, or the pulses are outside the
     protocol's limits.
     """
     robots = make_robots(protocol.driver, protocol.sides, protocol.limits, protocol.seed)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What an experiment shall do: the protocol file, validated."""
+"""What an experiment should do: the validated protocol file."""
 
 from gait_entrainment.protocol.block import Block, ProtocolError, PulsePlan
 from gait_entrainment.protocol.protocol import FIELDS, Protocol, content_of, said

@@ -4,8 +4,8 @@
 """
 One block of a protocol: baseline strides, pulses, washout strides, and a rest.
 
-The default values are the example of Ahn and Hogan (2012): pulses of 0.1 s and a tenth of the
-peak ankle torque, at a period 50 ms below the walker's own stride period.
+The defaults are the example of Ahn and Hogan (2012): pulses of 0.1 s at a tenth of the peak ankle
+torque, with a period 50 ms below the walker's own stride period.
 """
 
 from dataclasses import dataclass, field
@@ -21,16 +21,16 @@ from gait_entrainment.settings import Checked, setting
 
 # A million strides are three weeks of walking: no run is longer.
 _MOST = 1_000_000
-# A pulse at a smaller phase leaves the robot too little time after its strike: it is asked for at
+# A pulse at a smaller phase leaves the robot too little time after its strike: it is requested at
 # the strike before.
 _EARLY_PHASE = 0.05
-# Of two or more ways to say the same one is given.
+# Alternatives, of which exactly one is given.
 HEIGHTS = ("torque", "torque_fraction")
 TIMINGS = ("period", "period_offset", "period_ratio", "phase")
 
 
 class ProtocolError(UsageError):
-    """A protocol that cannot be conducted; the message says place, field and what is allowed."""
+    """A protocol that cannot be conducted; the message gives place, field and what is allowed."""
 
 
 def _either(unit: str, meaning: str, default: Any = None, **more: Any) -> Any:
@@ -51,7 +51,7 @@ class PulsePlan(Checked):
     width: float = setting(0.1, "duration of a pulse", "s", (1e-9, 10.0))
     torque: float | None = _either("N m", "height of the pulses, plantarflexion positive")
     torque_fraction: float | None = _either(
-        "1", "the same as a fraction of the peak ankle torque", 0.1, within=(-1.0, 1.0)
+        "1", "height as a fraction of the peak ankle torque", 0.1, within=(-1.0, 1.0)
     )
     # Until the stride period is measured, the experiment proceeds by at most a pulse period.
     period: float | None = _either(
@@ -62,28 +62,28 @@ class PulsePlan(Checked):
     )
     initial_phase: float = setting(
         0.0,
-        "place of the first pulse in the stride after the baseline",
+        "position of the first pulse in the stride after the baseline",
         "1",
         (0.0, 1.0),
         most_excluded=True,
     )
     period_ratio: float | None = _either(
-        "1", "pulse period by the stride period of the baseline", within=(0.01, 100.0)
+        "1", "pulse period divided by the stride period of the baseline", within=(0.01, 100.0)
     )
     phase: float | None = _either(
         "1",
-        "place of each pulse in its own stride, of which the length is predicted",
+        "position of each pulse in its own stride, whose length is predicted",
         within=(0.0, 1.0),
         most_excluded=True,
     )
-    sweep: float = setting(0.0, "change of the period, linear, to the last pulse", "s", (-10, 10))
-    jitter: float = setting(0.0, "by which each onset is off its period at most", "s", (0.0, 10.0))
+    sweep: float = setting(0.0, "linear change of the period up to the last pulse", "s", (-10, 10))
+    jitter: float = setting(0.0, "most that an onset deviates from its period", "s", (0.0, 10.0))
     shape: Shape = setting(Shape.SQUARE, "square, half_sine, trapezoid or samples")
     rise: float = setting(0.0, "duration of a trapezoid's first flank", "s", (0.0, 10.0))
     fall: float = setting(0.0, "duration of a trapezoid's second flank", "s", (0.0, 10.0))
-    samples: str = setting("", "shares of the torque from onset to end, such as [0, 0.4, 1, 0]")
-    rising: int = setting(0, "first pulses, which rise in equal steps", "1", (0, _MOST))
-    catch_share: float = setting(0.0, "share of the pulses that are left out", "1", (0.0, 1.0))
+    samples: str = setting("", "fractions of the torque, onset to end, such as [0, 0.4, 1, 0]")
+    rising: int = setting(0, "number of first pulses that rise in equal steps", "1", (0, _MOST))
+    catch_share: float = setting(0.0, "fraction of the pulses that are left out", "1", (0.0, 1.0))
     catch_pulses: str = setting("", "numbers of the pulses that are left out, such as [5, 12]")
 
     @property
@@ -101,7 +101,7 @@ class PulsePlan(Checked):
         period = self.period
         if period is None:
             period = measured_period * (self.period_ratio or 1.0) + (self.period_offset or 0.0)
-        # In stamps: successive onsets are at least the whole nanoseconds of a period apart.
+        # Successive onsets are at least the whole nanoseconds of a period apart.
         least = min(period, period + self.sweep) - 2 * self.jitter
         if not least * NANOSECONDS_PER_SECOND >= nanoseconds(self.width) + 1:
             name = "jitter" if self.jitter else "sweep" if self.sweep < 0 else "width"
@@ -113,10 +113,10 @@ class PulsePlan(Checked):
 
     def onsets(self, first: int, period: float, seed: tuple[int, int]) -> list[int]:
         """
-        Return the onsets [ns], of which the first is given, at a first period [s], and one more.
+        Return the onsets [ns], and one more, from the first onset [ns] and the first period [s].
 
-        The period changes by the same amount from pulse to pulse, by ``sweep`` from the first to
-        the last. Jitter is uniform and does not add up.
+        The period changes by the same amount from pulse to pulse, and by ``sweep`` from the first
+        to the last. Jitter is uniform and does not accumulate.
         """
         n, change = np.arange(self.count + 1), self.sweep / max(self.count - 2, 1) / 2
         late = np.zeros(n.size)
@@ -127,12 +127,12 @@ class PulsePlan(Checked):
         return [first + place for place in places.astype(np.int64).tolist()]
 
     def pulse(self, onset: int, torque: float) -> Pulse:
-        """Return a pulse of this shape at an onset [ns]; its torque [N m] is given."""
+        """Return a pulse of this shape with an onset [ns] and a torque [N m]."""
         shares = tuple(_numbers("samples", self.samples, float))
         return Pulse(onset, torque, self.width, self.shape, self.rise, self.fall, shares)
 
     def heights(self, torque: float, seed: tuple[int, int]) -> list[float]:
-        """Return the torque of each pulse [N m]: the first ones rise, a catch pulse has none."""
+        """Return the torque of each pulse [N m]: the first ones rise, catch pulses have none."""
         left_out = set(_numbers("catch_pulses", self.catch_pulses, int))
         if self.catch_share:
             random, chosen = np.random.default_rng((*seed, 1)), self.catch_share * self.count
@@ -142,7 +142,7 @@ class PulsePlan(Checked):
         return list((torque * steps).tolist())
 
     def check(self) -> None:
-        """Raise ProtocolError for what does not go together."""
+        """Raise ProtocolError for values that do not go together."""
         for group in (HEIGHTS, TIMINGS):
             if sum(getattr(self, name) is not None for name in group) != 1:
                 raise ProtocolError(f"pulses: give either {' or '.join(group)}")
@@ -169,12 +169,12 @@ class PulsePlan(Checked):
 
 
 def _numbers(name: str, text: str, kind: Any) -> list[Any]:
-    """Return the numbers of a text such as "0, 0.4, 1, 0"."""
+    """Return the numbers in a text such as "0, 0.4, 1, 0"."""
     try:
         return [kind(word) for word in text.replace(",", " ").split()]
     except ValueError:
         raise ProtocolError(
-            f"pulses.{name}: {text!r}; allowed: numbers with commas between them"
+            f"pulses.{name}: {text!r}; allowed: numbers separated by commas"
         ) from None
 
 
@@ -183,14 +183,14 @@ class Block(Checked):
     """
     Baseline, pulses and washout, conducted one after the other.
 
-    Baseline and washout last for so many strides at least, and on, if that is asked for, until a
-    time has passed and until the strides are steady.
+    Baseline and washout last at least the given number of strides and, if requested, until a time
+    has passed and the strides are steady.
     """
 
     name: str = setting("block", "name of the block", plain=True)
     baseline: int = setting(15, "unperturbed strides before the pulses", within=(1, _MOST))
     pulses: PulsePlan = field(default_factory=PulsePlan)
-    washout: int = setting(15, "strides after the strides of the pulses", within=(0, _MOST))
+    washout: int = setting(15, "strides after those of the pulses", within=(0, _MOST))
     baseline_time: float = setting(0.0, "shortest duration of the baseline", "s", (0.0, 86_400.0))
     washout_time: float = setting(0.0, "shortest duration of the washout", "s", (0.0, 86_400.0))
     baseline_steady: float = setting(
@@ -199,13 +199,13 @@ class Block(Checked):
         "1",
         (0.0, 1.0),
     )
-    washout_steady: float = setting(0.0, "the same for the washout", "1", (0.0, 1.0))
+    washout_steady: float = setting(0.0, "as baseline_steady, for the washout", "1", (0.0, 1.0))
     rest: float = setting(0.0, "pause before the next block, walked or not", "s", (0.0, 86_400.0))
     side: Side | None = setting(None, "the perturbed leg: left or right", kind=Side, optional=True)
-    both_legs: bool = setting(False, "whether the other leg gets its pulses too, in between")
+    both_legs: bool = setting(False, "whether the other leg also gets pulses, in between")
 
     def __post_init__(self) -> None:
-        """Check every field, and what concerns more than one."""
+        """Check every field, and fields that depend on each other."""
         super().__post_init__()
         plan = self.pulses
         plan.check()
@@ -219,12 +219,12 @@ class Block(Checked):
 
     @property
     def open_baseline(self) -> bool:
-        """Whether more than a number of strides is waited for."""
+        """Whether the baseline waits for more than a number of strides."""
         return self.baseline_time > 0 or self.baseline_steady > 0
 
     @property
     def open_ended(self) -> bool:
-        """Whether nobody knows before how many strides it will have."""
+        """Whether its number of strides is unknown beforehand."""
         return self.open_baseline or self.washout_time > 0 or self.washout_steady > 0
 
     def torque(self, walker: WalkerParameters) -> float:

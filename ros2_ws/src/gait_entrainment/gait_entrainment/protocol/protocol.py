@@ -17,22 +17,22 @@ from gait_entrainment.settings import Setting, setting, settings_of
 @dataclass(frozen=True)
 class Protocol(Block):
     """
-    One experiment, complete: what read_protocol returns and what a bag keeps.
+    One complete experiment: what read_protocol returns and what a bag keeps.
 
-    Without ``blocks`` it is itself its only block.
+    Without ``blocks`` it is its own only block.
     """
 
     name: str = setting("paper_example", "name of the experiment, and of its bag", plain=True)
     side: Side = setting(Side.RIGHT, "the perturbed leg: left or right")
     walker: WalkerParameters = field(default_factory=WalkerParameters)
     variation: Variation = field(default_factory=Variation)  # of the simulated walker's strides
-    limits: DeviceLimits = field(default_factory=DeviceLimits)  # of what the person may get
-    driver: str = setting("ideal", "ankle robot driver, as entrain driver list has them")
-    seed: int = setting(0, "seed of whatever is random", within=(0, 2**63 - 1))
+    limits: DeviceLimits = field(default_factory=DeviceLimits)  # of what the person may receive
+    driver: str = setting("ideal", "ankle robot driver, as listed by entrain driver list")
+    seed: int = setting(0, "seed of everything that is random", within=(0, 2**63 - 1))
     blocks: tuple[Block, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check every field; if each block is on the other leg, that is the protocol's."""
+        """Check every field; if every block is on the other leg, make that the protocol's."""
         super().__post_init__()
         if all(self.leg(block) is not self.side for block in self.sequence):
             object.__setattr__(self, "side", self.side.other)
@@ -42,24 +42,24 @@ class Protocol(Block):
         return self.side if block.side is None else block.side
 
     def ankles(self, block: Block) -> tuple[Side, ...]:
-        """Return the ankles that get a block's pulses, that of its leg first."""
+        """Return the ankles that get a block's pulses, its own leg's first."""
         leg = self.leg(block)
         return (leg, leg.other) if block.both_legs else (leg,)
 
     @property
     def sides(self) -> tuple[Side, ...]:
-        """The ankles that get pulses in some block, that of the protocol's leg first."""
+        """The ankles that get pulses in any block, the protocol's leg's first."""
         found = {side for block in self.sequence for side in self.ankles(block)}
         return tuple(sorted(found, key=lambda side: side is not self.side))
 
     @property
     def sequence(self) -> tuple[Block, ...]:
-        """The blocks in their order."""
+        """The blocks in order."""
         return self.blocks or (self,)
 
     @property
     def strides(self) -> int:
-        """Strides of the whole run, whatever the pulse period: one per pulse, and those around."""
+        """Strides of the whole run: baselines, washouts, and one per pulse whatever its period."""
         return sum(block.baseline + block.pulses.count + block.washout for block in self.sequence)
 
     @property
@@ -69,7 +69,7 @@ class Protocol(Block):
 
     @property
     def planned(self) -> PlannedPulses:
-        """Bounds of the pulses of all blocks."""
+        """Bounds on the pulses of all blocks."""
         plans = [block.pulses for block in self.sequence]
         return PlannedPulses(
             torque=abs(self.pulse_torque),
@@ -79,7 +79,7 @@ class Protocol(Block):
 
     @property
     def dose(self) -> Dose:
-        """What all blocks are to deliver, at both ankles."""
+        """What all blocks will deliver, at both ankles."""
         dose = Dose(self.planned.count)
         for number, block in enumerate(self.sequence, 1):
             heights = len(self.ankles(block)) * sum(block.pulses.heights(1.0, (self.seed, number)))
@@ -87,7 +87,7 @@ class Protocol(Block):
         return dose
 
     def check_limits(self, *blocks: Block) -> None:
-        """Raise LimitError if a pulse, of some blocks only, or all together exceed the limits."""
+        """Raise LimitError if a pulse (of ``blocks`` or any) or all together exceed the limits."""
         for block in blocks or self.sequence:
             self.limits.check_pulse(block.pulses.pulse(0, block.torque(self.walker)))
         self.limits.check_dose(self.dose, ())
@@ -111,10 +111,10 @@ def _fields_of(kind: type[Any], *sections: str) -> dict[str, Setting]:
 
 # All fields of a protocol, by the names that files and messages use: "pulses.width".
 FIELDS = _fields_of(Protocol, *SECTIONS)
-# Those that a block may have.
+# The fields that a block may have.
 BLOCK_FIELDS = _fields_of(Block, "pulses")
 
-# Said of every protocol; what came later is said where it is not as by default.
+# Written for every protocol; fields added later are written only if not at their default.
 _ALWAYS = ("name", "side", "baseline", "pulses", "washout", "walker", "limits", "driver", "seed")
 _ALWAYS_OF_PULSES = (
     *("count", "width", "torque", "torque_fraction"),
@@ -123,7 +123,7 @@ _ALWAYS_OF_PULSES = (
 
 
 def content_of(protocol: Protocol) -> dict[str, Any]:
-    """Return what a protocol says, by section, field and block; words for what has words."""
+    """Return the content of a protocol by section, field and block; enumerations as words."""
     content = said(protocol, _ALWAYS)
     content["pulses"] = said(protocol.pulses, _ALWAYS_OF_PULSES)
     if protocol.blocks:
@@ -138,13 +138,13 @@ def content_of(protocol: Protocol) -> dict[str, Any]:
 
 
 def said(instance: Any, always: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Return what settings say: what is ``always`` said, and all that is not as by default."""
-    told, unsaid = asdict(instance), asdict(type(instance)())
+    """Return settings by name: those in ``always``, and all that are not at their default."""
+    values, defaults = asdict(instance), asdict(type(instance)())
     chosen = [
         *always,
-        *(name for name in told if name not in always and told[name] != unsaid[name]),
+        *(name for name in values if name not in always and values[name] != defaults[name]),
     ]
     return {
-        name: told[name].name.lower() if isinstance(told[name], Enum) else told[name]
+        name: values[name].name.lower() if isinstance(values[name], Enum) else values[name]
         for name in chosen
     }

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Protocol files: YAML in, a validated Protocol out, with the line of whatever is wrong.
+Protocol files: YAML in, a validated Protocol out; errors give the line.
 
 PyYAML's node graph keeps the line of every key, which its loaded dictionaries do not.
 """
@@ -30,7 +30,7 @@ from gait_entrainment.settings import Setting, SettingError
 
 DEFAULT_PROTOCOL = Protocol()
 
-# Of several ways to say the same, the one that is given replaces the others.
+# Of alternative fields, the one that is given replaces the others.
 _ALTERNATIVES = tuple([f"pulses.{name}" for name in group] for group in (HEIGHTS, TIMINGS))
 
 
@@ -39,7 +39,7 @@ _B = TypeVar("_B", bound=Block)
 
 
 class Entry(NamedTuple):
-    """What was said of a field."""
+    """The value given for a field."""
 
     value: object
     where: str  # file and line, or the command-line option that set it
@@ -52,12 +52,12 @@ def read_protocol(
     to_run: bool = False,
 ) -> Protocol:
     """
-    Read and validate a protocol: the default, or of what one says, a YAML file or its text.
+    Read and validate a protocol: the default, or one given as entries, a YAML file or its text.
 
-    A text has a line break in it. ``overrides`` replace values of the source: dotted field name
-    -> (value, who says so), as ``{"pulses.width": (0.2, "--width")}``; a text is read as what it
-    stands for. ``to_run`` holds the pulses against the limits, and sees that there is such a
-    driver. Raises ProtocolError: one line with place, field, and what is allowed.
+    A text contains a line break. ``overrides`` replace values of the source: dotted field name
+    -> (value, origin), as ``{"pulses.width": (0.2, "--width")}``; a value given as text is parsed.
+    Raises ProtocolError: one line with place, field, and what is allowed. ``to_run`` also checks
+    that the driver loads and the pulses are within limits, else raises DeviceError or LimitError.
     """
     if isinstance(source, str | Path):
         name, _, root = composed(source)
@@ -68,23 +68,23 @@ def read_protocol(
     if blocks is None:
         entries = _merged(entries, replacing)
         return _checked(_build(Protocol, entries), [entries], to_run=to_run)
-    # What is said beside the blocks holds for each that does not say otherwise.
+    # Fields outside the blocks apply to every block that does not set them itself.
     of_blocks = BLOCK_FIELDS.keys() - {"name", "side"}
     common = {key: entries.pop(key) for key in BLOCK_FIELDS if key in of_blocks & entries.keys()}
     in_blocks = {k: e for k, e in replacing.items() if k in of_blocks}
-    told: Any = blocks.value
-    said = [_merged(_merged(common, of_block), in_blocks) for of_block in told]
-    made = [_build(Block, of_block) for of_block in said]
+    listed: Any = blocks.value
+    merged = [_merged(_merged(common, of_block), in_blocks) for of_block in listed]
+    made = [_build(Block, of_block) for of_block in merged]
     entries |= {k: e for k, e in replacing.items() if k not in in_blocks}
     if "side" in replacing:
         made = [replace(block, side=None) for block in made]
     protocol = _build(Protocol, entries, blocks=tuple(made))
-    return _checked(protocol, [of_block | entries for of_block in said], to_run=to_run)
+    return _checked(protocol, [of_block | entries for of_block in merged], to_run=to_run)
 
 
-def _checked(protocol: Protocol, said: Sequence[Mapping[str, Entry]], *, to_run: bool) -> Protocol:
-    """Return a protocol, checked if it is ``to_run``; of each block is ``said`` what."""
-    for block, entries in zip(protocol.sequence if to_run else (), said, strict=False):
+def _checked(protocol: Protocol, each: Sequence[Mapping[str, Entry]], *, to_run: bool) -> Protocol:
+    """Return a protocol, checked if it is ``to_run``, with the entries of each block."""
+    for block, entries in zip(protocol.sequence if to_run else (), each, strict=False):
         try:
             find_driver(protocol.driver, protocol.side)
             protocol.check_limits(block)
@@ -96,7 +96,7 @@ def _checked(protocol: Protocol, said: Sequence[Mapping[str, Entry]], *, to_run:
 
 
 def _place(suspects: Iterable[str], entries: Mapping[str, Entry]) -> str:
-    """Return the place of the first field at fault that was said, else of the first that was."""
+    """Return the place of the first suspect that was given, else of the first field given."""
     found = (entries[key].where + ": " for key in (*suspects, *entries) if key in entries)
     return next(found, "")
 
@@ -119,7 +119,7 @@ def composed(source: Path | str) -> tuple[str, str, yaml.Node | None]:
         name = str(source)
         try:
             text = Path(source).read_text(encoding="utf-8")
-        except (OSError, ValueError) as error:  # a name with a null byte, or no UTF-8 in it
+        except (OSError, ValueError) as error:  # a null byte in the name, or not UTF-8
             reason = error.strerror if isinstance(error, OSError) else "is not UTF-8 text"
             raise ProtocolError(f"{name}: cannot be read: {reason}") from None
     try:
@@ -136,7 +136,7 @@ def composed(source: Path | str) -> tuple[str, str, yaml.Node | None]:
 def entries_in(
     node: yaml.Node, name: str, allowed: Mapping[str, Setting] = FIELDS, prefix: str = ""
 ) -> Iterator[tuple[str, Entry]]:
-    """Yield dotted field names with value and place from a part of a file of this ``name``."""
+    """Yield dotted field names with value and place from a node of the file ``name``."""
     if not isinstance(node, yaml.MappingNode):
         section = prefix.rstrip(".") or "a protocol"
         raise ProtocolError(
@@ -154,11 +154,11 @@ def entries_in(
                 raise ProtocolError(f"{where}: blocks: must be a list of at least one block")
             blocks = [dict(entries_in(block, name, BLOCK_FIELDS)) for block in value_node.value]
             yield key, Entry(blocks, where)
-        elif key in allowed and allowed[key].kind is yaml.Node:  # for the caller to take apart
+        elif key in allowed and allowed[key].kind is yaml.Node:  # for the caller to read
             yield key, Entry(value_node, where)
         elif any(field.startswith(f"{key}.") for field in allowed):
             yield from entries_in(value_node, name, allowed, f"{key}.")
-        elif key not in allowed or "." in str(key_node.value):  # a section's field has one place
+        elif key not in allowed or "." in str(key_node.value):  # no dotted keys in a file
             inside = [field.removeprefix(prefix) for field in allowed if field.startswith(prefix)]
             known = ", ".join(sorted({field.partition(".")[0] for field in inside}))
             raise ProtocolError(f"{where}: {key}: unknown field; allowed: {known}")
@@ -166,7 +166,7 @@ def entries_in(
             yield key, Entry(", ".join(str(item.value) for item in value_node.value), where)
         elif not isinstance(value_node, yaml.ScalarNode):
             raise ProtocolError(f"{where}: {key}: must be a single value")
-        elif allowed[key].kind is str:  # as written, also if YAML would make a number of it
+        elif allowed[key].kind is str:  # as written, even if it is a number in YAML
             yield key, Entry(value_node.value, where)
         else:
             value = _meant(f"{where}: {key}", allowed[key].kind, value_node)
@@ -174,18 +174,18 @@ def entries_in(
 
 
 def _spelled_out(key: str, entry: Entry) -> tuple[str, Entry]:
-    """Return an entry, and what "side: both" is short for."""
+    """Return an entry, with "side: both" as the field that it is short for."""
     both = (key, entry.value) == ("side", "both")
     return ("both_legs", entry._replace(value=True)) if both else (key, entry)
 
 
 def _meant(where: str, kind: type, node: yaml.ScalarNode) -> object:
-    """Return a value as people mean it, else as written; ProtocolError where YAML 1.1 differs."""
+    """Return a value as people mean it, else as written; ProtocolError if YAML 1.1 differs."""
     if kind in (int, float) and node.style in ("'", '"'):
-        raise ProtocolError(f"{where}: {node.value!r} is a text: leave out the quotes")
+        raise ProtocolError(f"{where}: {node.value!r} is text: remove the quotes")
     try:
         value = yaml.SafeLoader("").construct_object(node)
-    except Exception:  # an unknown tag, a month 13: PyYAML passes on what it runs into
+    except Exception:  # an unknown tag, month 13: PyYAML lets any exception through
         raise ProtocolError(f"{where}: {node.value[:40]!r} cannot be read as a value") from None
     same = node.value.isdigit() and int(node.value) == value
     other_base = isinstance(value, int) and re.match(r"[-+]?0[0-9_box]", node.value) and not same
@@ -196,7 +196,7 @@ def _meant(where: str, kind: type, node: yaml.ScalarNode) -> object:
 
 
 def _merged(entries: Mapping[str, Entry], replacing: Mapping[str, Entry]) -> dict[str, Entry]:
-    """Return entries of which some are replaced, with what says the same in another way."""
+    """Return entries with some replaced; what replaces a field also replaces its alternatives."""
     replaced = {
         k for group in _ALTERNATIVES if not replacing.keys().isdisjoint(group) for k in group
     }
@@ -210,10 +210,10 @@ def _merged(entries: Mapping[str, Entry], replacing: Mapping[str, Entry]) -> dic
 
 
 def value_of(rule: Setting, key: str, entry: Entry) -> Any:
-    """Return what was said of a field as a value; raises ProtocolError."""
+    """Return the checked value of an entry; raises ProtocolError."""
     value, where = entry
     try:
-        # YAML 1.1 reads 1e-3, which has no dot, as a text.
+        # YAML 1.1 reads 1e-3, which has no dot, as text.
         return rule.parse(key, value) if isinstance(value, str) else rule.check(key, value)
     except SettingError as error:
         also = ", both" if key == "side" else ""
@@ -221,17 +221,17 @@ def value_of(rule: Setting, key: str, entry: Entry) -> Any:
 
 
 def _build(kind: type[_B], entries: Mapping[str, Entry], **more: Any) -> _B:
-    """Return a block or a whole protocol from what is said of it."""
+    """Return a block or a whole protocol made from its entries."""
     sections: dict[str, dict[str, Any]] = {"": {}}
     rules = BLOCK_FIELDS if kind is Block else FIELDS
     for key, entry in entries.items():
         section, _, name = key.rpartition(".")
         sections.setdefault(section, {})[name] = value_of(rules[key], key, entry)
-    # What is given leaves no place for the default of its alternative.
+    # A given field overrides the default of its alternative.
     for group in _ALTERNATIVES:
         if any(key in entries for key in group):
-            unsaid = {key.partition(".")[2]: None for key in group}
-            sections["pulses"] = unsaid | sections["pulses"]
+            unset = {key.partition(".")[2]: None for key in group}
+            sections["pulses"] = unset | sections["pulses"]
     values = sections.pop("") | more
     try:
         values |= {name: SECTIONS[name](**content) for name, content in sections.items()}
@@ -243,6 +243,6 @@ def _build(kind: type[_B], entries: Mapping[str, Entry], **more: Any) -> _B:
         places = [entries[key].where for key in ([named] if named in present else present)]
         raise ProtocolError(f"{', '.join(dict.fromkeys(places))}: walker: {error}") from None
     except ProtocolError as error:
-        # What is wrong may be a default; then the field that does not go with it is at fault.
+        # The wrong value may be a default; then the field that conflicts with it is at fault.
         suspects = (str(error).partition(":")[0], *_SUSPECTS)
         raise ProtocolError(f"{_place(suspects, entries)}{error}") from None

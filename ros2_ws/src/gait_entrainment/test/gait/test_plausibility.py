@@ -113,7 +113,7 @@ def test_stray_strikes_do_not_enter_the_measured_period():
 
 def test_a_baseline_of_strays_ends_the_run_before_the_first_pulse_with_the_figures():
     conductor = Conductor(Protocol())
-    with pytest.raises(GaitError, match=r"baseline: .* of .* strides cannot be"):
+    with pytest.raises(GaitError, match=r"baseline: .* of .* strides are implausible"):
         gait(conductor, 17, stray=range(2, 15))
 
 
