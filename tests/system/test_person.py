@@ -168,7 +168,7 @@ def test_what_sensors_do_wrong_is_told_by_name(tmp_path):
         for value, told in (
             (float("nan"), "samples are not numbers"),
             (500.0, "times the signal did not change"),
-            (8e4, "cannot be: the force"),
+            (8e4, "are impossible: the ground's force"),
         ):
             feet.value = value
             feet.until(lambda told=told: said(told), f"what is told of {value}")

@@ -2,17 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Gait events from the signals of sensors: detectors, numbering, emulated sensors, recordings.
+Gait events from sensor signals: detectors, numbering, emulated sensors, recordings.
 
-    detection       what a detector owes, and how one is found by name
+    detection       the interface of a detector, and how one is found by name
     vertical_force, foot_switch, foot_gyroscope, shank_gyroscope, ankle_encoder
                     the detectors
-    mounting        which way round a gyroscope was put on, from a calibration walk
-    numbering       step numbers for what was detected on both feet
+    mounting        the orientation of a gyroscope, from a calibration walk
+    numbering       step numbers for the events detected on both feet
     emulated        what sensors on the simulated walker would measure
     rehearsal       a simulated experiment, seen through emulated sensors and detectors
-    sources         topics, fields of messages and columns of tables of each kind of sensor
-    scoring         detected events beside a reference
+    sources         topics, message fields and table columns of each kind of sensor
+    scoring         detected events compared with a reference
 """
 
 from gait_entrainment_sensors.detection import Detection, Detector, find_detector

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The ankle angle that the robot's encoder measures: the fallback where there is nothing else."""
+"""The ankle angle from the robot's encoder: the fallback if there is no other sensor."""
 
 import math
 from collections.abc import Sequence
@@ -15,31 +15,29 @@ from gait_entrainment_sensors.detection import Detection, Detector, DetectorSett
 
 @dataclass(frozen=True)
 class AnkleEncoderSettings(DetectorSettings):
-    """What the detector can be told."""
+    """Settings of the detector."""
 
     least_range: float = setting(0.1, "least change from peak to peak", "rad", (0.01, 1.0))
     strike_share: float = setting(
         0.38, "strides from the plantarflexion peak to heel strike", "1", (0.0, 0.9)
     )
-    decision: float = setting(0.15, "for which a pulse may hide the peak", "s", (0.0, 0.5))
-    blank_torque: float = setting(
-        1.0, "torque from which on the angle is not read", "N m", (0, 30)
-    )
+    decision: float = setting(0.15, "longest time that a pulse may hide the peak", "s", (0.0, 0.5))
+    blank_torque: float = setting(1.0, "torque above which the angle is not read", "N m", (0, 30))
 
 
 class AnkleEncoderDetector(Detector):
     """
     Heel strikes, roughly, from the ankle angle, plantarflexion positive: a fallback.
 
-    Once in a stride, just after toe-off, plantarflexion peaks; the heel strike is put at a fixed
-    share of the own median stride after it: 62 % of the stride are stance in walking (Perry and
-    Burnfield, Gait Analysis, 2010). So the stride *period* can be followed, and no more: the
-    strikes have a bias of some percent of the stride that is the person's own, and there are no
-    toe-offs, since the lag of a pulse must not rest on a share that was assumed. Pulses move the
-    very angle; it is not read while the robot delivers more than ``blank_torque``.
+    Once per stride, just after toe-off, plantarflexion peaks. The heel strike is placed a fixed
+    share of the own median stride later: stance is 62 % of the stride in walking (Perry and
+    Burnfield, Gait Analysis, 2010). So the stride *period* can be followed, but no more: the
+    strikes have a bias of a few percent of the stride that differs between people, and there are
+    no toe-offs, since the lag of a pulse must not rest on an assumed share. Pulses move this very
+    angle; it is not read while the robot delivers more than ``blank_torque``.
 
-    Latency: ``decision``: a strike is foreseen, and told once its time has come; but while a pulse
-    hides the peak, nothing can be foreseen.
+    Latency: ``decision``: a strike is predicted, and reported at its time; but while a pulse hides
+    the peak, nothing can be predicted.
     Uncertainty: 50 ms.
     Fails: pulses near toe-off hide or shift the peak, so with pulses even the period is doubtful.
     """
@@ -47,7 +45,7 @@ class AnkleEncoderDetector(Detector):
     name = "ankle_encoder"
     signals: ClassVar[tuple[str, ...]] = ("angle", "torque")
     Settings: ClassVar[type[DetectorSettings]] = AnkleEncoderSettings
-    impossible = 200.0  # the magnitude of the torque is in it
+    impossible = 200.0  # includes the magnitude of the torque
     uncertainty = (0.05, math.nan)
     lacks = (
         "a fallback: no toe-offs, and heel strikes to some 50 ms, from an angle that pulses move: "
@@ -62,7 +60,7 @@ class AnkleEncoderDetector(Detector):
 
     @property
     def latency(self) -> float:
-        """As long as a pulse may hide the peak."""
+        """Longest time that a pulse may hide the peak."""
         return float(self.settings.decision)
 
     def _restart(self) -> None:
@@ -70,17 +68,17 @@ class AnkleEncoderDetector(Detector):
         self._extreme, self._at = math.nan, math.nan  # [rad], [s]
         self._trough, self._trough_at = math.nan, math.nan
         self._peak = math.nan  # time of the latest [s]
-        self._strike = math.nan  # foreseen [s]
+        self._strike = math.nan  # predicted [s]
 
     def troubles(self, now: float | None = None) -> tuple[str, ...]:
-        """Say that this is the fallback, and whether it seems to be read the other way round."""
+        """Add that this is the fallback, and whether the angle's sign seems to be reversed."""
         where = f"{self.side.name.lower()} {self.name}"
-        told = [*super().troubles(now), f"{where}: {self.lacks}"]
+        lines = [*super().troubles(now), f"{where}: {self.lacks}"]
         if self._rise.value > 0.6:  # push-off lasts a sixth of a stride (Perry and Burnfield)
-            told.append(
+            lines.append(
                 f"{where}: the angle rises slowly and falls fast: plantarflexion must be positive"
             )
-        return tuple(told)
+        return tuple(lines)
 
     def _take(self, time: float, values: Sequence[float]) -> list[Detection]:
         found: list[Detection] = []
@@ -106,7 +104,7 @@ class AnkleEncoderDetector(Detector):
         return found
 
     def _take_peak(self, angle: float, at: float) -> None:
-        """Take a peak of plantarflexion; foresee the strike after it."""
+        """Process a peak of plantarflexion; predict the strike after it."""
         if angle - self._trough >= self.settings.least_range:
             self._range.add(angle - self._trough)
         period = at - self._peak

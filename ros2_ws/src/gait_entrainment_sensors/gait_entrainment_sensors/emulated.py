@@ -4,26 +4,26 @@
 """
 What sensors on the simulated walker would measure: a pure function of its trajectory and a seed.
 
-Each sample follows from the walker at one instant, from the events before it, and from random
-numbers that are drawn sample by sample: the same however a walk is cut into stretches, so that
-lock-step and offline agree.
+Each sample depends on the walker at one time, on the events before it, and on random numbers
+drawn sample by sample. It is the same however a walk is cut into stretches, so lock-step and
+offline agree.
 
-What is modelled beyond the walker's own motion, because the model leaves it out:
+Effects that the walker model leaves out, and that are added here:
 
-- Its foot slaps down in no time, and meets the ground flat. A person's comes down on the heel with
-  the toes up and turns flat within a tenth of a second. So a gyroscope on the foot also measures
-  ``slap_angle`` turned in ``slap_time`` after each strike; that the swing turns it up by as much
-  more is left out. A switch under the toes closes after ``slap_time``.
-- Its swing leg has no dynamics; the foot goes on turning down for a seventh of a second after
-  toe-off. A person's is pulled up at once. So that rate fades with ``release_time``.
-- Its knee does not bend. A person's bends from 5 to 40 degrees in push-off, ever faster, and by 20
-  more once the toes are off (Perry and Burnfield, Gait Analysis, 2010). Thigh and shank are about
-  equally long, so each turns by half of that. So a gyroscope on the shank also measures half of
-  ``knee_angle``, turned in the ``push_off_time`` after the other foot's strike and fading with
-  ``knee_time`` after toe-off; that the swing turns it back by as much more is left out.
+- The model's foot slaps down instantly and meets the ground flat. A person's lands on the heel
+  with the toes up and turns flat within a tenth of a second. So a gyroscope on the foot also
+  measures a rotation by ``slap_angle`` in ``slap_time`` after each strike; the matching upward
+  rotation in swing is left out. A switch under the toes closes after ``slap_time``.
+- The model's swing leg has no dynamics: the foot keeps turning down for a seventh of a second
+  after toe-off. A person's is pulled up immediately. So that rate decays with ``release_time``.
+- The model's knee does not bend. A person's bends from 5 to 40 degrees in push-off, ever faster,
+  and by 20 more after toe-off (Perry and Burnfield, Gait Analysis, 2010). Thigh and shank are
+  about equally long, so each turns by half of that. So a gyroscope on the shank also measures a
+  rotation by half of ``knee_angle`` in the ``push_off_time`` after the other foot's strike, which
+  decays with ``knee_time`` after toe-off; the matching rotation back in swing is left out.
 
-What is not modelled: the knee in the rest of the stride, so the shank swings about half as fast as
-a person's, without the peak at strike; soft tissue; shocks at impact; cross-talk of axes; forces
+Not modelled: the knee in the rest of the stride, so the shank swings about half as fast as a
+person's, without the peak at strike; soft tissue; impact shocks; cross-talk between axes; forces
 on the other foot's belt; the centre of pressure.
 """
 
@@ -45,14 +45,14 @@ from gait_entrainment.walker import Samples
 Floats = NDArray[np.float64]
 Stamps = NDArray[np.int64]
 
-HIP, ANKLE = 0, 2  # places in an array of joints, plus the side
-_BLOCK: Final = 1024  # instants drawn at a time
+HIP, ANKLE = 0, 2  # indices into joint arrays, plus the side
+_BLOCK: Final = 1024  # sample times drawn at a time
 _NEVER: Final = -(10**15)  # [ns]
 
 
 @dataclass(frozen=True)
 class EmulatedSettings(Checked):
-    """How good a sensor is; noise, bias, drift, resolution and range in the unit of its signal."""
+    """Quality of a sensor; noise, bias, drift, resolution and range in the unit of its signal."""
 
     rate: float = setting(200.0, "samples per second", "Hz", (10.0, 5000.0))
     noise: float = setting(0.0, "white noise, standard deviation", "unit", (0.0, 1e4))
@@ -61,22 +61,22 @@ class EmulatedSettings(Checked):
     resolution: float = setting(0.0, "smallest step; 0: none", "unit", (0.0, 1e3))
     full_scale: float = setting(1e6, "largest magnitude", "unit", (1e-3, 1e6))
     jitter: float = setting(
-        0.0, "of sampling, unknown to the stamp, standard deviation", "s", (0.0, 0.1)
+        0.0, "sampling jitter not in the stamps, standard deviation", "s", (0.0, 0.1)
     )
     dropouts: float = setting(0.0, "dropouts per minute", "1/min", (0.0, 600.0))
     dropout_time: float = setting(0.3, "length of a dropout", "s", (1e-3, 60.0))
-    clock_offset: float = setting(0.0, "of the sensor's clock", "s", (-10.0, 10.0))
-    clock_drift: float = setting(0.0, "of the sensor's clock", "1", (-1e-2, 1e-2))
-    slap_angle: float = setting(0.25, "turned down after a strike", "rad", (0.0, 1.0))
+    clock_offset: float = setting(0.0, "offset of the sensor's clock", "s", (-10.0, 10.0))
+    clock_drift: float = setting(0.0, "drift of the sensor's clock", "1", (-1e-2, 1e-2))
+    slap_angle: float = setting(0.25, "downward rotation after a strike", "rad", (0.0, 1.0))
     slap_time: float = setting(0.1, "from heel strike to foot flat", "s", (1e-3, 0.5))
     release_time: float = setting(0.015, "time constant of the foot after toe-off", "s", (0, 0.1))
-    knee_angle: float = setting(0.6, "bent in push-off", "rad", (0.0, 1.5))
-    push_off_time: float = setting(0.35, "usual length of double stance", "s", (0.05, 1.0))
+    knee_angle: float = setting(0.6, "knee flexion in push-off", "rad", (0.0, 1.5))
+    push_off_time: float = setting(0.35, "usual duration of double stance", "s", (0.05, 1.0))
     knee_time: float = setting(0.1, "time constant of the knee after toe-off", "s", (1e-3, 0.5))
     bounce: float = setting(0.004, "time for which a switch bounces", "s", (0.0, 0.1))
 
 
-# Kinds of sensors: the detector's signals, and what is usual. Force: an instrumented treadmill
+# Kinds of sensors: the detector's signals, and usual settings. Force: an instrumented treadmill
 # (noise as measured on one, docs/sensors.md) and an insole; MEMS gyroscopes of 2000 deg/s.
 _GYROSCOPE = EmulatedSettings(
     noise=0.02, bias=0.03, drift=1e-5, resolution=1.07e-3, full_scale=34.9
@@ -102,13 +102,13 @@ KINDS: dict[str, tuple[tuple[str, ...], EmulatedSettings]] = {
 }
 
 
-# The emulated sensor of a detector, where the two have different names.
+# The emulated sensor of a detector, if their names differ.
 USUAL = {"vertical_force": "treadmill_force"}
 
 
 def find_sensor(text: str) -> tuple[str, EmulatedSettings]:
     """
-    Return kind and settings of the emulated sensor that a text names: KIND:OPTION=VALUE,...
+    Return kind and settings of the emulated sensor named by a text, KIND:OPTION=VALUE,...
 
     Raises UsageError if there is no such kind, LimitError for a wrong option.
     """
@@ -124,8 +124,8 @@ class EmulatedSensor:
     """
     One sensor on one foot of the simulated walker.
 
-    Ask `due` for the instants [ns] at which it samples next, sample the walker there, and give
-    the samples to `measure` with the events of the stretch. Raises KeyError for an unknown kind.
+    `due` returns the times [ns] of the next samples: sample the walker there, and pass the samples
+    to `measure` with the events of the stretch. Raises KeyError for an unknown kind.
     """
 
     def __init__(
@@ -135,11 +135,11 @@ class EmulatedSensor:
         self.signals, usual = KINDS[kind]
         self.settings = settings or usual
         seeds = np.random.SeedSequence([seed, int(side), [*KINDS].index(kind)]).spawn(4)
-        # One generator for each purpose: what it draws does not depend on the cuts.
+        # One generator per purpose, so that the draws do not depend on the cuts.
         self._jitters, self._noises, self._gaps, self._bounces = map(np.random.default_rng, seeds)
         self._bias = self.settings.bias * self._noises.standard_normal(len(self.signals))
         self._next = 0  # number of the first sample that `due` has not returned
-        self._taken = 0  # number of the first that `measure` has not had
+        self._taken = 0  # number of the first sample that `measure` has not seen
         self._instants: Stamps = np.empty(0, np.int64)  # drawn, from number `_next` on
         self._gap_from = -math.inf  # start of the latest dropout [s]
         self._strikes: list[int] = [_NEVER]  # of this foot [ns]
@@ -147,7 +147,7 @@ class EmulatedSensor:
         self._pushes: list[int] = [_NEVER]  # strikes of the other foot, when this one pushes off
 
     def due(self, until: int) -> Stamps:
-        """Return the instants of the samples up to and including ``until`` [ns], each once."""
+        """Return the times of the samples up to and including ``until`` [ns], each only once."""
         interval = NANOSECONDS_PER_SECOND / self.settings.rate
         while self._instants.size == 0 or self._instants[-1] <= until:
             numbers = self._next + self._instants.size + np.arange(_BLOCK)
@@ -164,9 +164,9 @@ class EmulatedSensor:
         self, times: Stamps, samples: Samples, events: Iterable[GaitEvent]
     ) -> list[tuple[float, tuple[float, ...]]]:
         """
-        Return what the sensor says: stamp by its own clock [s], and the values of `signals`.
+        Return the sensor's output: the stamp on its own clock [s], and the values of `signals`.
 
-        ``times`` are what `due` returned; ``events`` those of the stretch, of both feet.
+        ``times`` come from `due`; ``events`` are those of both feet in the stretch.
         """
         for event in events:
             struck = event.kind is EventKind.HEEL_STRIKE
@@ -180,7 +180,7 @@ class EmulatedSensor:
         values = _SIGNALS[self.kind](self, times, samples)
         noise = settings.noise * self._noises.standard_normal(values.shape)
         if self.kind == "ankle_encoder":
-            noise[:, 1] = 0.0  # the torque is the robot's own figure
+            noise[:, 1] = 0.0  # the robot itself reports its torque
         elif self.kind != "foot_switch":
             noise += self._bias + settings.drift * stamps[:, np.newaxis]
         values = values + noise
@@ -223,7 +223,7 @@ class EmulatedSensor:
         return np.where(bounces, self._bounces.random(closed.shape) < 0.5, closed)
 
     def _rates(self, times: Stamps, samples: Samples) -> Floats:
-        """Sensor x forward, y to the left, z up: it measures toes down, leaning forward as +y."""
+        """Axes x forward, y to the left, z up: toes down and leaning forward are +y."""
         settings = self.settings
         rate = -samples.velocity[:, HIP + self.side]
         trailing = samples.leading != self.side

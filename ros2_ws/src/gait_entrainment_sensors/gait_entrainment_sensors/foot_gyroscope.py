@@ -10,12 +10,12 @@ from gait_entrainment.conventions import EventKind, Side
 from gait_entrainment_sensors.detection import Detection
 from gait_entrainment_sensors.gyroscope import GyroscopeDetector, Peaks
 
-# Rate that has left zero for certain [rad/s]: 14 deg/s, three times the offset that a gyroscope
-# for consumers may have.
+# Rate that has certainly left zero [rad/s]: 14 deg/s, three times the offset that a consumer
+# gyroscope may have.
 _LEFT_ZERO = 0.25
 # Rate at which a foot that came down on the heel is slapping flat [rad/s].
 _SLAPPING = 1.0
-# Shares of the peak of push-off: it is falling for certain; it will not come back.
+# Shares of the push-off peak below which the rate is certainly falling; will not rise again.
 _FALLING = 0.75
 _FALLEN = 0.5
 
@@ -27,15 +27,14 @@ class FootGyroscopeDetector(GyroscopeDetector):
     The foot lies flat, turns toes down to a peak at push-off, swings back toes up, and turns down
     again as it slaps flat (Sabatini, IEEE Trans. Biomed. Eng. 52, 217, 2005; Kotiadis et al., Gait
     Posture 32, 2010; Mariani et al., IEEE Trans. Biomed. Eng. 60, 2013). Toe-off lies between the
-    peak, a plateau of several tens of milliseconds, and the zero crossing after it: taken is the
-    instant at which the rate has fallen to three quarters of the peak, the begin of the fall.
-    Heel strike is where the rate leaves the zero crossing after swing; of a foot that comes down
-    flat, where it comes to rest.
+    peak, a plateau of several tens of milliseconds, and the zero crossing after it. It is taken
+    when the rate has fallen to three quarters of the peak, the start of the fall. Heel strike is
+    when the rate leaves zero after swing or, if the foot lands flat, when it comes to rest.
 
-    Latency: the delay of the filter and ``decision``; of what takes longer nothing is told.
-    Uncertainty: 6 ms each, measured beside motion capture (docs/sensors.md).
-    Fails: on steps whose swing turns the foot by less than half of the usual rate (turning on the
-    spot, shuffling); where the foot is flat throughout (no push-off: no toe-off).
+    Latency: the filter delay plus ``decision``; events that take longer are not reported.
+    Uncertainty: 6 ms each, measured against motion capture (docs/sensors.md).
+    Fails: on steps whose swing turns the foot at less than half of the usual rate (turning on the
+    spot, shuffling); if the foot is flat throughout (no push-off, so no toe-off).
     """
 
     name = "foot_gyroscope"

@@ -15,12 +15,12 @@ from gait_entrainment_sensors.detection import Detection, Detector, DetectorSett
 
 @dataclass(frozen=True)
 class FootSwitchSettings(DetectorSettings):
-    """What the detector can be told; levels are shares of a closed contact."""
+    """Settings of the detector; levels are shares of a closed contact."""
 
     hysteresis: ClassVar[tuple[str, ...]] = ("open_below", "closed_above")
-    closed_above: float = setting(0.6, "a contact closes above", "1", (0.0, 1.0))
-    open_below: float = setting(0.4, "a contact opens below", "1", (0.0, 1.0))
-    debounce: float = setting(0.02, "a change must last for", "s", (0.0, 0.2))
+    closed_above: float = setting(0.6, "level above which a contact closes", "1", (0.0, 1.0))
+    open_below: float = setting(0.4, "level below which a contact opens", "1", (0.0, 1.0))
+    debounce: float = setting(0.02, "shortest change that counts", "s", (0.0, 0.2))
     longest_constant: float = setting(5.0, "longest time without change", "s", (0.1, 60.0))
 
 
@@ -28,14 +28,14 @@ class FootSwitchDetector(Detector):
     """
     Events from two contacts, a Schmitt trigger each; a foot is on the ground while one is closed.
 
-    An event is the first of the changes that lasts: half a sample before it was seen, interpolated
-    where the contact is graded. Hanlon and Anderson (Gait Posture 30, 2009) found 2.4 +/- 2.1 ms
-    beside force plates, a later study 17.7 +/- 11.7 ms.
+    An event is the start of a change that lasts, half a sample before it was seen. Hanlon and
+    Anderson (Gait Posture 30, 2009) found 2.4 +/- 2.1 ms compared with force plates, a later study
+    17.7 +/- 11.7 ms.
 
     Latency: ``debounce``.
-    Uncertainty: 6 ms, between the two published; measure it with your own insoles.
+    Uncertainty: 6 ms, between the two published values; measure it with your own insoles.
     Fails: worn or shifted insoles, whose toe-off comes early if only heel and toes are covered; a
-    contact that stays closed in the shoe: neither strike nor toe-off, which is told.
+    contact that stays closed in the shoe: neither strike nor toe-off, which is reported.
     """
 
     name = "foot_switch"
@@ -43,7 +43,7 @@ class FootSwitchDetector(Detector):
     Settings: ClassVar[type[DetectorSettings]] = FootSwitchSettings
     impossible = 4.0
     reached = 0.6
-    suspicion = "0 for an open contact to 1 for a closed one are expected, not volts"
+    suspicion = "values from 0 (open) to 1 (closed) are expected, not volts"
     uncertainty = (0.006, 0.006)
 
     def __init__(self, side: Side, settings: Any = None) -> None:
@@ -52,7 +52,7 @@ class FootSwitchDetector(Detector):
 
     @property
     def latency(self) -> float:
-        """The time that a change must last, and the half sample before it."""
+        """Time that a change must last."""
         return float(self.settings.debounce)
 
     def _restart(self) -> None:

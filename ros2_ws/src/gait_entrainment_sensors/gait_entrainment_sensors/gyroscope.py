@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What the detectors of a gyroscope on foot or shank share: mounting, filter, and the swing.
+What the gyroscope detectors for foot and shank share: mounting, filter, and the swing.
 
-Rates count positive where the toes turn down and the shank leans forward. So swing is negative.
+Rates are positive when the toes turn down and the shank leans forward, so negative in swing.
 """
 
 import math
@@ -19,7 +19,7 @@ from gait_entrainment.settings import setting
 from gait_entrainment_sensors.detection import Detection, Detector, DetectorSettings, OwnMedian
 from gait_entrainment_sensors.mounting import Mounting, find_mounting, usual_mounting
 
-# Lean of the axis of swing from which on the toes turn in [rad]: 9 degrees.
+# Lean of the swing axis above which the toes turn in [rad]: 9 degrees.
 _TOES_IN = 0.15
 # Time constant of one of two poles with -3 dB at one hertz [s].
 _TWO_POLES = math.sqrt(math.sqrt(2) - 1) / (2 * math.pi)
@@ -27,18 +27,18 @@ _TWO_POLES = math.sqrt(math.sqrt(2) - 1) / (2 * math.pi)
 
 @dataclass(frozen=True)
 class GyroscopeSettings(DetectorSettings):
-    """What a detector of a gyroscope can be told."""
+    """Settings of a gyroscope detector."""
 
     axis_x: float = setting(0.0, "axis about which the toes turn down, x", "1", (-1.0, 1.0))
     axis_y: float = setting(0.0, "the same, y; all zero: found in the first steps", "1", (-1, 1))
     axis_z: float = setting(0.0, "the same, z", "1", (-1.0, 1.0))
-    calibration: float = setting(5.0, "time in which the axis is found or checked", "s", (2, 60))
+    calibration: float = setting(5.0, "time for finding or checking the axis", "s", (2, 60))
     cutoff: float = setting(30.0, "cutoff frequency of the filter", "Hz", (5.0, 200.0))
     least_peak: float = setting(1.0, "least peak of a swing, and of a push-off", "rad/s", (0, 10))
-    peak_share: float = setting(0.5, "least peak, of the own median one", "1", (0.0, 0.9))
+    peak_share: float = setting(0.5, "least peak / own median peak", "1", (0.0, 0.9))
     shortest_swing: float = setting(0.15, "shortest swing", "s", (0.01, 1.0))
     shortest_stance: float = setting(0.25, "shortest stance", "s", (0.01, 1.0))
-    decision: float = setting(0.03, "longest time to be certain of an event", "s", (5e-3, 0.2))
+    decision: float = setting(0.03, "longest time to decide an event", "s", (5e-3, 0.2))
 
     @property
     def axis(self) -> tuple[float, float, float] | None:
@@ -58,11 +58,11 @@ class Peaks(OwnMedian):
 
     @property
     def threshold(self) -> float:
-        """What the peak of a step exceeds."""
+        """The value that a step's peak exceeds."""
         return max(self._least, self._share * self.value)
 
     def is_step(self, peak: float) -> bool:
-        """Take a peak; whether it is that of a step. Also one that is none moves the median."""
+        """Add a peak; return whether it is a step's. One that is not also moves the median."""
         step = peak >= self.threshold
         if peak >= self._least:
             self.add(peak)
@@ -73,24 +73,24 @@ class GyroscopeDetector(Detector):
     """
     The rate about one axis, filtered, and whether the leg stands or swings.
 
-    Two equal poles filter, with a coefficient made for each interval between samples, so that
-    irregular sampling does no harm; their delay is taken off each event. A derived class says
-    which features of the rate are the events.
+    The filter has two equal poles, with a coefficient for each interval between samples, so
+    irregular sampling does no harm; its delay is subtracted from each event. A derived class
+    defines which features of the rate are the events.
     """
 
     signals: ClassVar[tuple[str, ...]] = ("gyro_x", "gyro_y", "gyro_z")
     Settings: ClassVar[type[DetectorSettings]] = GyroscopeSettings
     moving = 1.0
-    impossible = 100.0  # rad/s, the magnitudes of three axes: twice what a kick reaches
+    impossible = 100.0  # rad/s, summed over three axes: twice what a kick reaches
     reached = 1.0
     suspicion = "angular velocities in rad/s are expected, not in degrees per second"
     foot: ClassVar[bool]  # on the foot, not on the shank
 
     def __init__(self, side: Side, settings: Any = None) -> None:
         super().__init__(side, settings)
-        self._mountings: deque[Mounting] = deque(maxlen=2)  # as the latest steps tell
+        self._mountings: deque[Mounting] = deque(maxlen=2)  # found in the latest steps
         self._recorded: list[tuple[float, Sequence[float]]] = []
-        self._asked = -math.inf  # when they were last asked [s]
+        self._searched = -math.inf  # when they were last searched [s]
         self._axis = self.settings.axis
         self._pole = _TWO_POLES / self.settings.cutoff
         self._interval = self._keep = math.nan
@@ -100,7 +100,7 @@ class GyroscopeDetector(Detector):
 
     @classmethod
     def calibrated(cls, settings: Any, walk: Sequence[Any]) -> Any:
-        """Return settings with the axis that a recorded walk tells, unless they name one."""
+        """Return settings with the axis found in a recorded walk, unless they give one."""
         if settings.axis is not None:
             return settings
         found = usual_mounting(walk, settings.calibration, foot=cls.foot)
@@ -109,7 +109,7 @@ class GyroscopeDetector(Detector):
 
     @property
     def latency(self) -> float:
-        """The delay of the filter, and the time to be certain."""
+        """The filter delay plus the time to decide an event."""
         return float(2 * self._pole + self.settings.decision)
 
     def _restart(self) -> None:
@@ -118,21 +118,21 @@ class GyroscopeDetector(Detector):
 
     def troubles(self, now: float | None = None) -> tuple[str, ...]:
         """Add what the calibration found."""
-        told = super().troubles(now)
+        lines = super().troubles(now)
         where = f"{self.side.name.lower()} {self.name}"
         axis, found = self._axis, self._mountings
         if axis is None:
-            return (*told, f"{where}: the axis is not known yet: walk straight on")
+            return (*lines, f"{where}: the axis is not known yet: walk straight ahead")
         if not found:
-            return told
+            return lines
         if self.foot and axis[1] > 0.9 and all(m.toes_out(self.side) < -_TOES_IN for m in found):
-            told = (*told, f"{where}: if x points forward, the toes turn in: on the right feet?")
+            lines = (*lines, f"{where}: if x points forward, the toes turn in: sensors swapped?")
         agreement = max(sum(a * b for a, b in zip(m.axis, axis, strict=True)) for m in found)
         if agreement < -0.5:
-            return (*told, f"{where}: put on the other way round: set {found[-1].text}")
+            return (*lines, f"{where}: mounted the other way round: set {found[-1].text}")
         if agreement < 0.7:
-            return (*told, f"{where}: turns about another axis: set {found[-1].text}")
-        return told
+            return (*lines, f"{where}: turns about another axis: set {found[-1].text}")
+        return lines
 
     def _take(self, time: float, values: Sequence[float]) -> list[Detection]:
         self._calibrate(time, values)
@@ -140,7 +140,7 @@ class GyroscopeDetector(Detector):
         if axis is None:
             return []
         rate = axis[0] * values[0] + axis[1] * values[1] + axis[2] * values[2]
-        if rate == 0.0 and not any(values) and abs(self._value) > self.moving:  # one was lost
+        if rate == 0.0 and not any(values) and abs(self._value) > self.moving:  # a lost sample
             self.counts.lost += 1
             rate, self._value = self._value, 0.0
         else:
@@ -161,14 +161,14 @@ class GyroscopeDetector(Detector):
         return self._stance(time, before, filtered)
 
     def _calibrate(self, time: float, values: Sequence[float]) -> None:
-        """Record some steps, find the axis in the first, and hold it against those that follow."""
+        """Record some steps, find the axis in the first, and check it against later ones."""
         recorded, longest = self._recorded, self.settings.calibration
         if recorded and time <= recorded[-1][0]:  # the clock has jumped
             recorded.clear()
         if not recorded:
-            self._asked = time
+            self._searched = time
         recorded.append((time, tuple(values)))
-        if time - self._asked < longest:
+        if time - self._searched < longest:
             return
         latest = [sample for sample in recorded if time - sample[0] <= longest]
         found = find_mounting(latest, foot=self.foot)
@@ -178,20 +178,20 @@ class GyroscopeDetector(Detector):
         if found:
             self._mountings.append(found)
         self._recorded = [sample for sample in recorded if time - sample[0] <= 2 * longest]
-        # Before it is known it is asked for again soon.
-        self._asked = time - (0.8 * longest if self._axis is None else 0.0)
+        # Until the axis is known, search again soon.
+        self._searched = time - (0.8 * longest if self._axis is None else 0.0)
 
     def _crossing(self, before: float, rate: float, level: float) -> float:
-        """Return when the rate crossed a level between two samples, the delay taken off."""
+        """Return when the rate crossed a level between two samples, minus the filter delay."""
         return self._passed(level, before, rate) - self._delay
 
     def _enter(self, *, swinging: bool, time: float) -> None:
-        """Begin a stance or a swing."""
+        """Start a stance or a swing."""
         self._swinging, self._changed = swinging, time
         self._peak = 0.0  # of push-off; of a swing, its magnitude [rad/s]
 
     def _land(self, strike: float, time: float) -> list[Detection]:
-        """End a swing; return the strike if it was that of a step."""
+        """End a swing; return the strike if it was a step's."""
         peak = self._peak
         self._enter(swinging=False, time=time)
         if self._swings.is_step(peak):
@@ -201,8 +201,8 @@ class GyroscopeDetector(Detector):
 
     @abstractmethod
     def _stance(self, time: float, before: float, rate: float) -> list[Detection]:
-        """Take the rate while the leg stands; toe-off ends that."""
+        """Process the rate in stance, which toe-off ends."""
 
     @abstractmethod
     def _swing(self, time: float, before: float, rate: float) -> list[Detection]:
-        """Take the rate while the leg swings; heel strike ends that."""
+        """Process the rate in swing, which heel strike ends."""

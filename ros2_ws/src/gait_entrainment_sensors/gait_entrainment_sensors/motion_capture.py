@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Recordings of a motion laboratory: C3D files with force plates and markers."""
+"""Motion capture recordings: C3D files with force plates and markers."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -19,8 +19,8 @@ from gait_entrainment_sensors.recording import RecordingError
 
 Floats = NDArray[np.float64]
 
-# Names of markers in the usual sets, in capitals and without the signs between, by what they are
-# here; where there are several, it is their mean.
+# Names of markers in the usual sets, in capitals and without separators, by their name here; if
+# there are several, their mean is used.
 _HEEL = ("HEE", "HEEL", "CAL", "CALC", "FCC")
 _TOE = ("TOE", "MT1", "MT2", "MT5", "MTH2", "FM1", "FM2", "FM5")
 _PELVIS = ("SACR", "SACRUM", "VSAC", "LPSI", "RPSI", "LPSIS", "RPSIS", "LIPS", "RIPS")
@@ -31,11 +31,11 @@ MARKERS: dict[str, tuple[str, ...]] = {
 } | {"pelvis": _PELVIS}
 # A foot whose middle is further from the centre of pressure does not press there [m].
 _REACH = 0.25
-# A foot that swings is faster, also in slow walking [m/s].
+# A swinging foot is faster than this, even in slow walking [m/s].
 _STANDING = 0.3
 # Standard deviation of events from markers: 94 % were within 16.7 ms (Zeni 2008) [s].
 _MARKER_UNCERTAINTY = 0.009
-# What a foot travels at least, relative to the pelvis, in a step [m]; and for how long [s].
+# Least travel of a foot relative to the pelvis in a step [m], and least stride period [s].
 _LEAST_TRAVEL, _LEAST_STRIDE = 0.1, 0.4
 
 
@@ -52,7 +52,7 @@ class Plate:
 
 @dataclass(frozen=True)
 class MotionCapture:
-    """What a C3D file holds that tells gait events."""
+    """The contents of a C3D file from which gait events follow."""
 
     path: Path
     plates: tuple[Plate, ...]
@@ -65,20 +65,20 @@ def read_c3d(
     path: Path, names: Mapping[str, str] | None = None, *, plates: bool = True
 ) -> MotionCapture:
     """
-    Read a C3D file; its times count from the first frame that it holds.
+    Read a C3D file; times count from the first frame in it.
 
-    ``names`` says which of its markers is left_heel, right_toe, ..., pelvis; ``plates`` whether
-    its force plates are wanted. Raises RecordingError if it is none, holds nothing, or lacks a
-    marker that is named.
+    ``names`` maps left_heel, right_toe, ..., pelvis to markers of the file; ``plates`` is whether
+    to read its force plates. Raises RecordingError if it is not a C3D file, is empty, or lacks a
+    marker in ``names``.
     """
-    import ezc3d  # for this alone: it takes a quarter of a second to load
+    import ezc3d  # not at the top: it takes a quarter of a second to load
 
     try:
         file = ezc3d.c3d(str(path), extract_forceplat_data=plates)
     except (OSError, RuntimeError, ValueError, IndexError) as error:
         reason = str(error).partition("\n")[0].partition(", please")[0]  # please tell ezc3d
         raise RecordingError(f"{path}: cannot be read as C3D: {reason}") from None
-    # Some systems put the subject's name and a colon before each.
+    # Some systems prefix each with the subject's name and a colon.
     labels = [label.rpartition(":")[2] for label in file["parameters"]["POINT"]["LABELS"]["value"]]
     plain = [re.sub(r"[\W_]|(?<=^L)EFT|(?<=^R)IGHT", "", label.upper()) for label in labels]
     unit = _unit(path, file["parameters"]["POINT"].get("UNITS", {"value": ["mm"]})["value"])
@@ -87,7 +87,7 @@ def read_c3d(
     seen = np.any(np.isfinite(points).all(axis=-1), axis=-1).tolist()
     rate = float(file["header"]["points"]["frame_rate"])
     if not rate:
-        raise RecordingError(f"{path}: holds no frame")
+        raise RecordingError(f"{path}: has no frames")
     markers = {}
     for what, usual in MARKERS.items():
         wanted, known = usual, plain
@@ -98,10 +98,10 @@ def read_c3d(
             markers[what] = np.mean(points[found], axis=0)
         elif names and what in names:
             raise RecordingError(
-                f"{path}: has no marker {names[what]}, which is to be {what}; it has: "
+                f"{path}: has no marker {names[what]} to use as {what}; it has: "
                 f"{', '.join(labels) or 'none'}"
             )
-    # There may be plates without a sample, as in a file of a standing trial.
+    # Plates may be without samples, as in a file of a standing trial.
     platforms = [p for p in file["data"].get("platform", []) if np.size(p["force"])]
     up = _vertical(platforms)
     analog = float(file["header"]["analogs"]["frame_rate"])
@@ -121,7 +121,7 @@ def _unit(path: Path, units: Sequence[str]) -> float:
 
 
 def _vertical(platforms: Sequence[Mapping[str, Any]]) -> int:
-    """Return the axis that plates lie across; z without plates."""
+    """Return the axis normal to the plates; z without plates."""
     for platform in platforms:
         sides = np.diff(platform["corners"], axis=1)
         normal = np.cross(sides[:, 0], sides[:, 1])
@@ -144,20 +144,20 @@ def events_on_plates(
     capture: MotionCapture, chosen: ChosenDetector, sides: Sequence[Side] | None = None
 ) -> tuple[list[Detection], tuple[str, ...]]:
     """
-    Return the events on the plates, and what was wrong.
+    Return the events on the plates, and any troubles.
 
-    A contact is the foot's whose middle, between heel and toe, is next to the centre of pressure;
-    none's, and told, if both feet are on the plate or neither is near. ``sides`` says instead
-    whose each plate is, as of a treadmill with two belts.
-    Raises RecordingError if nothing tells whose the contacts are.
+    A contact belongs to the foot whose middle, between heel and toe, is next to the centre of
+    pressure. If both feet are on the plate or neither is near, it belongs to no foot and is
+    reported. ``sides`` instead gives the foot of each plate, as for a treadmill with two belts.
+    Raises RecordingError if the feet cannot be determined.
     """
-    told: list[str] = []
+    troubles: list[str] = []
     found: list[Detection] = []
     feet = [_markers_of(capture, side) for side in Side]
     if sides is None and not all(feet):
         missing = [name for name in MARKERS if name not in capture.markers and name != "pelvis"]
         raise RecordingError(
-            f"{capture.path}: nothing tells whose foot is on which plate: it lacks markers "
+            f"{capture.path}: which foot is on which plate is unknown: it lacks markers "
             f"{', '.join(missing)}; name them with --marker, or the feet with --plates"
         )
     if sides is not None and len(sides) != len(capture.plates):
@@ -169,7 +169,7 @@ def events_on_plates(
         if not np.any(plate.high - plate.low):
             raise RecordingError(
                 f"{capture.path}: FORCE_PLATFORM:CORNERS of plate {index + 1} are one point: its "
-                "axes, and so its vertical force, are not known; enter its corners"
+                "axes, and so its vertical force, are unknown; enter its corners"
             )
         samples = [*zip(plate.times.tolist(), plate.force[:, np.newaxis].tolist(), strict=True)]
         settings = chosen.detector.calibrated(chosen.settings, samples)
@@ -177,22 +177,22 @@ def events_on_plates(
         events = [event for t, v in samples for event in detector.add(t, v)]
         if sides is not None:
             found += events
-            told += detector.troubles()
+            troubles += detector.troubles()
             continue
         ours, doubtful = _of_their_feet(capture, plate, events)
         contacts += ours
         if doubtful:
-            told.append(f"plate {index + 1}: {doubtful} contacts of both feet or of neither")
+            troubles.append(f"plate {index + 1}: {doubtful} contacts of both feet or of neither")
         if not events:
-            least, most = float(np.min(plate.force)), float(np.max(plate.force))
-            told.append(f"plate {index + 1}: no contact, by forces of {least:.0f} to {most:.0f} N")
-    return found + _merged(contacts), tuple(told)
+            low, high = float(np.min(plate.force)), float(np.max(plate.force))
+            troubles.append(f"plate {index + 1}: no contact: forces of {low:.0f} to {high:.0f} N")
+    return found + _merged(contacts), tuple(troubles)
 
 
 def _of_their_feet(
     capture: MotionCapture, plate: Plate, events: Sequence[Detection]
 ) -> tuple[list[list[Detection]], int]:
-    """Return a plate's contacts with the side of the foot, and how many were nobody's."""
+    """Return a plate's contacts with their sides, and how many belong to no foot."""
     contacts: list[list[Detection]] = []
     for event in events:
         if event.kind is EventKind.HEEL_STRIKE or not contacts:
@@ -213,12 +213,12 @@ def _of_their_feet(
 
 
 def _merged(contacts: Sequence[Sequence[Detection]]) -> list[Detection]:
-    """Return the events of contacts; of a foot on two plates at once the first and the last."""
+    """Return the events of contacts; for a foot on two plates at once, the first and last."""
     found: list[Detection] = []
     for side in Side:
         own = sorted((list(c) for c in contacts if c[0].side is side), key=lambda c: c[0].time)
         for before, after in pairwise(own):
-            if after[0].time < before[-1].time:  # a strike is not the foot's first, nor a toe-off
+            if after[0].time < before[-1].time:  # on both plates at once
                 after[:] = [before[0], max(before[-1], after[-1], key=lambda e: e.time)]
                 before.clear()
         found += [event for contact in own for event in contact]
@@ -226,13 +226,13 @@ def _merged(contacts: Sequence[Sequence[Detection]]) -> list[Detection]:
 
 
 def _markers_of(capture: MotionCapture, side: Side) -> list[Floats]:
-    """Return the markers of a foot that are there, (m, 3) [m] each."""
+    """Return the available markers of a foot, (m, 3) [m] each."""
     names = (f"{side.name.lower()}_{what}" for what in ("heel", "toe"))
     return [capture.markers[name] for name in names if name in capture.markers]
 
 
 def _whose(capture: MotionCapture, plate: Plate, start: float, end: float) -> Side | None:
-    """Return the foot that presses on a plate between two instants [s]; None if doubtful."""
+    """Return the foot that presses on a plate between two times [s]; None if doubtful."""
     across = [axis for axis in range(3) if axis != capture.up]
     during = (capture.times >= start) & (capture.times <= end)
     if not during.any():
@@ -257,9 +257,9 @@ def _whose(capture: MotionCapture, plate: Plate, start: float, end: float) -> Si
 
 def events_of_markers(capture: MotionCapture) -> list[Detection]:
     """
-    Return events by the position of heel and toe relative to the pelvis, for the whole recording.
+    Return events from the positions of heel and toe relative to the pelvis, for a whole recording.
 
-    Heel strike is where the heel is furthest ahead, toe-off where the toe is furthest behind
+    Heel strike is when the heel is furthest ahead, toe-off when the toe is furthest behind
     (Zeni, Richards and Higginson, Gait Posture 27, 710, 2008): within 16.7 ms in 94 % of
     strides. Not causal. Hidden markers are interpolated.
     Raises RecordingError if a marker is missing.
@@ -271,7 +271,7 @@ def events_of_markers(capture: MotionCapture) -> list[Detection]:
             f"{capture.path}: lacks markers {', '.join(missing)}; name them with --marker"
         )
     seen = {name: _without_gaps(points) for name, points in capture.markers.items()}
-    # Where the feet point, at each instant: people turn round.
+    # The direction of the feet at each time: people turn round.
     feet = np.mean([seen[f"{s}_toe"] - seen[f"{s}_heel"] for s in ("left", "right")], axis=0)
     feet[:, capture.up] = 0.0
     forward = feet / np.maximum(np.linalg.norm(feet, axis=1, keepdims=True), 1e-9)

@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Step numbers for what was detected, by a model of the period.
+Step numbers for detected events, from a model of the stride period.
 
-A sensor does not know which step it sees, and one that counts loses count at the first event that
-it misses. Here a place in the gait follows from the time since the latest event, in strides of the
-person's own median: a missed event leaves a gap in the numbers, a
-doubled one finds its place taken, and neither moves the number of any other event.
+A sensor does not know which step it sees, and a sensor that counts is wrong from the first event
+that it misses. Here the place in the gait follows from the time since the latest event, in the
+person's own median strides. A missed event leaves a gap in the numbers, a doubled one finds its
+place taken, and neither changes the number of any other event.
 """
 
 import math
@@ -17,32 +17,32 @@ from gait_entrainment.conventions import EventKind, Side, nanoseconds
 from gait_entrainment.gait import GaitEvent, GaitLimits
 from gait_entrainment_sensors.detection import Detection, OwnMedian
 
-# Heel strike and toe-off of each leg; a kind and side comes back after so many places.
+# Heel strike and toe-off of each leg: a kind and side recurs after this many places.
 _PLACES = 4
-# Strides of either kind and side whose median is the period: two wrong ones do not move it.
+# Strides of any kind and side whose median is the period: two wrong ones do not move it.
 _OWN_STRIDES = 9
-# From so many on the median is known: one missed event can spoil one of them.
+# The median is known after this many: one missed event can spoil one of them.
 _KNOWN_STRIDES = 3
-# Detections of a kind and side refused in a row after which it is the model that is wrong.
+# After this many detections of a kind and side refused in a row the model is wrong.
 _CONVINCING = 3
-# Strides for which places are remembered, to see which are taken.
+# Places that are remembered, to see which are taken: four strides.
 _REMEMBERED = 4 * _PLACES
 
 
 @dataclass(slots=True)
 class NumberingCounts:
-    """What became of the detections."""
+    """The outcome of the detections."""
 
     numbered: int = 0
     repeated: int = 0  # dropped: its place was taken
     implausible: int = 0  # dropped: too early or too late for any place
     airborne: int = 0  # dropped: toe-offs before the other foot's strike, as in running
-    missed: int = 0  # places that were passed by without a detection
-    restarts: int = 0  # times that the detections fitted together, but not what was known
+    missed: int = 0  # places that were passed without a detection
+    restarts: int = 0  # times that detections agreed with each other, but not with the model
 
 
 def numbered(found: Detection, step: int) -> GaitEvent:
-    """Return a detection as the event of a step."""
+    """Return the event of a detection, with its step number."""
     return GaitEvent(nanoseconds(found.time), found.kind, found.side, step, found.uncertainty)
 
 
@@ -50,12 +50,12 @@ class Numbering:
     """
     Numbers the detections of both feet, given in the order in which they were detected.
 
-    The first heel strike is step 0; with ``first_side`` it is step 0 or 1, such that strikes of
-    that side have even numbers. Strikes and toe-offs of a side return once a stride, so each
-    belongs to the place of its kind and side that is nearest to where the period predicts it from
-    the latest strike: half a stride either way. While the period is not known, to the next such
-    place after the latest event. A runner's feet leave the ground before the other one strikes:
-    such toe-offs have no place. ``limits`` say which strides can be
+    The first heel strike is step 0; with ``first_side`` it is step 0 or 1, so that strikes of that
+    side have even numbers. Strikes and toe-offs of a side recur once a stride, so each belongs to
+    the place of its kind and side that is nearest to where the period predicts it from the latest
+    strike: half a stride either way. Until the period is known, it belongs to the next such place
+    after the latest event. In running a foot leaves the ground before the other one strikes; such
+    toe-offs have no place. ``limits`` define which strides are plausible
     (`gait_entrainment.gait.GaitLimits`).
     """
 
@@ -76,7 +76,7 @@ class Numbering:
         return self._strides.value
 
     def add(self, detection: Detection) -> GaitEvent | None:
-        """Return the event, numbered, or None if it can have no place in the gait."""
+        """Return the numbered event, or None if it has no place in the gait."""
         if not self._known:
             if detection.kind is not EventKind.HEEL_STRIKE:  # with which a run begins
                 return None
@@ -97,21 +97,21 @@ class Numbering:
         return numbered(detection, (place + 1) // 2)
 
     def troubles(self) -> tuple[str, ...]:
-        """Return what a person should know, each in one line; empty if all is well."""
+        """Return what a person should know, one line each; empty if all is well."""
         counts = self.counts
-        told = []
+        lines = []
         if counts.repeated or counts.implausible:
-            told.append(
+            lines.append(
                 f"{counts.repeated} detections repeated an event, {counts.implausible} fitted no "
                 "place in the gait"
             )
         if counts.airborne:
-            told.append(f"{counts.airborne} toe-offs precede the other's strike: running? clocks?")
+            lines.append(f"{counts.airborne} toe-offs before the other's strike: running? clocks?")
         if counts.missed:
-            told.append(f"{counts.missed} events were missed")
+            lines.append(f"{counts.missed} events were missed")
         if counts.restarts:
-            told.append(f"the count was begun anew {counts.restarts} times")
-        return tuple(told)
+            lines.append(f"the count was restarted {counts.restarts} times")
+        return tuple(lines)
 
     def _begin(self, detection: Detection) -> int:
         """Return the place of the first heel strike."""
@@ -126,7 +126,7 @@ class Numbering:
         return 3 if even else 1
 
     def _place(self, detection: Detection) -> tuple[str, int]:
-        """Return as what a detection must be dropped, or an empty text, and its place."""
+        """Return the count under which to drop a detection, empty to keep it, and its place."""
         time, first, least = detection.time, self._first_place(detection), self.limits.stride_least
         earlier = [p for p, known in self._known.items() if known < time]
         before = max(earlier, default=-1)
@@ -134,17 +134,17 @@ class Numbering:
         same = max((p for p in self._known if (p - first) % _PLACES == 0), default=None)
         if same is not None and abs(time - self._known[same]) < least:
             return "repeated", same
-        if before < 0:  # earlier than all that is remembered
+        if before < 0:  # earlier than all remembered events
             return "implausible", first
         strike = max((p for p in earlier if p % 2 == 0), default=-_PLACES)
-        # Who runs strikes after the other foot's toe-off, and soon.
+        # In running a strike soon follows the other foot's toe-off.
         runs = self.period or time - self._known[before] < least
         since = strike if runs and before - strike < _PLACES else before
         place = since + 1 + (first - since - 1) % _PLACES  # the next of the kind and side
         if place == strike + 3 and self._comes_before(strike + 2, time):
             return "airborne", place
         if self.period:
-            # From that strike, a quarter of a stride a place: the error is one place at most.
+            # From that strike, at a quarter of a stride per place: off by at most one place.
             strides = (time - self._known[since]) / self.period
             place = first + _PLACES * round((since - first) / _PLACES + strides)
             if place in self._known:
@@ -157,18 +157,18 @@ class Numbering:
         return ("" if before < place < after else "implausible"), place
 
     def _comes_before(self, strike: int, time: float) -> bool:
-        """Whether a time is before that of the other foot's strike, as far as one can know."""
+        """Whether a time is before the other foot's strike, as far as is known."""
         if (latest := self._known.get(strike - _PLACES)) is None:
             return False
-        # Of a stride that is not known yet one step is, and the other may be shorter by a quarter.
+        # While the stride is unknown, one step is known; the other may be shorter by a quarter.
         stride = self.period or 1.75 * (self._known[strike - 2] - latest)
         return time < latest + stride
 
     def _measure(self, first: int, time: float, place: int | None) -> None:
         """
-        Take the stride since the latest detection of a kind and side, whether taken or refused.
+        Add the stride since the latest detection of a kind and side, whether kept or refused.
 
-        Were those refused left out, a period of two strides would confirm itself.
+        Without the refused ones, a period of two strides would confirm itself.
         """
         (before, known), self._previous[first] = self._previous[first], (time, place)
         strides = 1 if place is None or known is None else max((place - known) // _PLACES, 1)
@@ -188,7 +188,7 @@ class Numbering:
         self._known = {p: t for p, t in self._known.items() if p > self._latest - _REMEMBERED}
 
     def _restart(self, detection: Detection) -> int:
-        """Believe the detections rather than the model; return the place to go on from."""
+        """Trust the detections rather than the model; return the place to continue from."""
         elapsed = detection.time - self._known[self._latest]
         passed = max(round(_PLACES * elapsed / self.period), 0) if self.period else 0
         place = self._latest + passed + 1

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Gait events of a recording, and the table that keeps them.
+Gait events of a recording, and the table that stores them.
 
 The table is an ``events.tsv`` of BIDS (1.10, "Task events"): ``onset`` and ``duration`` in
-seconds, ``trial_type``, and columns of our own, which the JSON file beside it describes.
+seconds, ``trial_type``, and columns of our own, described in the JSON file next to it.
 """
 
 import csv
@@ -46,7 +46,7 @@ KINDS = {kind.name.lower(): kind for kind in EventKind}
 
 @dataclass(frozen=True)
 class DetectedEvent:
-    """An event as it was detected, and its number."""
+    """A detected event and its number."""
 
     detection: Detection
     event: GaitEvent
@@ -56,7 +56,7 @@ class DetectedEvent:
 def detect(
     chosen: ChosenDetector, streams: Sequence[Stream]
 ) -> tuple[list[DetectedEvent], tuple[str, ...]]:
-    """Return the events in recorded signals, in the order of detection; and what was wrong."""
+    """Return the events in recorded signals, in the order of detection, and any troubles."""
     found: list[Detection] = []
     troubles: list[str] = []
     times = [t for s in streams for t in s.times if math.isfinite(t)] or [0.0]
@@ -69,33 +69,33 @@ def detect(
         troubles += detector.troubles(max(times))
     if not (found or troubles):
         troubles.append(f"it lasts {max(times) - min(times):.3g} s")
-    events, told = number(found, chosen.name)
-    return events, (*troubles, *told)
+    events, of_numbering = number(found, chosen.name)
+    return events, (*troubles, *of_numbering)
 
 
 def number(
     found: Iterable[Detection], detector: str, limits: GaitLimits | None = None
 ) -> tuple[list[DetectedEvent], tuple[str, ...]]:
-    """Return detections numbered, in the order of detection; and what was wrong."""
+    """Return numbered detections, in the order of detection, and any troubles."""
     numbering, before, events = Numbering(limits=limits), dict[Side, Detection](), []
     for detection in sorted(found, key=lambda d: (d.detected_at, d.time)):
         if (event := numbering.add(detection)) is not None:
             events.append(DetectedEvent(detection, event, detector))
         elif not events:
             before[detection.side] = detection  # the latest toe-off of a foot before strike 0
-    begun = [
+    earlier = [
         DetectedEvent(d, numbered(d, 0 if side is events[0].event.side else -1), detector)
         for side, d in before.items()
         if events
     ]
-    return begun + events, numbering.troubles()
+    return earlier + events, numbering.troubles()
 
 
 def write_events(path: Path, events: Iterable[DetectedEvent]) -> None:
     """
     Write a table of events and the JSON file that describes it.
 
-    Raises RecordingError if either is there: nothing is overwritten.
+    Raises RecordingError if either exists: nothing is overwritten.
     """
     sidecar = path.with_suffix(".json")
     for file in (path, sidecar):
@@ -126,29 +126,29 @@ def read_events(path: Path) -> list[GaitEvent]:
     Return the events of a table: columns onset [s], trial_type, side, and step if it has steps.
 
     Without steps the events are numbered here, by the period. ``uncertainty`` is read if it is
-    there. Raises RecordingError if a column is missing or a field is none of what is allowed.
+    there. Raises RecordingError if a column is missing or a field is not allowed.
     """
     table = read_table(path)
     table.require("onset", "trial_type", "side")
     times = _finite(table, "onset")
     sides = {side.name.lower(): side for side in Side}
     kinds, feet = _words(table, "trial_type", KINDS), _words(table, "side", sides)
-    sure = [0.0] * len(times)
+    uncertainties = [0.0] * len(times)
     if "uncertainty" in table.columns:
-        sure = _finite(table, "uncertainty", "0 to 1 s", lambda value: 0.0 <= value <= 1.0)
-    detections = map(Detection, kinds, feet, times, times, sure)
+        uncertainties = _finite(table, "uncertainty", "0 to 1 s", lambda sd: 0.0 <= sd <= 1.0)
+    detections = map(Detection, kinds, feet, times, times, uncertainties)
     if "step" in table.columns:
         steps = _finite(table, "step", "a whole number", float.is_integer)
         events = [numbered(d, int(step)) for d, step in zip(detections, steps, strict=True)]
     else:
         events = [e.event for e in number(detections, "")[0]]
-    # A toe-off before strike 0 is in no stride.
+    # A toe-off before strike 0 belongs to no stride.
     known = (e for e in events if e.step > 0 or e.kind is EventKind.HEEL_STRIKE)
     return sorted(known, key=lambda event: event.stamp)
 
 
 def read_onsets(path: Path) -> list[int]:
-    """Return the instants at which pulses began [ns]: the column onset [s] of a table."""
+    """Return the onsets of pulses [ns]: the column onset [s] of a table."""
     onsets = _finite(read_table(path), "onset")
     return sorted(round(onset * NANOSECONDS_PER_SECOND) for onset in onsets)
 
@@ -167,7 +167,7 @@ def _finite(
     allowed: str = "a finite number",
     fits: Callable[[float], bool] = math.isfinite,
 ) -> list[float]:
-    """Return the numbers of a column, each of which has to fit."""
+    """Return the numbers of a column, each of which must pass ``fits``."""
     numbers = table.numbers(name)
     for row, value in enumerate(numbers):
         if not (abs(value) < 1e10 and fits(value)):  # it may count from 1970

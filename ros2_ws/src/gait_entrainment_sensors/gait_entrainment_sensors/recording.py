@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Signals that were recorded elsewhere: a table with named columns.
+Signals recorded elsewhere: a table with named columns.
 
-A column is named by side and signal, in SI units: ``left_force_z``, ``right_foot_gyro_y``. One in
-another unit says so: ``right_foot_gyro_y_deg``, ``time [ms]``, ``Left_Force_Z (kN)``.
+A column is named by side and signal, in SI units: ``left_force_z``, ``right_foot_gyro_y``. Another
+unit is part of the name: ``right_foot_gyro_y_deg``, ``time [ms]``, ``Left_Force_Z (kN)``.
 """
 
 import csv
@@ -22,8 +22,8 @@ from gait_entrainment.errors import UsageError
 from gait_entrainment_sensors.detection import ChosenDetector
 from gait_entrainment_sensors.sources import source_of
 
-# What the numbers of a column are multiplied by, by the unit that its name says: in brackets, at
-# its end, or in a row of their own.
+# Factors to SI units, by the unit of a column: in brackets or at the end of its name, or in a row
+# of units.
 _UNITS = dict.fromkeys(("", "1", "s", "n", "n m", "nm", "rad", "rad/s"), 1.0)
 _UNITS |= {"ms": 1e-3, "us": 1e-6, "\u03bcs": 1e-6, "ns": 1e-9, "kn": 1e3}
 _UNITS |= dict.fromkeys(("deg", "deg/s", "\u00b0", "\u00b0/s", "dps"), math.pi / 180)
@@ -31,7 +31,7 @@ _MISSING = ("", "n/a", "na", "nan", "null", "none")
 
 
 class RecordingError(UsageError):
-    """What of a recording cannot be read: one line that names file and column or field."""
+    """A recording cannot be read: one line that names the file and the column or field."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Table:
     """The columns of a file."""
 
     path: Path
-    # By name, in small letters and without the unit: what makes it SI, and the texts.
+    # By name, in lower case and without the unit: the factor to SI units, and the texts.
     columns: dict[str, tuple[float, list[str]]]
     first: int  # row of the file that holds the first texts
 
@@ -61,26 +61,26 @@ class Table:
             )
 
     def refused(self, row: int, name: str, allowed: str) -> RecordingError:
-        """Return what to raise because of a text, counted from the first one."""
+        """Return the error for a text in a column, counted from the first one."""
         text = self.columns[name][1][row]
         return RecordingError(
             f"{self.path}: row {self.first + row}, column {name}: {text!r}; allowed: {allowed}"
         )
 
     def numbers(self, name: str) -> list[float]:
-        """Return a column in SI units; NaN where a field is empty, ``n/a`` or says so."""
+        """Return a column in SI units; NaN if a field is empty, ``n/a`` or the like."""
         self.require(name)
         factor, texts = self.columns[name]
         numbers = []
         for row, text in enumerate(texts):
             if (number := _number(text)) is None:
-                raise self.refused(row, name, "a number, or nothing where a sample is missing")
+                raise self.refused(row, name, "a number, or nothing if a sample is missing")
             numbers.append(factor * number)
         return numbers
 
 
 def _number(text: str) -> float | None:
-    """Return the number in a field, with a point or a comma; NaN if missing, None if no number."""
+    """Return the number in a field, with a point or a comma; NaN if missing, None if invalid."""
     if text.strip().lower() in _MISSING:
         return math.nan
     try:
@@ -100,23 +100,23 @@ def _plain(name: str, unit: str = "") -> tuple[str, float]:
 
 
 def _names(head: list[list[str]]) -> list[tuple[str, float]]:
-    """Return names and factors from the rows above the numbers: names, perhaps units below."""
+    """Return names and factors from the header rows: names, perhaps with units below."""
     *above, names = head
     units = [field.strip("[() ]").casefold() for field in names]
     if above and _UNITS.keys() >= {*units}:
         *above, names = above
     else:
         units = [""] * len(names)
-    while above and len({*names}) < len(names):  # as of axes, below the names of sensors
+    while above and len({*names}) < len(names):  # such as axes below the names of sensors
         names = [f"{a} {b}".strip() for a, b in zip(above.pop(), names, strict=True)]
     return [*map(_plain, names, units)]
 
 
 def read_table(path: Path, separators: str = "\t;,") -> Table:
     """
-    Return the columns of a table; tab, semicolon or comma separates.
+    Return the columns of a table that is separated by tabs, semicolons or commas.
 
-    The names may have several rows, the units one below; what comes before is passed over.
+    The names may take several rows, and the units one row below; anything before is skipped.
     Raises RecordingError if it cannot be read, is empty, or a row has too many or too few fields.
     """
     try:
@@ -124,24 +124,24 @@ def read_table(path: Path, separators: str = "\t;,") -> Table:
         wide = data[:2] in (b"\xff\xfe", b"\xfe\xff")
         text = data.decode("utf-16" if wide else "utf-8-sig")
         lines = text.rstrip("\r\n ").splitlines()
-        # The comma comes last: it may be that of the numbers.
+        # The comma comes last: it may be a decimal comma.
         separator = max(separators, key=lambda sign: sum(sign in line for line in lines))
         rows = [*enumerate(csv.reader(lines, delimiter=separator), 1)]
-    except csv.Error as error:  # such as a cell of many pages
+    except csv.Error as error:  # such as an enormous cell
         raise RecordingError(f"{path}: cannot be read: {error}") from None
     except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "is no text in UTF-8"
+        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
         raise RecordingError(f"{path}: cannot be read: {reason}") from None
     width = Counter(len(row) or 1 for _, row in rows).most_common(1)[0][0] if rows else 0
-    # In a single column nothing at all is a field that is empty.
+    # In a table of one column an empty line is an empty field.
     rows = [(number, row or [""]) for number, row in rows if row or width == 1]
     if len(rows) < 2:
-        raise RecordingError(f"{path}: holds no row; expected: names of columns, then rows")
+        raise RecordingError(f"{path}: has no rows; expected: names of columns, then rows")
     begin = next((i for i, (_, row) in enumerate(rows) if _is_data(row, width)), 1)
     head = begin
     while head > 0 and len(rows[head - 1][1]) == width:
         head -= 1
-    if head == begin and separator == ",":  # it is that of the numbers
+    if head == begin and separator == ",":  # it is a decimal comma
         return read_table(path, "\t;")
     if head == begin:
         raise RecordingError(f"{path}: row {rows[begin][0]} has no names above it")
@@ -171,10 +171,9 @@ def read_streams(
     rate: float | None = None,
 ) -> tuple[ChosenDetector, list[Stream]]:
     """
-    Return the first of some detectors that fits a table, and what it reads of each foot.
+    Return the first detector that fits a table, and the stream of each foot.
 
-    ``columns`` says which column of the file is meant by a name; ``rate`` [Hz] stands for a
-    column ``time`` [s].
+    ``columns`` maps names to columns of the file; ``rate`` [Hz] replaces a column ``time`` [s].
     Raises RecordingError if the file cannot be read or columns are missing.
     """
     table = read_table(path)
@@ -182,7 +181,7 @@ def read_streams(
     for name, column in (columns or {}).items():
         if (found := table.columns.get(_plain(column)[0])) is None:
             raise RecordingError(
-                f"{path}: has no column {column}, which is to be {name}; it has: {there}"
+                f"{path}: has no column {column} to use as {name}; it has: {there}"
             )
         meant, factor = _plain(name)
         table.columns[meant] = (factor * found[0], found[1])
@@ -201,7 +200,7 @@ def read_streams(
             return chosen, streams
         needed.append(" and ".join(f"SIDE_{name}" for name in names))
     raise RecordingError(
-        f"{path}: lacks columns {' or '.join(needed)}, or --column; it has: {there}"
+        f"{path}: lacks columns {' or '.join(needed)} (see --column); it has: {there}"
     )
 
 
@@ -211,24 +210,24 @@ def _times(table: Table, rate: float | None) -> list[float]:
         return [number / rate for number in range(count)]
     if "time" not in table.columns:
         raise RecordingError(
-            f"{table.path}: lacks the column time [s]: name it with --column time=NAME, or say "
+            f"{table.path}: lacks the column time [s]: name it with --column time=NAME, or give "
             f"--rate; it has: {', '.join(table.columns)}"
         )
     return table.numbers("time")
 
 
 def _check_steps(path: Path, times: Sequence[float], longest: float) -> None:
-    """Raise RecordingError if times are further apart [s] than the samples of a walk can be."""
+    """Raise RecordingError if times are further apart [s] than samples of a walk may be."""
     steps = sorted(b - a for a, b in pairwise(times) if b > a)
     if steps and (usual := steps[len(steps) // 2]) > 0.99 * longest:
         raise RecordingError(
             f"{path}: column time, or --rate: samples are {usual:g} s apart; allowed: less than "
-            f"longest_gap, {longest:g} s; a time in another unit says so: time_ms"
+            f"longest_gap, {longest:g} s; name a column in another unit, as in time_ms"
         )
 
 
 def _values(table: Table, side: Side, signals: Sequence[str]) -> list[tuple[float, ...]] | None:
-    """Return the samples of one foot; None if nothing of it is there."""
+    """Return the samples of one foot; None if it has no columns."""
     names = [f"{side.name.lower()}_{signal}" for signal in signals]
     found = [name for name in names if name in table.columns]
     if not found:

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-A simulated experiment, conducted by what detectors find in emulated sensors: one process, no ROS.
+A simulated experiment that relies on events detected in emulated sensors: one process, no ROS.
 
-The chain is that of an experiment with a person. The conductor is told the detected events, and
-that they are complete up to the time reached less the detector's latency; the walker follows the
-torque that comes of it. The exact events stay beside, as the truth.
+The chain is that of an experiment with a person. The conductor receives the detected events, which
+are complete up to the time reached minus the detector's latency; the walker responds to the
+resulting torque. The exact events are kept as the truth.
 """
 
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ from gait_entrainment_sensors.numbering import Numbering
 
 @dataclass(frozen=True)
 class Rehearsal:
-    """What came of a rehearsal; stamps count from its start."""
+    """The result of a rehearsal; stamps count from its start."""
 
     truth: tuple[GaitEvent, ...]  # the walker's exact events
     events: tuple[GaitEvent, ...]  # what was detected and numbered, in that order
@@ -56,12 +56,12 @@ class Sensors:
 
     @property
     def latency(self) -> float:
-        """Longest time from an event to its detection [s], one sample interval included."""
+        """Longest time from an event to its detection [s], two sample intervals included."""
         interval = 1.0 / self._sensors[0].settings.rate
         return max(detector.latency for detector in self.detectors) + 2 * interval
 
     def see(self, walker: Walker, events: Sequence[GaitEvent]) -> list[GaitEvent]:
-        """Measure what the walker went through in its last stretch; return what is detected."""
+        """Measure the walker's last stretch; return the events that are detected."""
         found: list[Detection] = []
         for sensor, detector in zip(self._sensors, self.detectors, strict=True):
             times = sensor.due(walker.time_reached)
@@ -72,17 +72,17 @@ class Sensors:
         return [event for event in numbered if event is not None]
 
     def troubles(self) -> tuple[str, ...]:
-        """Return what a person should know, each in one line."""
-        told = [line for detector in self.detectors for line in detector.troubles()]
-        return (*told, *self.numbering.troubles())
+        """Return what a person should know, one line each."""
+        lines = [line for detector in self.detectors for line in detector.troubles()]
+        return (*lines, *self.numbering.troubles())
 
 
 def rehearse(protocol: Protocol, sensors: Sensors) -> Rehearsal:
     """
     Conduct a protocol on the simulated walker through emulated sensors.
 
-    Raises as `gait_entrainment.simulate` does, and GaitError if the detected gait is not one that
-    torque may follow.
+    Raises the errors of `gait_entrainment.simulate`, and GaitError if torque must not follow the
+    detected gait.
     """
     robots = begun_robots(protocol)
     conductor = Conductor(protocol)

@@ -8,18 +8,18 @@ from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-# An event further from the reference than this is another one [s].
+# Events further apart than this do not match [s].
 TOLERANCE = 0.1
 
 
 @dataclass(frozen=True)
 class Score:
-    """Detected events of one kind beside a reference."""
+    """Detected events of one kind compared with a reference."""
 
     events: int  # in the reference
-    found: int  # of those, the ones that were detected
+    found: int  # of those, the detected ones
     missed: int
-    false: int  # detected between the first and the last of the reference, and not in it
+    false: int  # detected between the first and the last of the reference, but not in it
     bias: float | None  # mean error [s]; None without one
     deviation: float | None  # standard deviation of the errors [s]; None with fewer than two
     errors: tuple[float, ...]  # detected minus reference [s]
@@ -29,10 +29,10 @@ def score(
     feet: Iterable[tuple[Sequence[float], Sequence[float]]], tolerance: float = TOLERANCE
 ) -> Score:
     """
-    Hold detected events against a reference: pairs (reference, detected) of times [s], one a foot.
+    Compare detected events with a reference: pairs (reference, detected) of times [s] per foot.
 
-    Each event of the reference takes the nearest detected one within the tolerance, if no other
-    has it. Nothing is said of what was detected before or after the reference.
+    Each event of the reference is matched with the nearest detected one within the tolerance that
+    is not matched yet. Events detected before or after the reference do not count.
     """
     events, false, errors = 0, 0, list[float]()
     for reference, detected in feet:

@@ -12,18 +12,18 @@ from gait_entrainment.settings import setting
 from gait_entrainment_sensors.detection import Detection, DetectorSettings
 from gait_entrainment_sensors.gyroscope import GyroscopeDetector, GyroscopeSettings
 
-# Share of a peak below which the rate is past it for certain.
+# Share of a peak below which the rate has certainly passed it.
 _PAST = 0.75
-# The peak of push-off comes at most so long before the swing [s].
+# Longest time from the push-off peak to the swing [s].
 _PUSH_OFF = 0.3
 
 
 @dataclass(frozen=True)
 class ShankGyroscopeSettings(GyroscopeSettings):
-    """What the detector can be told."""
+    """Settings of the detector."""
 
     decision: float = setting(0.1, "longest time from toe-off to swing", "s", (0.03, 0.3))
-    strike_decision: float = setting(0.03, "from the zero crossing to the peak", "s", (5e-3, 0.1))
+    strike_decision: float = setting(0.03, "time from zero crossing to peak", "s", (5e-3, 0.1))
 
 
 class ShankGyroscopeDetector(GyroscopeDetector):
@@ -32,17 +32,17 @@ class ShankGyroscopeDetector(GyroscopeDetector):
 
     The shank leans forward through stance, fastest at push-off, and swings back to a peak at
     mid-swing (Aminian et al., J. Biomech. 35, 2002; Catalfamo et al., Sensors 10, 2010). Push-off
-    is a plateau, which toe-off ends: taken is where the rate has fallen to three quarters of its
-    peak. Heel strike lies between the zero crossing after swing and the forward peak after that:
-    taken is where the rate has risen to half of that peak, or of the highest rate in
-    ``strike_decision`` where there is none.
+    is a plateau that toe-off ends: toe-off is taken when the rate has fallen to three quarters of
+    its peak. Heel strike lies between the zero crossing after swing and the forward peak after
+    that: it is taken when the rate has risen to half of that peak or, without a peak, of the
+    highest rate in ``strike_decision``.
 
-    Latency: the delay of the filter and ``decision``, for toe-off, known at the zero crossing.
+    Latency: the filter delay plus ``decision``, for toe-off, which the zero crossing decides.
     Uncertainty: published errors are up to 25 ms for strikes and 75 ms for toe-offs (Catalfamo
     2010), taken as twice the standard deviation; no licensed record with a reference was found to
     measure it here.
-    Fails: where the fall begins more than ``decision`` before the swing, as with a stiff knee or
-    in very slow walking: no toe-off.
+    Fails: no toe-off if the fall begins more than ``decision`` before the swing, as with a stiff
+    knee or in very slow walking.
     """
 
     name = "shank_gyroscope"
@@ -51,7 +51,7 @@ class ShankGyroscopeDetector(GyroscopeDetector):
     foot = False
 
     def __init__(self, side: Side, settings: Any = None) -> None:
-        self._latest: deque[tuple[float, float]] = deque()  # forward rates, when: beside a swing
+        self._latest: deque[tuple[float, float]] = deque()  # forward rates, times: around a swing
         super().__init__(side, settings)
 
     def _enter(self, *, swinging: bool, time: float) -> None:
@@ -70,7 +70,7 @@ class ShankGyroscopeDetector(GyroscopeDetector):
         return self._leave(time) if rate < 0.0 <= before else []
 
     def _leave(self, time: float) -> list[Detection]:
-        """Look back at the zero crossing to swing: where the rate fell for good was toe-off."""
+        """Find toe-off at the zero crossing to swing: it is where the rate finally fell."""
         latest = [*self._latest]
         self._latest.clear()
         peak, _ = max(latest)

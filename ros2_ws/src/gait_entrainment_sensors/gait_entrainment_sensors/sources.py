@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Where the signals of sensors are: topics and fields of messages, live or in a bag; columns."""
+"""Where sensor signals are: topics and message fields, live or in a bag; table columns."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,14 +18,14 @@ class Source:
     type: str  # of its messages
     topics: tuple[str, str]  # [left, right], relative
     fields: Mapping[str, str]  # of the message, by signal
-    column: str = ""  # what a table puts between the side and the name of a signal
-    joint: bool = False  # each field is a list, of one joint
+    column: str = ""  # part of a column name between side and signal
+    joint: bool = False  # each field is a list with one joint
 
     def reader(self, signals: Sequence[str]) -> Callable[[Any], tuple[float, ...]]:
         """
-        Return what reads the signals from a message.
+        Return a function that reads the signals from a message.
 
-        It raises IndexError if a message has no such value, AttributeError if no such field.
+        It raises IndexError if a message lacks a value, AttributeError if it lacks a field.
         """
         fields = [self.fields[signal] for signal in signals]
         if self.joint:
@@ -67,8 +67,8 @@ def source_of(name: str, signals: Sequence[str]) -> Source:
     """
     Return where the signals of a detector or an emulated sensor come from.
 
-    An inertial sensor is on the foot unless ``name`` says that it is on the shank. Raises
-    UsageError for signals that no message of a sensor carries together.
+    An inertial sensor is on the foot unless ``name`` contains "shank". Raises UsageError for
+    signals that no sensor's message carries together.
     """
     for source in (FORCE, SWITCH, SHANK if "shank" in name else FOOT, ENCODER):
         if set(signals) <= source.fields.keys():

@@ -75,7 +75,7 @@ class Settingless(FootGyroscopeDetector):
         ("raise SystemExit(3)", r"SystemExit\(3\)"),
         ("Detector = (", "SyntaxError"),
         ("", "AttributeError"),
-        ("class Detector: pass", "is no Detector"),
+        ("class Detector: pass", "is not a Detector"),
         (Unmade, "KeyError.*calibration"),
         (Settingless, "TypeError.*dataclass"),
     ],
@@ -154,7 +154,7 @@ def test_a_signal_in_which_nothing_is_found_is_told():
     detector.reached = 0.0
     assert fed(detector, contacts) == []
     assert detector.troubles() == (
-        "right foot_switch: no event yet: does anybody walk? else see sensor and settings",
+        "right foot_switch: no event yet: if the person walks, check sensor and settings",
     )
 
 

@@ -93,7 +93,7 @@ def test_contacts_are_the_feet_s_that_stand_there(tmp_path, sign):
 def test_a_plate_without_a_contact_is_told(tmp_path):
     found, told = events_on_plates(read_c3d(write(tmp_path / "a.c3d", sign=-1e-3)), FORCE)
     assert found == []
-    assert told[0] == "plate 1: no contact, by forces of -1 to 0 N"
+    assert told[0] == "plate 1: no contact: forces of -1 to 0 N"
 
 
 def test_plates_without_a_sample_are_none(tmp_path):
@@ -156,7 +156,7 @@ def test_a_file_that_is_none_and_markers_that_are_not_there_are_one_line(tmp_pat
     path.write_bytes(b"nothing")
     with pytest.raises(RecordingError, match="cannot be read as C3D"):
         read_c3d(path)
-    with pytest.raises(RecordingError, match="has no marker X, which is to be left_heel"):
+    with pytest.raises(RecordingError, match="has no marker X to use as left_heel"):
         read_c3d(write(tmp_path / "a.c3d"), {"left_heel": "X"})
     with pytest.raises(RecordingError, match="POINT:UNITS: 'feet'"):
         read_c3d(write(tmp_path / "b.c3d", units="feet"))

@@ -153,15 +153,15 @@ def test_a_missing_sample_is_told(walk):
     lines = walk.read_text().splitlines()
     lines[400] = lines[400].rpartition(",")[0] + ","
     walk.write_text("\n".join(lines))
-    assert "right vertical_force: 1 samples are not numbers, left out" in events_of(walk)[1]
+    assert "right vertical_force: 1 samples are not numbers, skipped" in events_of(walk)[1]
 
 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
         pytest.param(f"time\n{9:0200000}\n", "cannot be read: field larger", id="endless field"),
-        ("", "holds no row"),
-        ("time,left_force_z", "holds no row"),
+        ("", "has no rows"),
+        ("time,left_force_z", "has no rows"),
         ("time,left_force_z\n0,1,2", "row 2 has 3 fields"),
         ("time,time\n0,1", "column time appears twice"),
         ("left_force_z\n1", "lacks the column time"),

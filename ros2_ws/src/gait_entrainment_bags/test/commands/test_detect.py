@@ -105,7 +105,7 @@ def test_detect_writes_beside_the_file_and_prints(capsys, tmp_path):
         (["none.csv"], "there is no such file"),
         (["FILE", "--rate", "-3"], "--rate: -3 Hz; allowed: above 0"),
         (["FILE", "--column", "x"], "--column: 'x'; allowed: NAME=NAME_IN_FILE"),
-        (["FILE", "--column", "time=z"], "has no column z, which is to be time"),
+        (["FILE", "--column", "time=z"], "has no column z to use as time"),
         (["FILE", "--detector", "guess"], "detector: 'guess' is unknown"),
         (["FILE", "--plates", "left,right"], "--plates: "),
         (["FILE"], "holds no gait event that could be detected: it lasts 0"),
