@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Bags: recording into MCAP with rosbag2's rules, reading, checking, rescuing, exporting."""
+"""Bags: recording MCAP files by rosbag2's rules, reading, checking, rescuing, exporting."""
 
 from gait_entrainment_bags.checks import Finding, Severity, check
 from gait_entrainment_bags.definitions import Definition, find_definition

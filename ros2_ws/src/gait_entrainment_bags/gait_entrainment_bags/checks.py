@@ -316,7 +316,7 @@ def _check_metadata_file(folder: Path, contents: dict[str, Contents], report: _R
     description = read_metadata_file(folder)
     missing = list(missing_keys(description))
     for key in missing:
-        report.add("metadata-key", f"{file}: {key} is missing or of the wrong kind")
+        report.add("metadata-key", f"{file}: {key} is missing or has the wrong type")
     version = description.get("version")
     if not isinstance(version, int) or not 1 <= version <= METADATA_VERSION:
         report.add("metadata-version", f"{file}: version {version!r}; known: 1 to 9")

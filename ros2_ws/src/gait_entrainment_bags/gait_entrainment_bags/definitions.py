@@ -4,9 +4,9 @@
 """
 Definitions of message types: as installed, and as the text that makes a bag readable anywhere.
 
-They are read from the ``share`` folders of a ROS 2 installation, without ROS itself: ``.msg``
-files for messages, the ``.json`` type descriptions beside them for the type hashes, and for the
-messages inside services and actions, which have no ``.msg`` file, for the text as well.
+They are read from the ``share`` folders of a ROS 2 installation, without ROS itself. The text of
+a message comes from its ``.msg`` file and its hash from the ``.json`` type description next to
+it; messages inside services and actions have no ``.msg`` file, so the latter also gives the text.
 """
 
 import json
@@ -22,8 +22,8 @@ from gait_entrainment_bags.errors import DefinitionMissingError
 
 SEPARATOR = "=" * 80
 
-# type_description_interfaces/msg/FieldType: kinds of values, to which 48 is added for an array
-# of fixed length, 96 for a bounded and 144 for an unbounded sequence.
+# type_description_interfaces/msg/FieldType: types of values. 48 is added for an array of fixed
+# length, 96 for a bounded and 144 for an unbounded sequence.
 _VALUE_TYPES = {
     2: "int8", 3: "uint8", 4: "int16", 5: "uint16", 6: "int32", 7: "uint32", 8: "int64",
     9: "uint64", 10: "float32", 11: "float64", 13: "char", 15: "bool", 16: "byte", 17: "string",
@@ -34,14 +34,14 @@ _KINDS_OF_VALUES = 48
 BUILT_IN_TYPES = frozenset(name for name in _VALUE_TYPES.values() if "<" not in name)
 
 _TYPE_NAME = re.compile(r"([A-Za-z]\w*)/(msg|srv|action)/([A-Za-z]\w*)")
-# Type, bound of a text, brackets of an array and what is in them, name; no constant.
+# Type, bound of a string, brackets of an array and their content, name; not a constant.
 _FIELD = re.compile(r"\s*([\w/]+)(?:<=\d+)?(\[(<?=?\d*)\])?\s+(\w+)\b(?!\s*=)")
 _UNIT = re.compile(r"\[([A-Za-z][^\[\]]*)\]")
 
 
 @dataclass(frozen=True)
 class Definition:
-    """Text of a message type with all that it depends on, and the hash that identifies it."""
+    """Text of a message type with all its dependencies, and the hash that identifies it."""
 
     type: str
     schema_text: str
@@ -50,10 +50,10 @@ class Definition:
 
 def find_definition(type_name: str, prefixes: Iterable[Path | str] | None = None) -> Definition:
     """
-    Gather the definition of ``package/msg/Type``, or of a message inside a service or an action.
+    Find the definition of ``package/msg/Type``, or of a message inside a service or an action.
 
     The prefixes are folders that hold ``share/``; those of AMENT_PREFIX_PATH if None. Raises
-    DefinitionMissingError if the type or one that it is made of is not installed, or cannot be
+    DefinitionMissingError if the type or one of its dependencies is not installed, or cannot be
     read. The name of a message inside an action is ``package/action/Walk_FeedbackMessage``.
     """
     if prefixes is None:
@@ -62,7 +62,7 @@ def find_definition(type_name: str, prefixes: Iterable[Path | str] | None = None
         return _find_definition(type_name, tuple(Path(prefix) for prefix in prefixes))
     except (KeyError, TypeError):
         raise DefinitionMissingError(
-            f"{type_name}: its type description is not of the form of ROS 2 Jazzy"
+            f"{type_name}: its type description does not have the form of ROS 2 Jazzy"
         ) from None
 
 
@@ -106,7 +106,7 @@ def _field_line(field: Mapping[str, Any]) -> str:
 
 def _description_of(type_name: str, prefixes: tuple[Path, ...]) -> Any:
     package, kind, name = _split(type_name)
-    # Of a service or an action: Trigger_Event belongs to Trigger, Walk_FeedbackMessage to Walk.
+    # In a service or an action, Trigger_Event belongs to Trigger, Walk_FeedbackMessage to Walk.
     file = f"share/{package}/{kind}/{name if kind == 'msg' else name.partition('_')[0]}.json"
     try:
         return json.loads(_read(file, type_name, prefixes))
@@ -115,7 +115,7 @@ def _description_of(type_name: str, prefixes: tuple[Path, ...]) -> Any:
 
 
 def _read(relative: str, type_name: str, prefixes: tuple[Path, ...]) -> str:
-    """Read a file of the first prefix that has it."""
+    """Read a file from the first prefix that has it."""
     path = next((prefix / relative for prefix in prefixes if (prefix / relative).is_file()), None)
     if path is None:
         where = ", ".join(map(str, prefixes)) or "AMENT_PREFIX_PATH, which is empty"
@@ -128,7 +128,7 @@ def _read(relative: str, type_name: str, prefixes: tuple[Path, ...]) -> str:
 
 @dataclass(frozen=True)
 class Field:
-    """A field of a definition: its type without bounds, built in or ``package/Type``."""
+    """A field of a definition; its type is built in or ``package/Type``, without bounds."""
 
     name: str
     type: str
@@ -138,10 +138,10 @@ class Field:
 
 def fields_of(text: str, package: str) -> Iterator[Field]:
     """
-    Read the fields of a definition, constants left out, with the units in their comments.
+    Yield the fields of a definition, without constants, with the units in their comments.
 
-    A unit stands in brackets, ``[N m]``. One in the comment at the head of the definition holds
-    for every field that has none of its own.
+    A unit is in brackets, ``[N m]``. A unit in the comment at the head of the definition applies
+    to every field that has none itself.
     """
     head_unit, in_head = "", True
     for line in text.splitlines():
@@ -160,18 +160,18 @@ def fields_of(text: str, package: str) -> Iterator[Field]:
 
 
 def _dependencies(type_name: str, text: str) -> Iterator[str]:
-    """Give the full names of the message types that a definition names, in its order."""
+    """Yield the full names of the message types that a definition uses, in its order."""
     package, kind, _ = _split(type_name)
     for field in fields_of(text, package):
         if field.type not in BUILT_IN_TYPES:
             owner, _, name = field.type.rpartition("/")
-            # In a text made from a type description names with an underscore are those of the
-            # same service or action.
+            # In text made from a type description, names with an underscore belong to the same
+            # service or action.
             yield f"{owner}/{kind if '_' in name else 'msg'}/{name}"
 
 
 def schema_parts(type_name: str, schema_text: str) -> dict[str, str]:
-    """Take the text of a schema apart: definitions by ``package/Type``, the root one first."""
+    """Split the text of a schema into definitions by ``package/Type``, the root first."""
     root, *others = schema_text.split(f"{SEPARATOR}\nMSG: ")
     parts = {short_name(type_name): root}
     for other in others:
@@ -181,12 +181,12 @@ def schema_parts(type_name: str, schema_text: str) -> dict[str, str]:
 
 
 def definition_lines(schema_text: str) -> list[list[str]]:
-    """Return the words of a definition: what is left without comments and empty lines."""
+    """Return the words of each line of a definition, without comments and empty lines."""
     return [w for line in schema_text.splitlines() if (w := line.partition("#")[0].split())]
 
 
 def missing_definitions(type_name: str, schema_text: str) -> list[str]:
-    """List the types (``package/Type``) that the text of a schema names but does not define."""
+    """List the types (``package/Type``) that the text of a schema uses but does not define."""
     needed = set()
     try:
         parts = schema_parts(type_name, schema_text)
@@ -199,7 +199,7 @@ def missing_definitions(type_name: str, schema_text: str) -> list[str]:
 
 
 def is_type_name(name: str) -> bool:
-    """Tell whether a name reads ``package/msg/Type``, or the same of a service or an action."""
+    """Return whether a name reads ``package/msg/Type``, or has ``srv`` or ``action`` instead."""
     return _TYPE_NAME.fullmatch(name) is not None
 
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is missing from the record of a run, by counts, revisions and step numbers."""
+"""Holes in the record of a run, found by counts, revisions and step numbers."""
 
 from collections import Counter
 from typing import Any
@@ -18,26 +18,26 @@ _NAMES = {_PROFILE: "torque profiles", _EVENT: "gait events"}
 
 class RunRecord:
     """
-    Follows the messages of a bag; one without a run has no holes.
+    Follows the messages of a bag; a bag without a run has no holes.
 
-    Every node says at the end how many messages it has published; torque profiles count their
-    revisions from 0 and say which is the last; gait events are numbered by steps, so that what a
-    sensor never saw shows here too.
+    Every node reports at the end how many messages it has published. Torque profiles count their
+    revisions from 0 and mark the last one. Gait events are numbered by steps, so events that a
+    sensor missed are also found here.
     """
 
     def __init__(self) -> None:
-        self._recorded: Counter[str] = Counter()  # messages by topic, of all that are announced
-        self._published: dict[str, int] = {}  # the same, as the nodes say
-        # By topic, run, and ankle of a profile; from 0.
+        self._recorded: Counter[str] = Counter()  # messages by topic, for all announced topics
+        self._published: dict[str, int] = {}  # the same, as reported by the nodes
+        # Numbers from 0, by topic, run, and (for a profile) ankle.
         self._numbers: dict[tuple[TopicInfo, int, int], set[int]] = {}
         self._ended: set[tuple[TopicInfo, int, int]] = set()
 
     def announce(self, *topics: str) -> None:
-        """Take the names of topics that are in the bag, with or without a message."""
+        """Add the names of topics that are in the bag, with or without messages."""
         self._recorded.update(dict.fromkeys(topics, 0))
 
     def add(self, topic: TopicInfo, data: bytes) -> None:
-        """Take a message; one that cannot be decoded is ignored."""
+        """Add a message; it is ignored if it cannot be decoded."""
         self._recorded[topic.name] += 1
         if topic.type not in (_COUNTS, *_NAMES):
             return
@@ -48,8 +48,8 @@ class RunRecord:
                 return
             place = topic, message.run, message.side if topic.type == _PROFILE else 0
             numbers = self._numbers.setdefault(place, set())
-            if topic.type == _EVENT:  # heel strike n closes step n, toe-off n begins its swing
-                numbers.add(max(2 * message.step - message.kind, 0))  # none is before strike 0
+            if topic.type == _EVENT:  # heel strike n ends step n, toe-off n begins its swing
+                numbers.add(max(2 * message.step - message.kind, 0))  # strike 0 is the first
                 return
             numbers.add(message.revision)
             if message.last or message.stop:
@@ -58,7 +58,7 @@ class RunRecord:
             return
 
     def holes(self) -> list[str]:
-        """Return a line for each topic, or topic and run, with something missing."""
+        """Return a line for each topic, or topic and run, that has holes."""
         holes = [
             f"{topic}: {count - self._recorded[topic]} of {count} messages"
             for topic, count in self._published.items()

@@ -30,9 +30,9 @@ _ROOT_KEY = "rosbag2_bagfile_information"
 _RECORD_KEY = "serialized_metadata"
 
 INFINITE = 2**63 - 1
-"""Duration [ns] by which DDS says "no limit": 9223372036 s and 854775807 ns."""
+"""Duration [ns] that means "no limit" in DDS: 9223372036 s and 854775807 ns."""
 
-# The spelling of rosbag2's version 9 by the integers that earlier versions used.
+# The spellings of rosbag2's version 9, by the integers that earlier versions used.
 QOS_POLICIES = {
     policy: {number: word for number, word in enumerate(words.split()) if word != "-"}
     for policy, words in {
@@ -44,7 +44,7 @@ QOS_POLICIES = {
 }
 _QOS_DURATIONS = ("deadline", "lifespan", "liveliness_lease_duration")
 
-# Keys that a version has added to those of version 1.
+# Keys that are not in version 1, with the version that added them.
 _ADDED = {
     "offered_qos_profiles": 4,
     "files": 5,
@@ -52,16 +52,16 @@ _ADDED = {
     "type_description_hash": 7,
     "ros_distro": 8,
 }
-# Keys whose kind depends on the version, or does not matter.
+# Keys whose type depends on the version, or does not matter.
 _OF_ANY_KIND = ("offered_qos_profiles", "custom_data", "type_description_hash")
 
 
 @dataclass(frozen=True)
 class QosProfile:
     """
-    Quality of service that a publisher offered, in rosbag2's terms; durations in nanoseconds.
+    Quality of service offered by a publisher, in rosbag2's terms; durations in nanoseconds.
 
-    Raises ValueError if a policy is not spelled as rosbag2 spells it.
+    Raises ValueError if a policy is not spelled as in rosbag2.
     """
 
     history: str = "keep_last"
@@ -78,10 +78,10 @@ class QosProfile:
         for policy, spellings in QOS_POLICIES.items():
             if (value := getattr(self, policy)) not in spellings.values():
                 allowed = ", ".join(spellings.values())
-                raise ValueError(f"{policy} {value!r}: one of {allowed} is allowed")
+                raise ValueError(f"{policy} {value!r}; allowed: {allowed}")
 
     def as_map(self) -> dict[str, Any]:
-        """Give the map of nine keys that rosbag2 writes."""
+        """Return the map of nine keys that rosbag2 writes."""
         values = asdict(self)
         for name in _QOS_DURATIONS:
             seconds, rest = divmod(values[name], NANOSECONDS_PER_SECOND)
@@ -92,11 +92,11 @@ class QosProfile:
 @dataclass(frozen=True)
 class TopicInfo:
     """
-    A topic as it is announced in a bag.
+    A topic as announced in a bag.
 
     ``type`` reads ``package/msg/Type``, ``type_hash`` is ``RIHS01_`` and 64 hex digits,
-    ``schema_text`` the definition of the message with all that it depends on; bytes of it that are
-    no text are surrogates. Topics of ROS 2 have the encodings that are the defaults.
+    ``schema_text`` the message definition with all its dependencies; bytes in it that are not
+    valid text are surrogates. Topics of ROS 2 have the default encodings.
     """
 
     name: str
@@ -109,7 +109,7 @@ class TopicInfo:
 
     @property
     def is_storable(self) -> bool:
-        """Whether the name of the type is one that the encoding of the messages wants."""
+        """Whether the type's name is valid for the encoding of the messages."""
         return self.message_encoding != "cdr" or is_type_name(self.type)
 
 
@@ -125,7 +125,7 @@ class FileInformation:
 
 @dataclass(frozen=True)
 class BagDescription:
-    """All that ``metadata.yaml`` says about a bag."""
+    """The content of a bag's ``metadata.yaml``."""
 
     topics: Sequence[tuple[TopicInfo, int]]  # each with its number of messages
     files: Sequence[FileInformation]
@@ -133,7 +133,7 @@ class BagDescription:
     ros_distro: str = ""
 
     def as_map(self) -> dict[str, Any]:
-        """Give rosbag2's map of version 9, without the root key."""
+        """Return rosbag2's map of version 9, without the root key."""
         filled = [file for file in self.files if file.message_count]
         start = min((file.start for file in filled), default=0)
         end = max((file.end for file in filled), default=0)
@@ -168,7 +168,7 @@ class BagDescription:
                 }
                 for file in self.files
             ],
-            # A name that is not UTF-8 may be in them, which YAML cannot hold.
+            # They may contain a name that is not UTF-8, which YAML cannot hold.
             "custom_data": {
                 key: text.encode(errors="backslashreplace").decode()
                 for key, text in self.custom_data.items()
@@ -177,11 +177,11 @@ class BagDescription:
         }
 
     def as_record(self) -> dict[str, str]:
-        """Give the content of the MCAP metadata record ``rosbag2``."""
+        """Return the content of the MCAP metadata record ``rosbag2``."""
         return {_RECORD_KEY: _dump_yaml(self.as_map())}
 
     def write(self, folder: Path) -> None:
-        """Write ``metadata.yaml`` so that a reader finds the old file or the new, never half."""
+        """Write ``metadata.yaml``; a reader finds the old file or the new one, never a part."""
         unfinished = folder / (METADATA_FILE + ".tmp")
         with unfinished.open("w", encoding="utf-8") as stream:
             stream.write(_dump_yaml({_ROOT_KEY: self.as_map()}))
@@ -190,7 +190,7 @@ class BagDescription:
         unfinished.replace(folder / METADATA_FILE)
 
 
-# Every key, with a value of its kind.
+# Every key, with a value of its type.
 _EXAMPLE = BagDescription([(TopicInfo("", "", ""), 0)], [FileInformation("")]).as_map()
 
 
@@ -211,14 +211,14 @@ def read_metadata_file(folder: Path) -> dict[str, Any]:
 
 
 def described_beside(path: Path) -> dict[str, Any]:
-    """Give what the ``metadata.yaml`` of a folder says, or {} if it says nothing."""
+    """Return the content of a folder's ``metadata.yaml``, or {} if it cannot be read."""
     with contextlib.suppress(UnreadableBagError):
         return read_metadata_file(path)
     return {}
 
 
 def recorded_description(records: Sequence[Metadata]) -> dict[str, Any]:
-    """Give rosbag2's description from the last metadata record of that name, {} without one."""
+    """Return rosbag2's description from the last record of that name, {} without one."""
     for record in reversed(records):
         if record.name == RECORD_NAME:
             with contextlib.suppress(UnreadableBagError):
@@ -229,13 +229,13 @@ def recorded_description(records: Sequence[Metadata]) -> dict[str, Any]:
 
 
 def custom_data_of(description: Mapping[str, Any]) -> dict[str, str]:
-    """Give the custom data in a description, {} without any."""
+    """Return the custom data in a description, {} if there is none."""
     found = description.get("custom_data")
     return {str(k): str(v) for k, v in found.items()} if isinstance(found, dict) else {}
 
 
 def missing_keys(description: Mapping[str, Any]) -> Iterator[str]:
-    """Name the keys that a description of its version must have, and lacks or has wrong."""
+    """Yield required keys of a description's version that are missing or of the wrong type."""
     version = description.get("version")
     return _misfits(description, _EXAMPLE, "", version if isinstance(version, int) else 1)
 
@@ -258,9 +258,9 @@ def _misfits(found: Any, example: Any, place: str, version: int) -> Iterator[str
 
 
 def topic_of(channel: Channel, schema: Schema | None) -> TopicInfo:
-    """Describe the topic of a channel; what is damaged in its description is left out."""
+    """Describe the topic of a channel; damaged parts of its description are left out."""
     qos: tuple[QosProfile, ...] = ()
-    with contextlib.suppress(UnreadableBagError):  # the messages can be read all the same
+    with contextlib.suppress(UnreadableBagError):  # messages can be read without it
         qos = parse_qos_profiles(channel.metadata.get("offered_qos_profiles", ""), channel.topic)
     type_hash = channel.metadata.get("topic_type_hash", "")
     if schema is None:
@@ -271,16 +271,16 @@ def topic_of(channel: Channel, schema: Schema | None) -> TopicInfo:
 
 
 def offered_qos_text(profiles: Iterable[QosProfile]) -> str:
-    """Give the text of a channel's ``offered_qos_profiles``: a YAML sequence of maps."""
+    """Return the text of a channel's ``offered_qos_profiles``: a YAML sequence of maps."""
     return _dump_yaml([profile.as_map() for profile in profiles])
 
 
 def parse_qos_profiles(value: object, where: str) -> tuple[QosProfile, ...]:
     """
-    Read offered QoS profiles: a sequence of maps, or text that holds one.
+    Parse offered QoS profiles: a sequence of maps, or text that holds one.
 
-    Policies may be spelled as in version 9, or as the integers of earlier versions. Raises
-    UnreadableBagError if it is not of that form; the message says which key is wrong.
+    Policies may be spelled as in version 9, or given as the integers of earlier versions. Raises
+    UnreadableBagError if the value has another form; the message names the wrong key.
     """
     if isinstance(value, str):
         value = load_yaml(value, where) or []
@@ -314,7 +314,7 @@ def _dump_yaml(value: object) -> str:
 
 
 def load_yaml(text: str, where: str) -> Any:
-    """Read somebody's YAML; raises UnreadableBagError if it is invalid or nested too deeply."""
+    """Parse untrusted YAML; raises UnreadableBagError if it is invalid or nested too deeply."""
     try:
         depth = 0
         for event in yaml.parse(text, Loader=_LOADER):
@@ -328,12 +328,12 @@ def load_yaml(text: str, where: str) -> Any:
 
 
 def first_line(error: Exception) -> str:
-    """Give what an error says, on one line."""
+    """Return an error's message on one line."""
     return " ".join(str(error).split()) or type(error).__name__
 
 
-# PyYAML's own C parser, ten times faster, is absent only if PyYAML was built without libyaml.
-# Its loader calls itself for each level, and 30,000 of them end the process.
+# PyYAML's C parser, ten times faster, is absent only if PyYAML was built without libyaml.
+# Its loader recurses once per level, and 30,000 levels crash the process.
 _DEEPEST = 100
 _DUMPER: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)

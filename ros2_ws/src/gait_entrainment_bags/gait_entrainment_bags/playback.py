@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Playing a bag: which message is due when. Nothing here looks at a clock or sends anything.
+Playing a bag: which message is due when. Nothing here reads a clock or sends anything.
 
-Every call is given the time, so that a node paces by absolute deadlines and a test by numbers.
+The caller passes the time: a node can pace by absolute deadlines, and a test by chosen numbers.
 """
 
 from collections.abc import Collection, Generator, Iterator
@@ -20,16 +20,16 @@ from gait_entrainment_bags.mcap_records import BagMessage
 from gait_entrainment_bags.reader import BagReader
 
 FASTEST = float("inf")
-"""Rate at which every message is due at once: whoever takes them sets the pace."""
+"""Rate at which every message is due immediately: the caller sets the pace."""
 
-# Nobody waits for the ticks of a longer silence [ns], as before a log time that is years ahead.
+# In a longer silence [ns] ticks are skipped at this rate: the next log time may be years ahead.
 _LONGEST_TICKING = 3600 * NANOSECONDS_PER_SECOND
-# So many messages are read ahead while as many are given out.
+# Number of messages that are read ahead while the previous ones are taken.
 _AHEAD = 2000
 
 
 class Moment(NamedTuple):
-    """An instant of the bag [ns since 1970]: of a message, or of a tick of the clock."""
+    """A time in the bag [ns since 1970], of a message or, without one, of a clock tick."""
 
     instant: int
     message: BagMessage | None
@@ -37,16 +37,16 @@ class Moment(NamedTuple):
 
 class Playback:
     """
-    The messages of an open bag in the order of log time, each at its time.
+    The messages of an open bag in the order of log time, each at its due time.
 
-    Played are the topics of these names, from ``start_offset`` seconds into the bag, to which a
-    loop returns, for ``duration`` seconds. The rate is in seconds of the bag per second, above 0;
-    `FASTEST` is no pace at all. The clock ticks every ``clock_period`` seconds of the bag from
-    the start on, 0: never; so a listener sees the same ticks at every rate, but for an hour's
-    silence, which `FASTEST` skips.
+    It plays the named topics from ``start_offset`` seconds into the bag, to which a loop returns,
+    for ``duration`` seconds. The rate is in seconds of the bag per second, above 0; `FASTEST`
+    means no pacing. The clock ticks every ``clock_period`` seconds of the bag from the start on
+    (0: never), so a listener sees the same ticks at every rate, except that `FASTEST` skips those
+    in a silence of more than an hour.
 
     Raises BagError if a number is out of range or a topic is not in the bag, NothingToPlayError if
-    none has a message; UnreadableBagError, from every method that moves on, if the bag is damaged.
+    no topic has a message. Methods that advance raise UnreadableBagError if the bag is damaged.
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class Playback:
         self._topics = list(bag.require_topics(topics))
         if not any(bag.counts[topic] for topic in self._topics):
             chosen = ", ".join(self._topics) or "nothing"
-            raise NothingToPlayError(f"{bag.path}: holds no message to play on {chosen}")
+            raise NothingToPlayError(f"{bag.path}: holds no messages to play on {chosen}")
         _require_positive("rate", rate)
         _require_positive("duration", duration, " s")
         offset = round(start_offset * NANOSECONDS_PER_SECOND)
@@ -75,24 +75,24 @@ class Playback:
             )
         self.rate = rate
         self.paused = paused
-        # The first instant to play, and the one to stop before [ns].
+        # The first time to play, and the time to stop before [ns].
         self.start = bag.start + offset
-        lasting = min(duration * NANOSECONDS_PER_SECOND, bag.duration + 1)
-        self.end = min(self.start + round(lasting), bag.end + 1)
+        length = min(duration * NANOSECONDS_PER_SECOND, bag.duration + 1)
+        self.end = min(self.start + round(length), bag.end + 1)
         self._bag = bag
         self._loop = loop
         self._tick_period = round(clock_period * NANOSECONDS_PER_SECOND)
-        # The instant `_origin` of the bag is due at `_origin_at` on the steady clock.
+        # The time `_origin` in the bag is due at `_origin_at` on the steady clock.
         self._origin = self._origin_at = 0
         self._moments = self._moments_from(self.start)
         self._go_to(self.start)
 
     def begin(self, now: int) -> None:
-        """Let the first instant be due now (steady time [ns])."""
+        """Make the first time in the bag due now (steady time [ns])."""
         self._origin_at = now
 
     def due(self) -> int | None:
-        """Return the steady time [ns] at which the next moment is due; None for never."""
+        """Return the steady time [ns] at which the next moment is due; None if never."""
         if self.paused or self.ended or self._next is None:
             return None
         if self.rate == FASTEST:
@@ -100,12 +100,12 @@ class Playback:
         return self._origin_at + round((self._next.instant - self._origin) / self.rate)
 
     def take(self, now: int) -> Moment | None:
-        """Give the next moment if it is due by now (steady time [ns]); None if none is."""
+        """Return the next moment if it is due by now (steady time [ns]); None if none is."""
         due = self.due()
         return None if due is None or now < due else self._advance(due)
 
     def take_next(self) -> Moment | None:
-        """Give the next moment while paused, whenever it is due; None once all were given."""
+        """Return the next moment while paused, whenever it is due; None after the last one."""
         if not self.paused or self.ended:
             return None
         moment = self._advance(self._origin_at)
@@ -114,13 +114,13 @@ class Playback:
         return moment
 
     def pause(self, now: int) -> None:
-        """Stop at the instant that is due now."""
+        """Stop at the time in the bag that is due now."""
         if not self.paused:
             self._origin = self.instant(now)
             self.paused = True
 
     def resume(self, now: int) -> None:
-        """Go on from the instant at which it was stopped."""
+        """Continue from where playback was paused."""
         if self.paused:
             self._origin_at = now
             self.paused = False
@@ -132,7 +132,7 @@ class Playback:
         self.rate = rate
 
     def seek(self, instant: int, now: int) -> None:
-        """Go on from an instant [ns since 1970]; raises BagError outside of what is played."""
+        """Continue from a time in the bag [ns since 1970]; BagError if that is out of range."""
         if not self.start <= instant < self.end:
             raise BagError(f"time: {instant} ns; allowed: {self.start} to {self.end - 1} ns")
         self._origin_at = now
@@ -144,7 +144,7 @@ class Playback:
         self._moments.close()
 
     def instant(self, now: int) -> int:
-        """Return the instant of the bag that is due now [ns since 1970]."""
+        """Return the time in the bag that is due now [ns since 1970]."""
         if self.paused or self.rate == FASTEST:
             return self._origin
         return self._origin + round((now - self._origin_at) * self.rate)
@@ -157,14 +157,14 @@ class Playback:
         self.ended = self._next is None
 
     def _advance(self, due: int) -> Moment | None:
-        """Give the next moment, which was due at a steady time [ns], and look at the one after."""
+        """Return the next moment, due at a steady time [ns], and fetch the one after it."""
         moment = self._next
         self._next = next(self._moments, None)
         if self.rate == FASTEST and moment is not None:
             self._origin = moment.instant
         if self._next is None:
             if self._loop:
-                # Each round lasts as long as the bag does, whenever this call came.
+                # Each round lasts as long as the bag, however late this call is.
                 self._origin_at = due
                 self._go_to(self.start)
             else:
@@ -188,9 +188,9 @@ def choose_topics(
     bag: BagReader, patterns: Collection[str] = (), excluded: Collection[str] = ()
 ) -> list[str]:
     """
-    List the topics of a bag that match one of the patterns, and none of the excluded.
+    List the topics of a bag that match one of the patterns, and none of the excluded ones.
 
-    Patterns are names, or hold ``*`` for any text, as ``/gait/*`` does; without any all match.
+    Patterns are names, with ``*`` for any text, as in ``/gait/*``; without patterns all match.
     Raises BagError if a pattern matches no topic of the bag.
     """
     for pattern in patterns:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Reading a bag: what is in it through its index, and its messages in the order of log time."""
+"""Reading a bag: its contents through its index, and its messages in the order of log time."""
 
 import math
 from bisect import bisect_left
@@ -27,10 +27,10 @@ class BagReader(AbstractContextManager["BagReader"]):
     """
     A bag opened for reading: a folder, or a single ``.mcap`` file.
 
-    ``counts`` are its messages by topic, ``start`` and ``end`` the first and the last log time
-    [ns since the epoch; 0 without messages], ``size`` the bytes of all its files. Raises
-    UnreadableBagError if it is not a bag, or damaged, or was never closed; NoBagError if there is
-    nothing.
+    ``counts`` are message counts by topic, ``start`` and ``end`` the first and the last log time
+    [ns since the epoch; 0 without messages], ``size`` is the size of all its files in bytes.
+    Raises UnreadableBagError if it is not a bag, is damaged, or was never closed; NoBagError if
+    the path does not exist.
     """
 
     def __init__(self, path: Path | str) -> None:
@@ -99,12 +99,12 @@ class BagReader(AbstractContextManager["BagReader"]):
         self, topics: Collection[str] | None = None, start: int = 0, end: float = math.inf
     ) -> Iterator[BagMessage]:
         """
-        Give messages in the order of log time; those of one instant in the order of the file.
+        Yield messages in the order of log time; with equal log times, in the order of the file.
 
-        They are of the topics of these names (None: all), with log times from ``start`` up to,
-        but without, ``end`` [ns since the epoch]. Held in memory at once are the chunks whose
-        spans of time overlap. Raises BagError if a topic is not in the bag, UnreadableBagError if
-        what is read turns out to be damaged, or does not add up.
+        They are the messages of the named topics (None: all) with log times from ``start`` up to,
+        but not including, ``end`` [ns since the epoch]. Only chunks whose time spans overlap are
+        in memory together. Raises BagError if a topic is not in the bag, UnreadableBagError if
+        the data is damaged or does not match the index.
         """
         wanted = set(self.topics if topics is None else self.require_topics(topics))
         given = 0
@@ -126,11 +126,11 @@ class BagReader(AbstractContextManager["BagReader"]):
         expected = sum(self.counts[name] for name in wanted)
         if start <= self.start and end > self.end and given != expected:
             raise UnreadableBagError(
-                f"{self.path}: {given} messages found, but {expected} expected by its index"
+                f"{self.path}: {given} messages found, but {expected} expected from its index"
             )
 
     def require_topics(self, topics: Collection[str]) -> Collection[str]:
-        """Return topics if all of them are in the bag; else raise BagError."""
+        """Return topics if all of them are in the bag; otherwise raise BagError."""
         if missing := sorted(set(topics) - self.topics.keys()):
             raise BagError(f"{self.path}: no topic {', '.join(missing)} in the bag")
         return topics
@@ -139,10 +139,10 @@ class BagReader(AbstractContextManager["BagReader"]):
         self, relative: str, type_name: str = "", *, filled: bool = False
     ) -> str | None:
         """
-        Return the topic with this relative name in whatever namespace; None if there is none.
+        Return the topic with this relative name in any namespace; None if there is none.
 
-        Of several it is the shortest, as /truth/gait_events lies beside /gait_events; of a type,
-        or ``filled`` with messages, if that is asked for.
+        Returns the shortest match, since a bag may hold both /gait_events and /truth/gait_events.
+        It must be of the given type, if any, and have messages if ``filled``.
         """
         names = [
             name
@@ -154,7 +154,7 @@ class BagReader(AbstractContextManager["BagReader"]):
         return min(names, key=len, default=None)
 
     def messages_of(self, relative: str, type_name: str = "") -> Iterator[Any]:
-        """Give the decoded messages of the topic that `find_topic` finds; none without it."""
+        """Yield the decoded messages of the topic that `find_topic` finds, if there is one."""
         name = self.find_topic(relative, type_name)
         for _, message in self.decoded([name] if name else []):
             yield message
@@ -178,7 +178,7 @@ class BagReader(AbstractContextManager["BagReader"]):
     def decoded(
         self, topics: Collection[str] | None = None, start: int = 0, end: float = math.inf
     ) -> Iterator[tuple[BagMessage, Any]]:
-        """Give messages as `messages` does, decoded; BagError also if a definition is broken."""
+        """Yield messages as `messages` does, decoded; BagError also if a definition is broken."""
         names = self.topics if topics is None else self.require_topics(topics)
         decoders = {name: decoder_for(self.topics[name]) for name in names}
         for message in self.messages(topics, start, end):
@@ -186,7 +186,7 @@ class BagReader(AbstractContextManager["BagReader"]):
 
 
 def differing_types(one: TopicInfo, other: TopicInfo) -> str:
-    """Say how the types of two channels of a topic differ; an empty text if they do not."""
+    """Describe how the types of two channels of a topic differ; "" if they do not."""
     if one.type != other.type:
         return f"two types, {one.type} and {other.type}"
     if definition_lines(one.schema_text) != definition_lines(other.schema_text):
@@ -202,9 +202,9 @@ def require_bag(path: Path) -> None:
 
 def bag_files(path: Path) -> list[Path]:
     """
-    List the files of a bag: as ``metadata.yaml`` does, or without one all MCAP files in order.
+    List the files of a bag as in ``metadata.yaml``, or without one all MCAP files in order.
 
-    Raises UnreadableBagError if there is no bag, or it is stored in another way than MCAP.
+    Raises UnreadableBagError if there is no bag, or it is not stored as MCAP.
     """
     require_bag(path)
     if not path.is_dir():
@@ -217,7 +217,7 @@ def bag_files(path: Path) -> list[Path]:
     _require_plain_messages(path, description)
     listed = description.get("relative_file_paths")
     if isinstance(listed, list) and listed:
-        # Only the names count: what lies outside of its folder is no part of a bag.
+        # Only the names count: files outside of its folder are not part of a bag.
         files = [path / name for name in dict.fromkeys(PurePath(str(n)).name for n in listed)]
         if compressed := [file.name for file in files if file.suffix == ".zstd"]:
             raise UnreadableBagError(
@@ -227,21 +227,21 @@ def bag_files(path: Path) -> list[Path]:
     files = sorted(path.glob("*.mcap"), key=_file_order)
     if not files:
         bags = sorted({file.parent.name for file in path.glob("*/*.mcap")})
-        within = f", but bags in it: {', '.join(bags[:5])}" if bags else ""
+        within = f", but it contains bags: {', '.join(bags[:5])}" if bags else ""
         raise UnreadableBagError(f"{path}: no MCAP file in this folder{within}")
     return files
 
 
 def _require_plain_messages(path: Path, description: Mapping[str, Any]) -> None:
-    """Raise UnreadableBagError if rosbag2 has compressed each message by itself."""
+    """Raise UnreadableBagError if rosbag2 has compressed each message separately."""
     if str(description.get("compression_mode", "")).upper() == "MESSAGE":
-        raise _convertible(path, "compressed message by message, which is not read")
+        raise _convertible(path, "compressed message by message, which is not supported")
 
 
 def _convertible(path: Path, what: str) -> UnreadableBagError:
-    """Return the error that says what keeps a bag from being read, and how to convert it."""
+    """Return the error that explains why a bag cannot be read, and how to convert it."""
     return UnreadableBagError(
-        f"{path}: {what}; `ros2 bag convert -i {path} -o FILE` makes a bag that is, if FILE holds "
+        f"{path}: {what}; convert it with `ros2 bag convert -i {path} -o FILE`, where FILE holds "
         "{output_bags: [{uri: NEW, storage_id: mcap, all_topics: true}]}"
     )
 

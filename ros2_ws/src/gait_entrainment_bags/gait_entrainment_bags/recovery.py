@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Rescuing what can be read of a bag that was never closed, or is damaged, into a new bag."""
+"""Rescuing into a new bag what can be read from a bag that is damaged or was never closed."""
 
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ from gait_entrainment_bags.reader import bag_files, differing_types
 from gait_entrainment_bags.writer import BagWriter
 
 RECOVERY_KEY = "recovery"
-"""Entry of the custom data of a rescued bag that says what it was made of, and what is missing."""
+"""Key in a rescued bag's custom data for a text on its origin and on what is missing."""
 
 
 @dataclass(frozen=True)
@@ -32,15 +32,15 @@ class Recovery:
     folder: Path
     counts: dict[str, int]  # messages rescued, by topic
     last: int  # log time of the latest of them [ns since the epoch]; 0 without messages
-    losses: tuple[str, ...]  # a line for each place where something is missing; () if none is
+    losses: tuple[str, ...]  # a line for each place where something is missing
 
 
 def recover(path: Path | str, out: Path | str) -> Recovery:
     """
-    Write all that can be read of a bag, a folder or an ``.mcap`` file, into a new folder.
+    Write all that can be read from a bag, a folder or an ``.mcap`` file, into a new folder.
 
-    Raises BagExistsError if the folder is already there, UnreadableBagError if none of the files
-    is an MCAP file that can be read, BagWriteError if the new bag cannot be written.
+    Raises BagExistsError if the folder already exists, UnreadableBagError if none of the files
+    is a readable MCAP file, BagWriteError if the new bag cannot be written.
     """
     path = Path(path)
     losses: list[str] = []
@@ -66,7 +66,7 @@ def recover(path: Path | str, out: Path | str) -> Recovery:
 
 
 class _Rescue:
-    """Carries messages over into the new bag, and remembers the topics that it cannot take."""
+    """Copies messages into the new bag, and remembers the topics that it cannot store."""
 
     def __init__(self, writer: BagWriter) -> None:
         self.writer = writer
@@ -78,7 +78,7 @@ class _Rescue:
         self._announced: object = None
 
     def take(self, file: McapFile) -> list[str]:
-        """Carry over a file; say what is missing of it."""
+        """Copy the messages of a file; return a line for each loss."""
         losses: list[str] = []
         summary: Contents | None = None
         with noting(losses.append):
@@ -102,7 +102,7 @@ class _Rescue:
         return losses
 
     def _announce(self, contents: Contents) -> None:
-        """Announce the topics that have come since the last call."""
+        """Announce the topics found since the last call."""
         present = [*contents.schemas], [*contents.channels]
         if present == self._announced:
             return

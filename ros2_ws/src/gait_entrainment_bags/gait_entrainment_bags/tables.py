@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Tables out of a bag for spreadsheets and pandas: one per topic, a row per message."""
+"""Tables from a bag for spreadsheets and pandas: one per topic, a row per message."""
 
 import json
 import shutil
@@ -21,7 +21,7 @@ from gait_entrainment_bags.metadata import TopicInfo, first_line
 from gait_entrainment_bags.reader import BagReader
 
 FORMATS = ("csv", "parquet")
-# Units of the standard messages, whose definitions name them in prose only.
+# Units of standard messages, whose definitions give them only in prose.
 STANDARD_UNITS = {
     ("sensor_msgs/JointState", "position"): "rad",
     ("sensor_msgs/JointState", "velocity"): "rad/s",
@@ -38,7 +38,7 @@ _Get = Callable[[Any], Any]
 
 
 class ExportError(BagError):
-    """Topics of which no table could be made; ``files`` are those of the others, by topic."""
+    """Some topics could not be exported; ``files`` are the tables of the others, by topic."""
 
     def __init__(self, files: dict[str, Path], refused: dict[str, str]) -> None:
         super().__init__("; ".join(refused.values()))
@@ -47,11 +47,11 @@ class ExportError(BagError):
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table: what it is called, its unit, and how a message fills it."""
+    """A column of a table: its name, its unit, and how its cell is taken from a message."""
 
     name: str
     unit: str
-    kind: str  # float64, int64, uint64, bool_ or string, as pyarrow names them
+    kind: str  # pyarrow's name: float64, int64, uint64, bool_ or string
     value: _Get
     is_list: bool = False
 
@@ -66,30 +66,30 @@ def export(
     Write one table per topic, named after it: ``/gait/strides`` becomes ``gait.strides.csv``.
 
     The first two columns are the log time and the publish time. Stamps are integer nanoseconds.
-    Arrays of fixed length take a column per element; those of a message that names its elements
-    (JointState) a column per name, ``position.l_hip``; other arrays are lists, in CSV as JSON.
-    Units stand in the metadata of a Parquet column, and in CSV behind the name: ``period [s]``.
-    Floats in CSV have as many digits as give the same float again; NaN is an empty cell.
+    Arrays of fixed length get a column per element. Arrays of a message that names its elements
+    (JointState) get a column per name, ``position.l_hip``. Other arrays are lists, as JSON in CSV.
+    Units are in the metadata of a Parquet column, and after the name in CSV: ``period [s]``.
+    Floats in CSV have enough digits to read the same float back; NaN is an empty cell.
 
-    The format is ``csv`` or ``parquet``, ``out`` a folder to make; without ``topics`` it is all
-    that have messages. Returns the files by topic. Raises BagExistsError if the folder is already
-    there, BagError if the format is unknown, a topic is not in the bag, or pyarrow is missing;
-    and, once the other tables are written, ExportError for topics that cannot be decoded.
+    The format is ``csv`` or ``parquet``, ``out`` a folder to create; by default all topics with
+    messages are exported. Returns the files by topic. Raises BagExistsError if the folder exists,
+    BagError if the format is unknown, a topic is not in the bag, or pyarrow is missing; and, once
+    the other tables are written, ExportError for topics that cannot be decoded.
     """
     out = Path(out)
     if format_name not in FORMATS:
-        raise BagError(f"format {format_name!r}: one of {', '.join(FORMATS)}")
+        raise BagError(f"format {format_name!r}; allowed: {', '.join(FORMATS)}")
     with BagReader(path) as reader:
         if topics is None:
             topics = [name for name, count in reader.counts.items() if count]
             if not topics:
-                raise BagError(f"{path}: holds no message to make a table of")
+                raise BagError(f"{path}: holds no messages to export")
         reader.require_topics(topics)
         if silent := [name for name in topics if not reader.counts[name]]:
             raise BagError(f"{path}: no messages on {', '.join(silent)}: leave it out of --topics")
         _import_pyarrow()
         make_folder(out)
-        # A dot, which no topic of ROS 2 has, is doubled: no table is written over another.
+        # A dot, which no ROS 2 topic has, is doubled so that no table overwrites another.
         plain = {name: name.strip("/").replace(".", "..").replace("/", ".") for name in topics}
         files = {name: out / f"{text}.{format_name}" for name, text in plain.items()}
         refused: dict[str, str] = {}
@@ -98,7 +98,7 @@ def export(
                 try:
                     _write_table(reader, reader.topics[name], file)
                 except BagError as error:
-                    file.unlink(missing_ok=True)  # a table that breaks off is worse than none
+                    file.unlink(missing_ok=True)  # a truncated table is worse than none
                     refused[name] = str(error)
         except BaseException as error:
             shutil.rmtree(out, ignore_errors=True)
@@ -136,23 +136,23 @@ def _write_table(reader: BagReader, topic: TopicInfo, file: Path) -> None:
                     for column, field in zip(cells, schema, strict=True)
                 ]
                 writer.write_table(arrow.Table.from_arrays(arrays, schema=schema))
-    except IndexError:  # the decoder gives fewer bytes than an array has where a message ends
+    except IndexError:  # the decoder returns a short byte array if the message ends early
         raise UnreadableBagError(
             f"{topic.name}: not a {topic.type} in CDR: an array of fixed length is too short"
         ) from None
     except _ChangedNamesError:
         raise BagError(
-            f"{topic.name}: the names of its elements change, so that no table of one column per "
-            "name can be made"
+            f"{topic.name}: the names of its elements change, so a table with one column per name "
+            "is impossible"
         ) from None
 
 
 class _ChangedNamesError(Exception):
-    """The elements of a message have other names, or another order, than in the first one."""
+    """The elements of a message are named or ordered differently than in the first message."""
 
 
 def _arrow_field(arrow: Any, column: Column, is_csv: bool) -> Any:
-    """Say where the unit stands, and of which type the cells are."""
+    """Return the Arrow field of a column, with its unit and type."""
     name, metadata, kind = column.name, None, getattr(arrow, column.kind)()
     if column.unit and is_csv:
         name = f"{name} [{column.unit}]"
@@ -167,7 +167,7 @@ def _as_text(column: Column) -> Column:
 
 
 def _import_pyarrow() -> list[Any]:
-    # Imported only here, since rosdep has no key for it: recording and reading do without.
+    # Imported only here, since rosdep has no key for it: recording and reading do not need it.
     try:
         return [import_module(name) for name in ("pyarrow", "pyarrow.csv", "pyarrow.parquet")]
     except ImportError:
@@ -175,7 +175,7 @@ def _import_pyarrow() -> list[Any]:
 
 
 def columns_of(topic: TopicInfo, example: Any) -> list[Column]:
-    """Lay out the columns of a topic, whose messages have elements of the example's names."""
+    """Lay out the columns of a topic whose messages name their elements as the example does."""
     parts = schema_parts(topic.type, topic.schema_text)
     return list(_columns(parts, next(iter(parts)), "", "", None, example))
 
@@ -183,7 +183,7 @@ def columns_of(topic: TopicInfo, example: Any) -> list[Column]:
 def _columns(
     parts: dict[str, str], type_name: str, prefix: str, outer: str, get: _Get | None, example: Any
 ) -> Iterator[Column]:
-    """Lay out the columns of a type; `get` takes a value of it from a message (None: itself)."""
+    """Lay out a type's columns; `get` takes its value from a message (None: the message)."""
     fields = list(fields_of(parts[type_name], type_name.partition("/")[0]))
     names = _element_names(fields, example)
     for field in fields:
@@ -213,7 +213,7 @@ def _columns(
 
 
 def _element_names(fields: list[Field], example: Any) -> list[str]:
-    """Return the names of a message's elements, [] if it has no numbers by name."""
+    """Return the names of a message's elements, [] if its numbers have no names."""
     if not any((f.name, f.type, f.length) == ("name", "string", -1) for f in fields):
         return []
     arrays = [f.name for f in fields if (f.type, f.length) == ("float64", -1)]
@@ -222,7 +222,7 @@ def _element_names(fields: list[Field], example: Any) -> list[str]:
 
 
 def _column(field: Field, path: str, unit: str, value: _Get) -> Column:
-    """Lay out one column: of values, or of lists if the field is an array of any length."""
+    """Lay out one column, of values or, if the field is an array of any length, of lists."""
     is_list = field.length == -1
     if field.type in _INSTANTS:
         step = (lambda stamps: [*map(nanoseconds_of, stamps)]) if is_list else nanoseconds_of

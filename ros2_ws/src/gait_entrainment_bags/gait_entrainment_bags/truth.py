@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Detected gait events beside the exact ones of the simulated walker: the errors of a detector."""
+"""Errors of a detector: its gait events compared with the simulated walker's exact events."""
 
 import math
 import statistics
@@ -17,12 +17,12 @@ from gait_entrainment_commands.outcome import final_phase_lag, from_strikes
 from gait_entrainment_sensors.scoring import score
 
 TOE_OFF_BIAS = Setting("by how much toe-offs are detected late", unit="s", least=-0.2, most=0.2)
-# An event is found if one of its kind and side was detected within this share of a step.
+# An event is found if an event of its kind and side was detected within this share of a step.
 WINDOW = 0.5
 
 
 def without_bias(events: Iterable[GaitEvent], bias: float) -> list[GaitEvent]:
-    """Return events with a known bias [s] taken off their toe-offs."""
+    """Return events with a known bias [s] subtracted from their toe-offs."""
     late = nanoseconds(bias)
     return [
         replace(e, stamp=e.stamp - late) if late and e.kind is EventKind.TOE_OFF else e
@@ -36,15 +36,15 @@ def detector_errors(
     """
     Return, for heel strikes and for toe-offs, how many were found, missed and false.
 
-    And the bias and the standard deviation of the stamps, detected minus true [s]; None where
-    there are too few. What comes before the first detected event or after the last is not
-    judged: a detector is put to work while somebody walks.
+    Also returns the bias and the standard deviation of the stamps, detected minus true [s]; None
+    if there are too few. Events before the first detected event or after the last are not judged,
+    since a detector may be started or stopped during a walk.
     """
     return {kind.name.lower(): _errors_of(kind, detected, truth) for kind in EventKind}
 
 
 def lag_shift(detected: Analysis, exact: Analysis) -> dict[str, float | None]:
-    """Return by how much the final phase lag is shifted [s]; None if they do not compare."""
+    """Return by how much the final phase lag is shifted [s]; None if it cannot be compared."""
     shift = final_phase_lag(detected) - final_phase_lag(exact)
     if from_strikes(detected):
         shift = math.nan
@@ -67,13 +67,13 @@ def _errors_of(
         if found := times(detected, side):
             first, last = found[0] - window, found[-1] + window
             feet.append(([t for t in times(truth, side) if first <= t <= last], found))
-    told = asdict(score(feet, window))
-    del told["errors"]
-    return told
+    scores = asdict(score(feet, window))
+    del scores["errors"]
+    return scores
 
 
 def _errors_line(errors: dict[str, Any]) -> str:
-    """Say in one line how far the detected events are from the exact ones."""
+    """Return a line about how far the detected events are from the exact ones."""
     parts = []
     for kind, words in (("heel_strike", "heel strikes"), ("toe_off", "toe-offs")):
         e = errors[kind]
@@ -87,10 +87,10 @@ def _errors_line(errors: dict[str, Any]) -> str:
 
 
 def detection_lines(outcome: dict[str, Any]) -> list[str]:
-    """Return lines for people about what detected the events; [] if they are exact."""
+    """Return readable lines about the detection of the events; [] if they are exact."""
     lines = []
     if bias := outcome.get("toe_off_bias"):
-        lines.append(f"toe-off bias     {1e3 * bias:+.1f} ms, taken off every toe-off")
+        lines.append(f"toe-off bias     {1e3 * bias:+.1f} ms, subtracted from every toe-off")
     if uncertainty := outcome.get("final_phase_lag_uncertainty"):
         lines.append(f"uncertainty      {1e3 * uncertainty:.1f} ms of each lag, as detected")
     if errors := outcome.get("detector_errors"):

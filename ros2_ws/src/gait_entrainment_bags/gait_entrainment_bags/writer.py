@@ -30,7 +30,7 @@ from gait_entrainment_bags.metadata import (
 )
 
 ENDED_EARLY = "ended_early"
-"""Entry of the custom data of a bag whose recording ended early: why it did."""
+"""Key in the custom data of a bag for the reason why its recording ended early."""
 _COMPRESSIONS = {kind.name.lower(): kind for kind in CompressionType}  # none, lz4, zstd
 _MEBIBYTE = 2**20
 _DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
@@ -38,18 +38,18 @@ _DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
 
 class BagWriter(AbstractContextManager["BagWriter"]):
     """
-    A bag that is being recorded; not to be shared between threads.
+    A bag that is being recorded; not thread-safe.
 
-    The folder is made, and the files in it are named after it, as rosbag2 names them. Messages of
+    The folder is created, and its files are named after it, as by rosbag2. Messages of
     ``chunk_size`` bytes are compressed together by ``zstd``, ``lz4`` or ``none``. A chunk that is
-    not full is completed by the `write` that comes ``flush_interval`` seconds later; if messages
-    may stop coming, call `flush` as well, from a timer that runs on steady time. A new file
-    begins once the present one holds ``max_bytes`` bytes, or spans ``max_duration`` seconds of
-    log time; 0: never. The attribute ``custom_data`` may be completed until `close`.
+    not full is completed by the first `write` after ``flush_interval`` seconds; if messages may
+    stop arriving, also call `flush`, from a timer on steady time. A new file begins once the
+    current one holds ``max_bytes`` bytes, or spans ``max_duration`` seconds of log time (0:
+    never). The attribute ``custom_data`` may be extended until `close`.
 
-    Raises BagExistsError if the folder is already there, BagWriteError if it cannot be made or
+    Raises BagExistsError if the folder already exists, BagWriteError if it cannot be created or
     written to; no folder is left behind. Every method raises BagWriteError if writing fails: the
-    bag takes no more, and `recover` rescues what reached the disk.
+    bag then accepts no more messages, and `recover` rescues what reached the disk.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class BagWriter(AbstractContextManager["BagWriter"]):
         max_duration: float = 0.0,
     ) -> None:
         if compression not in _COMPRESSIONS:
-            raise BagError(f"compression {compression!r}: one of {', '.join(_COMPRESSIONS)}")
+            raise BagError(f"compression {compression!r}; allowed: {', '.join(_COMPRESSIONS)}")
         if not chunk_size > 0 or max_bytes < 0 or not max_duration >= 0 or not flush_interval > 0:
             raise BagError(
                 "chunk_size and flush_interval must be above 0, max_bytes and max_duration at "
@@ -81,7 +81,7 @@ class BagWriter(AbstractContextManager["BagWriter"]):
         self._max_bytes = max_bytes
         self._max_span = round(max_duration * NANOSECONDS_PER_SECOND)
         self._topics: dict[str, TopicInfo] = {}
-        self._files: list[FileInformation] = []  # the last one is the present file
+        self._files: list[FileInformation] = []  # the last one is the current file
         self._flush_at: int | None = None  # on the steady clock; None: nothing is pending
         self._closed = False
         make_folder(Path(folder))
@@ -90,13 +90,13 @@ class BagWriter(AbstractContextManager["BagWriter"]):
             self._write_description()
         except OSError as error:
             shutil.rmtree(self.folder, ignore_errors=True)
-            raise _write_error(error, f"{folder}: cannot be recorded into, removed") from None
+            raise _write_error(error, f"{folder}: cannot be written to, removed") from None
 
     def __exit__(self, *_: object) -> None:
         self.close()
 
     def add_topic(self, topic: TopicInfo) -> None:
-        """Announce a topic: it is in the bag even without messages; BagError if it already is."""
+        """Announce a topic, which is in the bag even without messages; BagError if it exists."""
         if topic.name in self._topics:
             raise BagError(f"{topic.name}: already in the bag")
         if not topic.is_storable:
@@ -106,44 +106,44 @@ class BagWriter(AbstractContextManager["BagWriter"]):
         self.counts[topic.name] = 0
         try:
             self._register(topic)
-            # Written again now, so that metadata.yaml names every topic even after a crash.
+            # Updated now, so that metadata.yaml lists every topic even after a crash.
             self._write_description()
         except OSError as error:
             raise self._failure(error) from None
 
     def write(self, topic: str, data: bytes, log_time: int, publish_time: int) -> None:
         """
-        Record one message, in CDR with its header of four bytes, of a topic that was announced.
+        Record one message of an announced topic, in CDR with its four-byte header.
 
-        It was received (or speaks of the instant) at the log time, and was sent at the publish
-        time [ns since the epoch]. Raises BagError for a topic or a time that is not allowed; and
-        DiskFullError if the disk is full: unless the text says otherwise the bag has then been
-        closed with all that was written, this message included.
+        The log time is when it was received, or the time that it is about; the publish time is
+        when it was sent [ns since the epoch]. Raises BagError if the topic or a time is invalid,
+        and DiskFullError if the disk is full: unless its text says otherwise, the bag has then
+        been closed with all that was written, including this message.
         """
         self._require_open()
         channel = self._channels.get(topic)
         if channel is None:
-            raise BagError(f"{topic}: not announced by add_topic")
+            raise BagError(f"{topic}: not announced with add_topic")
         if not (0 <= log_time < 2**64 and 0 <= publish_time < 2**64):
             raise BagError(
-                f"{topic}: a time lies outside of 0 to 2**64 - 1 ns: "
+                f"{topic}: a time is outside of 0 to 2**64 - 1 ns: "
                 f"log time {log_time}, publish time {publish_time}"
             )
         try:
             self._writer.add_message(channel, log_time, data, publish_time)
         except OSError as error:
             raise self._failure(error) from None
-        present = self._files[-1]
-        if log_time < present.start or not present.message_count:
-            present.start = log_time
-        if log_time > present.end:
-            present.end = log_time
-        present.message_count += 1
+        current = self._files[-1]
+        if log_time < current.start or not current.message_count:
+            current.start = log_time
+        if log_time > current.end:
+            current.end = log_time
+        current.message_count += 1
         self.counts[topic] += 1
-        self._complete(present)
+        self._complete(current)
 
-    def _complete(self, present: FileInformation) -> None:
-        """Complete what is due: the chunk once it is old enough, the file once it is large."""
+    def _complete(self, current: FileInformation) -> None:
+        """Complete the chunk once it is old enough, and the file once it is large enough."""
         now = time.monotonic_ns()
         if self._flush_at is None:
             self._flush_at = now + self._flush_interval
@@ -157,7 +157,7 @@ class BagWriter(AbstractContextManager["BagWriter"]):
                 f"{self.folder}: {full}; all of them are in the bag, which is closed and readable"
             )
         if (self._max_bytes and self._file.tell() >= self._max_bytes) or (
-            self._max_span and present.end - present.start >= self._max_span
+            self._max_span and current.end - current.start >= self._max_span
         ):
             try:
                 self._close_file()
@@ -170,10 +170,10 @@ class BagWriter(AbstractContextManager["BagWriter"]):
 
     def flush(self) -> None:
         """
-        Bring all that was written to the file, so that a crash of this process loses none of it.
+        Write everything pending to the file, so that a crash of this process loses none of it.
 
-        A separate thread then syncs it to the disk, so that a power failure loses only what came
-        after; the caller does not wait for that. Without new messages it costs nothing.
+        A separate thread then syncs it to the disk, so that a power failure loses only later
+        messages; the caller does not wait for that. Without new messages it costs nothing.
         """
         self._require_open()
         if self._flush_at is None:
@@ -202,7 +202,7 @@ class BagWriter(AbstractContextManager["BagWriter"]):
             raise BagWriteError(f"{self.folder}: the bag is closed")
 
     def _failure(self, error: OSError) -> BagWriteError:
-        """Give up the present file as it is, and say so."""
+        """Abandon the current file as it is; return the error to raise."""
         self._closed = True
         self._file.close()
         return _write_error(
@@ -211,7 +211,7 @@ class BagWriter(AbstractContextManager["BagWriter"]):
 
     def _open_file(self) -> None:
         path = self.folder / f"{self.folder.name}_{len(self._files)}.mcap"
-        # Room for a chunk that does not compress, the index and the descriptions.
+        # Space for a chunk that does not compress, the index and the descriptions.
         self._file = _ReservingFile(path, 2 * self._chunk_size + _MEBIBYTE)
         self._files.append(FileInformation(path.name))
         output: Any = self._file
@@ -268,11 +268,11 @@ def _open_new(path: Path) -> FileIO:
 
 class _ReservingFile:
     """
-    The file that a recording goes to, with space put aside for its end.
+    The file that a recording is written to, with space reserved for its end.
 
-    When the disk is full the space that was put aside is given back, so that the write at hand
-    and the end of the bag find room; `full` then tells the writer to come to that end. The space
-    is held by a file without a name: a process that is killed leaves nothing behind.
+    When the disk is full, the reserved space is released for the current write and the end of the
+    bag; `full` then tells the writer to close the bag. An unnamed file holds the space, so a
+    process that is killed leaves nothing behind.
     """
 
     def __init__(self, path: Path, reserve: int) -> None:
@@ -285,7 +285,7 @@ class _ReservingFile:
         try:
             os.posix_fallocate(self._reserve.fileno(), 0, reserve)
         except OSError as error:
-            # Some file systems cannot put space aside; a bag on them ends unfinished if full.
+            # Some file systems cannot reserve space; if they are full, the bag stays unfinished.
             if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL):
                 self.close()
                 raise
@@ -304,7 +304,7 @@ class _ReservingFile:
         return len(data)
 
     def make_room(self, error: OSError) -> bool:
-        """Give back the space that was put aside, if the disk is full and it still is aside."""
+        """Release the reserved space, if the disk is full and it is still reserved."""
         if error.errno not in _DISK_FULL or self.full:
             return False
         self.full = True
@@ -315,13 +315,13 @@ class _ReservingFile:
         return self._size
 
     def flush(self) -> None:
-        """Nothing is held back: every write goes to the kernel at once."""
+        """Do nothing: there is no buffer, every write goes directly to the kernel."""
 
     def start_sync(self) -> None:
-        """Bring the data to the disk in a thread, unless that is still under way."""
+        """Sync the data to the disk in a thread, unless a sync is still running."""
         if self._synced is None or self._synced.done():
             if self._synced is not None:
-                self._synced.result()  # raises what went wrong
+                self._synced.result()  # raises its error, if any
             self._synced = self._syncing.submit(os.fdatasync, self._raw.fileno())
 
     def sync(self) -> None:

@@ -292,7 +292,7 @@ def no_bag(tmp_path: Path, kind: str) -> Path:
         ("empty folder", "no MCAP file"),
         ("sqlite", "stored as sqlite3"),
         ("sqlite alone", "stored as sqlite3"),
-        ("folder of bags", "no MCAP file in this folder, but bags in it: a, b"),
+        ("folder of bags", "no MCAP file in this folder, but it contains bags: a, b"),
         ("file compressed", "compressed as a whole"),
         ("messages compressed", "compressed message by message.*ros2 bag convert"),
         ("file missing", "file missing/a_0.mcap: no such file"),

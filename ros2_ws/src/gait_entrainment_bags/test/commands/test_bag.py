@@ -150,4 +150,4 @@ def test_nothing_rescued_is_no_success(capsys, tmp_path, form):
     assert "0 messages" in out or json.loads(out)["messages"] == 0
     code, out, err = entrain(capsys, "export", tmp_path / "empty", tmp_path / "tables", *form)
     assert (code, out) == (1, "")
-    assert "holds no message to make a table of" in err
+    assert "holds no messages to export" in err
