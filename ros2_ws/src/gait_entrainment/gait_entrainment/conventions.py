@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Vocabulary that every part shares: sides, kinds of gait events, and nanosecond stamps."""
+"""Shared vocabulary: sides, kinds of gait events, and nanosecond stamps."""
 
 import enum
 from typing import Any
@@ -32,13 +32,13 @@ def nanoseconds(seconds: float) -> int:
     """
     Quantize seconds since the start of the run to the integer nanoseconds of a stamp.
 
-    A double that counts from the start of a run resolves far less than a nanosecond; one that
-    counts from 1970 resolves only 0.2 microseconds. So the core quantizes before the node adds
-    the start stamp.
+    A double resolves far less than a nanosecond if it counts from the start of a run, but only
+    0.2 microseconds if it counts from 1970. The core therefore quantizes before the node adds the
+    start stamp.
     """
     return round(seconds * NANOSECONDS_PER_SECOND)
 
 
 def nanoseconds_of(stamp: Any) -> int:
-    """Return a ROS time or duration, decoded by whatever reader, as integer nanoseconds."""
+    """Return a ROS time or duration, decoded by any reader, as integer nanoseconds."""
     return int(stamp.sec) * NANOSECONDS_PER_SECOND + int(stamp.nanosec)

@@ -2,23 +2,23 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Closed forms of the walker's linkage, each written once.
+Closed forms of the walker's linkage, each defined once.
 
-The whole model hangs on one triangle. The leading foot's heel B is the origin, x forward, z up.
-The point mass C stands on the leading leg, leaned back by theta: C = L (-sin theta, cos theta).
+The whole model rests on one triangle. The leading foot's heel B is the origin, x forward, z up.
+The point mass C is on the leading leg, which leans back by theta: C = L (-sin theta, cos theta).
 The trailing toe A rests at (-d, 0) with d = 2 L sin(alpha) - l. The trailing ankle D joins the
 foot AD = l and the leg DC = L at the angle psi. The law of cosines for the side AC gives
 
     L^2 + d^2 - 2 L d sin(theta) = L^2 + l^2 - 2 L l cos(psi),
 
-so sin(theta) and cos(psi) are linear in each other, which is the paper's function psi(theta)
-solved for the sine. While the walker moves on, theta falls and psi grows.
+so sin(theta) and cos(psi) are linear in each other. This is the paper's psi(theta), solved for
+the sine. As the walker moves forward, theta falls and psi grows.
 
-`body` is anything that has the names of the parameters for what is read of it: `leg_length` L,
-`foot_length` l, `toe_separation` d, `max_plantarflexion` mu, `ankle_stiffness` k, `mass`,
-`gravity`. The functions import only `math` and call no other: the parameters use them as they are,
-the walker compiles each. Lengths are in m, angles in rad, forces in N, torques in N m, masses in
-kg, rates in rad/s. Equation numbers are those of Ahn and Hogan (2012).
+`body` is any object with the attributes that a function reads, named as in the parameters:
+`leg_length` L, `foot_length` l, `toe_separation` d, `max_plantarflexion` mu, `ankle_stiffness` k,
+`mass`, `gravity`. The functions use only `math` and do not call each other: the parameters use
+them as they are, and the walker compiles each one. Lengths are in m, angles in rad, forces in N,
+torques in N m, masses in kg, rates in rad/s. Equation numbers are those of Ahn and Hogan (2012).
 """
 
 import math
@@ -26,19 +26,19 @@ from typing import Any
 
 
 def leg_sine(body: Any, cos_ankle: float) -> Any:
-    """Sine of the leading leg's lean theta if the trailing ankle's angle psi has this cosine."""
+    """Sine of the leading leg's lean theta, from the cosine of the trailing ankle's angle psi."""
     leg, foot, gap = body.leg_length, body.foot_length, body.toe_separation
     return (gap * gap - foot * foot) / (2 * leg * gap) + foot / gap * cos_ankle
 
 
 def ankle_cosine(body: Any, sin_leg: float) -> Any:
-    """Cosine of the trailing ankle's angle psi at this sine of theta: inverse of `leg_sine`."""
+    """Cosine of the trailing ankle's angle psi, from sin(theta): the inverse of `leg_sine`."""
     leg, foot, gap = body.leg_length, body.foot_length, body.toe_separation
     return (sin_leg - (gap * gap - foot * foot) / (2 * leg * gap)) * gap / foot
 
 
 def leg_per_ankle(body: Any, sin_ankle: float, cos_leg: float) -> Any:
-    """Transmission -d theta / d psi of the linkage, positive: the derivative of `leg_sine`."""
+    """Transmission -d theta / d psi of the linkage (positive): the derivative of `leg_sine`."""
     return body.foot_length / body.toe_separation * sin_ankle / cos_leg
 
 
@@ -46,7 +46,7 @@ def drop(sin_leg: float, cos_leg: float) -> float:
     """
     Height of the mass below the apex, 1 - cos(theta), in leg lengths.
 
-    Written without the difference, which would lose the digits of a small drop.
+    This form avoids the difference, which would lose the digits of a small drop.
     """
     return sin_leg * sin_leg / (1.0 + cos_leg)
 
@@ -57,7 +57,7 @@ def spring_torque(body: Any, ankle: float) -> Any:
 
 
 def torque_work(angle: float, torque: float, stiffness: float) -> float:
-    """Work [J] over a rotation by `angle` of a torque that falls off linearly from `torque`."""
+    """Work [J] of a torque that falls off linearly from `torque`, over a rotation by `angle`."""
     return angle * (torque - 0.5 * stiffness * angle)
 
 
@@ -68,16 +68,16 @@ def trailing_reach(body: Any, cos_ankle: float) -> float:
 
 
 def trailing_force(body: Any, torque: float, sin_ankle: float, reach: float) -> Any:
-    """Ground reaction F_A at the trailing toe, along AC = reach: moments on the foot, Eq. 5."""
+    """Ground reaction F_A at the trailing toe, along AC = reach: moments on the foot (Eq. 5)."""
     return torque * reach / (body.leg_length * body.foot_length * sin_ankle)
 
 
 def unloading_arm(body: Any, sin_ankle: float, sin_leg: float) -> Any:
     """
-    Force that a newton metre of trailing ankle torque takes off the leading leg [1/m].
+    Force taken off the leading leg per unit of trailing ankle torque [1/m].
 
-    From the paper's F_B: F_A (cos(phi) sin(theta) - sin(phi) cos(theta)), F_A from Eq. 5, where
-    |AC| cos(phi) = d - L sin(theta) and |AC| sin(phi) = L cos(theta), is
+    In the paper's F_B, the term F_A (cos(phi) sin(theta) - sin(phi) cos(theta)), with F_A from
+    Eq. 5, |AC| cos(phi) = d - L sin(theta) and |AC| sin(phi) = L cos(theta), equals
     -T (L - d sin(theta)) / (L l sin(psi)).
     """
     leg, foot = body.leg_length, body.foot_length
@@ -93,7 +93,7 @@ def trailing_leg_angle(body: Any, ankle: float, sin_leg: float) -> float:
     """
     Angle of the trailing leg from the vertical, positive with the ankle ahead of the mass.
 
-    The direction from the mass to the toe, turned back by the angle between leg and line CA.
+    It is the direction from the mass to the toe, turned back by the angle between leg and CA.
     """
     leg, foot = body.leg_length, body.foot_length
     cos_leg = math.sqrt(1.0 - sin_leg * sin_leg)
@@ -104,7 +104,7 @@ def trailing_leg_angle(body: Any, ankle: float, sin_leg: float) -> float:
 def trailing_leg_per_ankle(
     body: Any, ankle: float, sin_leg: float, transmission: float, reach: float
 ) -> Any:
-    """Derivative of `trailing_leg_angle` by psi; `transmission` and `reach` as at that posture."""
+    """Derivative of `trailing_leg_angle` with respect to psi, from `transmission` and `reach`."""
     leg, foot = body.leg_length, body.foot_length
     to_toe = transmission * leg * (leg - body.toe_separation * sin_leg)
     return -(to_toe + foot * (leg * math.cos(ankle) - foot)) / (reach * reach)

@@ -5,7 +5,7 @@
 Parameters of the ankle-actuated walker (Table 1 of Ahn and Hogan 2012) and what they imply.
 
 A walker exists only if the linkage closes and a period-one gait vaults over each step without
-flying off the ground. Its construction checks that, and an error says by how much it fails. The
+flying off the ground. The constructor checks this, and an error states by how much it fails. The
 gait's speed follows from energy alone (Eq. 7, 8), so everything here is in closed form except for
 two one-dimensional searches over double stance, which the paper left to simulation.
 """
@@ -21,23 +21,23 @@ from gait_entrainment.settings import Checked, SettingError, setting
 
 
 class ParameterError(SettingError):
-    """Parameters that make no walker; the message is one line: field, value, what is allowed."""
+    """Parameters of no possible walker; the message is one line: field, value, allowed range."""
 
 
-# Points of the search over double stance. The functions searched are smooth on that scale, and
-# the best point is then refined, so the result does not depend on it.
+# Number of points in the search over double stance. The functions are smooth on this scale, and
+# the best point is then refined, so the result does not depend on the number.
 _SEARCH_POINTS = 257
 
 
 def greatest(function: Callable[[float], float], lower: float, upper: float) -> float:
-    """Greatest value of a smooth function on [lower, upper]: scan, then golden section."""
+    """Maximum of a smooth function on [lower, upper]: scan, then golden-section search."""
     step = (upper - lower) / (_SEARCH_POINTS - 1)
     values = [function(lower + i * step) for i in range(_SEARCH_POINTS)]
     best = max(range(_SEARCH_POINTS), key=values.__getitem__)
     a = lower + max(best - 1, 0) * step
     b = lower + min(best + 1, _SEARCH_POINTS - 1) * step
     ratio = (math.sqrt(5.0) - 1.0) / 2.0
-    # At a smooth maximum the value no longer depends on the place once this is sqrt(epsilon).
+    # At a smooth maximum, an interval below sqrt(epsilon) no longer changes the value.
     while b - a > 1e-9:
         inner, outer = b - ratio * (b - a), a + ratio * (b - a)
         if function(inner) < function(outer):
@@ -56,8 +56,8 @@ class WalkerParameters(Checked):
     """
     The walker of Table 1: point mass, two massless legs with feet, a spring at the trailing ankle.
 
-    The names of the paper are, in this order, m, L, l, g, alpha, mu and k. Construction raises
-    ParameterError for a value that is out of range and for a walker without a period-one gait.
+    The paper's names are, in this order, m, L, l, g, alpha, mu and k. The constructor raises
+    ParameterError if a value is out of range or the walker has no period-one gait.
     """
 
     mass: float = _positive(80.0, "mass", "kg", 1e4)
@@ -68,7 +68,7 @@ class WalkerParameters(Checked):
         math.pi / 6, "angle of the leg at heel strike", "rad", math.pi / 4
     )
     max_plantarflexion: float = _positive(
-        2.576, "plantarflexion of the ankle at toe-off, its largest", "rad", math.pi
+        2.576, "largest plantarflexion of the ankle, at toe-off", "rad", math.pi
     )
     ankle_stiffness: float = _positive(87.3, "ankle stiffness", "N m/rad", 1e7)
 
@@ -82,11 +82,11 @@ class WalkerParameters(Checked):
             raise ParameterError(str(error)) from None
         except (ArithmeticError, ValueError):  # an overflow, the root of a negative number
             raise ParameterError(
-                "the values are too large, too small or too far apart to calculate with"
+                "the values are too large, too small or too far apart to compute with"
             ) from None
 
     def _check_linkage(self) -> None:
-        """Refuse angles at which the feet do not separate or the toe cannot leave the ground."""
+        """Reject angles at which the feet do not separate or the toe cannot leave the ground."""
         # cos(2 alpha) > 0: above pi/4 the collision would throw the mass back.
         least, most = math.asin(min(1.0, self.foot_length / (2 * self.leg_length))), math.pi / 4
         if least >= most:
@@ -112,21 +112,21 @@ class WalkerParameters(Checked):
             )
 
     def _check_gait(self) -> None:
-        """Refuse a stiffness with which the period-one gait falls or flies off."""
+        """Reject a stiffness with which the period-one gait falls or flies off."""
         least, most = self.just_vault_over_stiffness, self.just_fly_off_stiffness
-        if not least < most:  # also if one of them is not a number
+        if not least < most:  # also if either is NaN
             raise SettingError(
                 f"leg_angle: {self.leg_angle:.6g} rad with max_plantarflexion"
-                f" {self.max_plantarflexion:.6g} rad leaves no gait: the walker falls below an"
+                f" {self.max_plantarflexion:.6g} rad allows no gait: the walker falls below an"
                 f" ankle_stiffness of {least:.4g} N m/rad and flies off above {most:.4g} N m/rad"
             )
         reason = ""
         if self.ankle_stiffness <= least:
-            reason = "above the just-vault-over stiffness: the walker falls for want of"
+            reason = "above the just-vault-over stiffness: the walker falls because it lacks"
             reason += f" {-self.least_kinetic_energy:.3g} J"
         elif self.ankle_stiffness >= most:
-            reason = "below the just-fly-off stiffness: the walker flies off, its leading leg"
-            reason += f" would have to pull with {-self.least_leading_force:.3g} N"
+            reason = "below the just-fly-off stiffness: the walker flies off because its leading"
+            reason += f" leg would have to pull with {-self.least_leading_force:.3g} N"
         if reason:
             raise SettingError(
                 f"ankle_stiffness: {self.ankle_stiffness:g} N m/rad is not {reason};"
@@ -182,7 +182,7 @@ class WalkerParameters(Checked):
 
     @property
     def peak_torque(self) -> float:
-        """Torque [N m] of the ankle spring at heel strike, its greatest."""
+        """Torque [N m] of the ankle spring at heel strike, its maximum."""
         return float(geometry.spring_torque(self, self.double_stance_start))
 
     @property
@@ -195,8 +195,8 @@ class WalkerParameters(Checked):
         """Speed [m/s] of the mass just after a collision in the period-one gait."""
         return self.restitution * self.collision_speed
 
-    # Barrier and ground reaction of the period-one gait. Both are linear in the stiffness, so they
-    # are kept in two parts: one without it, and one per unit of it.
+    # Barrier and ground reaction of the period-one gait. Both are linear in the stiffness, so each
+    # is split into two parts: one without the stiffness, and one per unit of it.
 
     def _work_per_stiffness(self, ankle: float) -> float:
         """Work of the spring from heel strike to psi, per unit of stiffness [rad^2]."""
@@ -207,12 +207,12 @@ class WalkerParameters(Checked):
         """
         Part of the kinetic energy at psi that grows with k, per unit of stiffness [rad^2].
 
-        The gait's kinetic energy after a collision is what is left of the push-off work once the
-        collision has taken as much as the push-off gives.
+        The gait's kinetic energy after a collision is what remains if the collision takes as much
+        energy as the push-off adds.
         """
-        whole = self._work_per_stiffness(self.max_plantarflexion)
+        push_off = self._work_per_stiffness(self.max_plantarflexion)
         kept = self.floquet_multiplier / (1 - self.floquet_multiplier)
-        return kept * whole + self._work_per_stiffness(ankle)
+        return kept * push_off + self._work_per_stiffness(ankle)
 
     def _height(self, ankle: float) -> float:
         """Height [m] of the mass at psi above its height at heel strike."""
@@ -225,13 +225,13 @@ class WalkerParameters(Checked):
         return self.leg_length * geometry.drop(math.sin(self.leg_angle), math.cos(self.leg_angle))
 
     def _hold(self, ankle: float) -> float:
-        """Force [N] on the leading leg at psi of a walker that rises and falls without a push."""
+        """Force [N] on the leading leg at psi if the walker rises and falls without a push."""
         sine = self._leg_sine(ankle)
         lost = 2 * self.gravity * self._height(ankle) / self.leg_length**2
         return float(geometry.pendulum_force(self, math.sqrt(1 - sine * sine), -lost))
 
     def _lift_per_stiffness(self, ankle: float) -> float:
-        """Force on the leading leg that push and speed take off at psi, per unit of stiffness."""
+        """Force that push and speed take off the leading leg at psi, per unit of stiffness."""
         arm = float(geometry.unloading_arm(self, math.sin(ankle), self._leg_sine(ankle)))
         push = arm * (self.max_plantarflexion - ankle)
         return push + 2 * self._energy_per_stiffness(ankle) / self.leg_length
@@ -245,7 +245,7 @@ class WalkerParameters(Checked):
         return 2 * self._energy_per_stiffness(self.max_plantarflexion) / self.leg_length
 
     def _most_on_the_way_up(self, function: Callable[[float, float], float]) -> float:
-        """Greatest value, up to the apex, of a function of potential energy and energy per k."""
+        """Maximum, up to the apex, of a function of potential energy and kinetic energy per k."""
         weight = self.mass * self.gravity
 
         def at(ankle: float) -> float:
@@ -253,17 +253,17 @@ class WalkerParameters(Checked):
 
         most = greatest(at, self.double_stance_start, self.max_plantarflexion)
         if self.toe_off_angle > 0:  # the apex is in single stance
-            whole = self._energy_per_stiffness(self.max_plantarflexion)
-            most = max(most, function(weight * self._apex_height, whole))
+            gained = self._energy_per_stiffness(self.max_plantarflexion)
+            most = max(most, function(weight * self._apex_height, gained))
         return most
 
     def _most_while_leading(self, function: Callable[[float, float], float]) -> float:
-        """Greatest value, while a leg leads or stands, of a function of hold and lift per k."""
+        """Maximum, while a leg is leading or stance leg, of a function of hold and lift per k."""
 
         def at(ankle: float) -> float:
             return function(self._hold(ankle), self._lift_per_stiffness(ankle))
 
-        # In single stance the force is least at its end.
+        # In single stance the force is smallest at the end.
         return max(
             greatest(at, self.double_stance_start, self.max_plantarflexion),
             function(self._hold_before_collision, self._lift_before_collision),
@@ -274,8 +274,8 @@ class WalkerParameters(Checked):
         """
         Stiffness k_C [N m/rad] below which the period-one gait does not vault over.
 
-        Eq. 9 takes the barrier at the apex of single stance; here double stance counts too, and
-        decides if toe-off comes after the apex.
+        Eq. 9 puts the barrier at the apex of single stance. Here double stance counts as well, and
+        it is decisive if toe-off comes after the apex.
         """
         return self._most_on_the_way_up(lambda potential, gained: potential / gained)
 
@@ -292,19 +292,19 @@ class WalkerParameters(Checked):
 
     @property
     def least_leading_force(self) -> float:
-        """Smallest ground reaction [N] of the leading leg over the period-one gait."""
+        """Smallest ground reaction [N] of the leading leg in the period-one gait."""
         return -self._most_while_leading(lambda hold, lift: self.ankle_stiffness * lift - hold)
 
 
 @dataclass(frozen=True)
 class Variation(Checked):
     """
-    How the stride period varies by itself, which that of the paper's walker does not.
+    Natural variation of the stride period, which the paper's walker does not have.
 
     Adults: 1 to 3 %, exponent about 0.75 (Hausdorff et al., J. Appl. Physiol. 78, 349, 1995).
     """
 
     coefficient: float = setting(0.0, "coefficient of variation of the period", "1", (0.0, 0.2))
     exponent: float = setting(
-        0.75, "its long-range (Hurst) exponent; 0.5: white", "1", (0.5, 1.0), most_excluded=True
+        0.75, "long-range (Hurst) exponent; 0.5 is white", "1", (0.5, 1.0), most_excluded=True
     )

@@ -58,7 +58,7 @@ def test_message_says_by_how_much_the_walker_falls():
     # Below k_C each N m/rad lacks angle^2 / 2 of work, over the share that a collision takes.
     angle = math.pi / 6 + 2.576 - math.pi / 2
     missing = (67.4792 - 60) * angle**2 / 2 / 0.75
-    assert f"for want of {missing:.3g} J" in str(refused.value)
+    assert f"because it lacks {missing:.3g} J" in str(refused.value)
     assert "allowed: 67.4792 to 111.878 N m/rad" in str(refused.value)
     assert "\n" not in str(refused.value)
 

@@ -4,7 +4,7 @@
 """
 The gait: events and the strides they bound, pulse phases, phase lags, the entrainment verdict.
 
-Nothing here knows a walker: a person's signals take the same path as the model's.
+Nothing here depends on the walker: a person's signals take the same path as the model's.
 """
 
 from gait_entrainment.gait.analyzer import Analysis, GaitAnalyzer, Hole, PulseCounts, analyze

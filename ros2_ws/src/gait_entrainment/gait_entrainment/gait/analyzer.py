@@ -27,26 +27,26 @@ from gait_entrainment.gait.strides import (
 from gait_entrainment.gait.verdict import Entrainment, EntrainmentTest, VerdictSettings
 
 Result = Stride | PulsePhase | Entrainment
-# Whose strides they are is not known here: ten times smaller or larger than a person's.
+# The walker's size is not known here: strides may be ten times shorter or longer than a person's.
 _ANYBODY = GaitLimits(stride_least=0.03, stride_most=50.0)
-# So many strides in a row that are known to be without a pulse are the pause before another train.
+# This many strides in a row known to have no pulse are the pause before another train.
 _PAUSE_STRIDES = 5
 
 
 @dataclass(slots=True)
 class PulseCounts:
-    """What became of the pulse onsets received."""
+    """Outcome of the pulse onsets received."""
 
     placed: int = 0  # in a stride, published
     without_lag: int = 0  # of those, the ones whose nearest toe-off is missing
     outside_strides: int = 0  # before stride 1, in a missed stride, or after the last stride
-    late: int = 0  # dropped: came after the promise that no such pulse would come
-    withdrawn: int = 0  # announced, then called off by a stop
+    late: int = 0  # dropped: arrived after the promise that no such pulse would follow
+    withdrawn: int = 0  # announced, then withdrawn by a stop
 
 
 @dataclass(frozen=True, slots=True, order=True)
 class Hole:
-    """A part of a run of which the record lacks something."""
+    """A part of a run in which the record lacks something."""
 
     start: int  # [ns]
     end: int  # [ns]
@@ -57,38 +57,38 @@ class GaitAnalyzer:
     """
     Analyzes one run of one perturbed leg, online.
 
-    Two inputs, in any interleaving: gait events, and promises about pulses. A stride comes out
-    with the heel strike that closes it. Its pulses come out, with the verdict at that stride,
-    once the promises reach that heel strike; if a pulse may be nearer to the next toe-off than
-    to its own, once the next stride is closed too. So results depend on the events and the onsets,
-    never on how events and promises interleave, except for a stop, which happens when it happens.
-    Lags are followed, and verdicts formed, since the latest of ``holes`` or of the trains began.
+    There are two inputs, interleaved in any way: gait events and promises about pulses. A stride
+    is returned with the heel strike that closes it. Its pulses follow, with the verdict at that
+    stride, once the promises reach that heel strike and, if a pulse may be nearer to the next
+    toe-off than to its own, the next stride is closed. So results depend on the events and the
+    onsets, never on how events and promises interleave, except for a stop, which acts on arrival.
+    Lags and verdicts start over after each of ``holes`` and with each train.
     """
 
     def __init__(
         self, side: Side, settings: VerdictSettings | None = None, strides_before: int = 0
     ) -> None:
         self._tracker = StrideTracker(side, _ANYBODY)
-        self._strides_before = strides_before  # of the leg in the run, which are of no interest
+        self._strides_before = strides_before  # of the leg in the run, not part of the analysis
         settings = settings or VerdictSettings()
         self._test = EntrainmentTest(settings)
         self._lags = LagFollower()
-        self._toe_offs = False  # whether a stride has shown one; settled by the first pulse
+        self._toe_offs = False  # whether a stride has had one; fixed at the first pulse
         self._unperturbed = UnperturbedPeriod()
         self._pause = self._unperturbed  # strides since the latest pulse
         self._strides: deque[Stride] = deque()  # closed, pulses not placed yet
         self._before: Stride | None = None  # the latest stride whose pulses are placed
         self._onsets: list[int] = []  # announced, not placed yet; ascending
-        self._promised = -math.inf  # no pulse before this instant will be added [ns]
+        self._promised = -math.inf  # no pulse before this time will be added [ns]
         self._finished = False
         self._numbers = PulseNumbers(settings.irregularity)
-        self._unknown: list[tuple[int, int]] = []  # spans in which pulses may have begun [ns]
+        self._unknown: list[tuple[int, int]] = []  # intervals with possible unseen pulses [ns]
         self.holes: list[Hole] = []
         self.pulse_counts = PulseCounts()
 
     @property
     def event_counts(self) -> EventCounts:
-        """What became of the events received so far."""
+        """Outcome of the events received so far."""
         return self._tracker.counts
 
     def add_event(self, event: GaitEvent) -> list[Result]:
@@ -101,9 +101,9 @@ class GaitAnalyzer:
 
     def add_promise(self, onsets: Iterable[int], valid_until: int) -> list[Result]:
         """
-        Take the onsets of pulses [ns], and the promise that none before an instant will follow.
+        Take pulse onsets [ns], and the promise that none before ``valid_until`` [ns] will follow.
 
-        An onset that was announced already is ignored; one that an earlier promise excludes is
+        An onset that was already announced is ignored; one that an earlier promise excludes is
         dropped and counted. Returns the results that this completes, in order.
         """
         for onset in onsets:
@@ -117,19 +117,19 @@ class GaitAnalyzer:
         return self._place()
 
     def add_hole(self, start: int, end: int) -> None:
-        """Take that it is not known which pulses began in [start, end) [ns], ahead of promises."""
+        """Note, ahead of promises, that pulses that began in [start, end) [ns] are unknown."""
         self._unknown.append((start, end))
         self.holes.append(Hole(start, end, "which pulses began"))
 
     def stop(self, stamp: int) -> None:
-        """Take a stop [ns]: no announced pulse begins from it on, and no promise goes beyond."""
+        """Take a stop [ns]: no announced pulse begins from then on, no promise extends beyond."""
         kept = bisect_left(self._onsets, stamp)
         self.pulse_counts.withdrawn += len(self._onsets) - kept
         del self._onsets[kept:]
         self._promised = min(self._promised, stamp)
 
     def finish(self) -> list[Result]:
-        """End the run: no more events or pulses. Returns the results that were waiting."""
+        """End the run: no more events or pulses. Returns the results that were pending."""
         self._promised = math.inf
         self._finished = True
         results = self._place()
@@ -156,13 +156,13 @@ class GaitAnalyzer:
     def _place_in(
         self, stride: Stride, after: Stride | None, onsets: Sequence[int]
     ) -> list[Result]:
-        """Place the pulses that began before the end of a stride; then ask for the verdict."""
+        """Place the pulses that began before the end of a stride, then form the verdict."""
         before = self._before
         number = self._strides_before if before is None else before.number
         if stride.number != number + 1:
             start = stride.start if before is None else before.end
             lost = f"{stride.number - number - 1} stride(s)"
-            self._begin_anew(Hole(start, stride.start, lost))
+            self._start_over(Hole(start, stride.start, lost))
             before = None
         if after is not None and after.number != stride.number + 1:
             after = None
@@ -175,14 +175,14 @@ class GaitAnalyzer:
             self._toe_offs |= stride.toe_off is not None
             self._lags = LagFollower(from_strikes=not self._toe_offs)
         pulses: list[PulsePhase] = []
-        judged = 0  # the first of them that neither a hole nor another train comes after
+        judged = 0  # the first of them after the latest hole or the start of another train
         for onset in onsets:
             latest = self._numbers.latest
             missing = self._numbers.place(onset, unperturbed.mean, anew=paused)
             paused = False
             if missing != 0:
                 hole = Hole(latest, onset, f"{missing} pulse(s)") if missing else None
-                self._begin_anew(hole, another_train=missing is None)
+                self._start_over(hole, another_train=missing is None)
                 judged = len(pulses)
             if onset < stride.start:
                 self.pulse_counts.outside_strides += 1
@@ -195,17 +195,17 @@ class GaitAnalyzer:
         unseen = any(s < stride.end and stride.start < e for s, e in self._unknown)
         if onsets or (unseen and self._numbers.number):
             self._pause = UnperturbedPeriod()
-        # Once it is not known whether pulses have begun, no stride is an unperturbed one.
+        # Once pulses may have begun unseen, no stride counts as unperturbed.
         elif self._numbers.number or not any(s < stride.end for s, _ in self._unknown):
             self._pause.periods.append(stride.end - stride.start)
         if unseen:
-            self._begin_anew(None)
+            self._start_over(None)
             return list(pulses)
         entrainment = self._test.add(stride, pulses[judged:], unperturbed)
         return [*pulses, entrainment] if entrainment else list(pulses)
 
-    def _begin_anew(self, hole: Hole | None, *, another_train: bool = False) -> None:
-        """Follow lags and form verdicts anew: after a hole, known already if None, or a train."""
+    def _start_over(self, hole: Hole | None, *, another_train: bool = False) -> None:
+        """Start lags and verdicts over: after a hole (None if already listed) or with a train."""
         self.holes += [hole] if hole else []
         self._lags = LagFollower(from_strikes=not self._toe_offs)
         self._test.restart(hole=not another_train)
@@ -232,11 +232,11 @@ def analyze(
     strides_before: int = 0,
 ) -> Analysis:
     """
-    Analyze a whole run of one perturbed leg offline, with the very class that runs online.
+    Analyze a whole run of one perturbed leg offline, with the same class that runs online.
 
-    Events come in the order in which they were received; onsets [ns] in any. It is ``unknown``
-    which pulses began from one instant to another [ns]. Of a part of a run so many strides of the
-    leg came before.
+    Events are in the order in which they were received; onsets [ns] are in any order. ``unknown``
+    are the intervals [ns] in which unknown pulses may have begun. If this is part of a run,
+    ``strides_before`` is the number of the leg's strides before it.
     """
     analyzer = GaitAnalyzer(side, settings, strides_before)
     for start, end in unknown:

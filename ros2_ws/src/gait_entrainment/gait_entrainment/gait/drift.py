@@ -11,28 +11,28 @@ from dataclasses import dataclass
 @dataclass(frozen=True, slots=True)
 class Drift:
     """
-    How a lag moves; all NaN, and nothing creeps, with fewer than three successive pulses.
+    How a lag moves; with fewer than three successive pulses all NaN, and not creeping.
 
-    The lag of an indifferent walker is a sum over strides: its spread grows with the number of
-    pulses, by drift and by wandering. That of a locked one does not. The scatter is alike: that of
+    The lag of an indifferent walker is a sum over strides, so its spread grows with the number of
+    pulses, by drift and by wandering; a locked one's does not. The scatter is alike: it is that of
     second differences, in which the drift cancels. Spread over scatter is von Neumann's ratio
     (1941), a test of a random walk by Sargan and Bhargava (1983), taken one difference higher.
     """
 
     slope: float  # of a least-squares line [s per stride]
-    half_width: float  # of its 95 % interval, were the lag a random walk [s per stride]
+    half_width: float  # of its 95 % interval if the lag is a random walk [s per stride]
     spread: float  # the steady drift that would give the lag's standard deviation [s per pulse]
     scatter: float  # standard deviation of the second differences / sqrt(2) [s]
-    creeps: bool  # moves smoothly, in its second half by over half as much as in the first
+    creeps: bool  # moves smoothly, in the second half by more than half as much as in the first
 
 
 def drift_of(strides: Sequence[float], numbers: Sequence[int], lags: Sequence[float]) -> Drift:
     """
-    Return the drift of ``lags`` [s] of pulses with ``numbers`` in ``strides``, of equal length.
+    Return the drift of ``lags`` [s] of the pulses ``numbers`` in ``strides``, of equal length.
 
-    A least-squares line through a random walk of n steps has a slope of variance 6/5 per n and
-    square of a step. The scatter is sqrt(pi) / 2 times the mean size of second differences, as for
-    normal noise; an outlier moves it less than their squares.
+    The slope of a least-squares line through a random walk of n steps has the variance of a step
+    times 6 / (5 n). The scatter is sqrt(pi) / 2 times the mean size of second differences, as for
+    normal noise; an outlier changes it less than it would change their squares.
     """
     n = len(lags)
     triples = zip(numbers, numbers[2:], lags, lags[1:], lags[2:], strict=False)

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Which gait events can be believed, and whether somebody walks at all.
+Which gait events are plausible, and whether the person is walking at all.
 
-A sensor counts twice, misses, or is knocked, and torque follows from what is believed here: the
-stride tracker asks about every event, in a node, in a simulation and in an analysis.
+A sensor may count twice, miss an event or be knocked, and torque follows from the events accepted
+here. The stride tracker checks every event, in a node, in a simulation and in an analysis.
 """
 
 import math
@@ -16,16 +16,16 @@ from dataclasses import dataclass, replace
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, Side
 from gait_entrainment.settings import Checked, setting, settings_of
 
-# Strides whose median is the person's own: enough that two wrong ones do not move it.
+# Number of strides in the person's own median: enough that two wrong ones do not move it.
 _OWN_STRIDES = 7
-# From so many strides on the median is known.
+# The median is known from this many strides on.
 _KNOWN_STRIDES = 3
 
 
 @dataclass(frozen=True)
 class GaitLimits(Checked):
     """
-    What a stride can be.
+    Limits of plausible strides.
 
     The absolute bounds are those of slow walking after stroke and of running, with a margin
     (Perry and Burnfield, Gait Analysis, 2010). From stride to stride a healthy adult varies by 1
@@ -34,27 +34,27 @@ class GaitLimits(Checked):
 
     stride_least: float = setting(0.3, "shortest stride", "s", (1e-6, 1e6))
     stride_most: float = setting(5.0, "longest stride", "s", (1e-6, 1e6))
-    stride_change: float = setting(0.4, "change from the own median", "1", (0.01, 1.0))
+    stride_change: float = setting(0.4, "change from the person's median", "1", (0.01, 1.0))
     silence: float = setting(1.5, "strides without a strike that end a gait", "1", (1.05, 10.0))
     baseline_spread: float = setting(0.15, "deviation of baseline strides", "1", (0.001, 1.0))
 
     def scaled(self, factor: float) -> "GaitLimits":
-        """Return the limits with their times multiplied, as far as a setting allows."""
-        told = settings_of(type(self))
+        """Return the limits with their times multiplied, as far as the settings allow."""
+        bounds = settings_of(type(self))
         times = {
-            name: min(max(getattr(self, name) * factor, told[name].least), told[name].most)
+            name: min(max(getattr(self, name) * factor, bounds[name].least), bounds[name].most)
             for name in ("stride_least", "stride_most")
         }
         return replace(self, **times)
 
 
 class GaitWatch:
-    """Knows the strides of a person's leg; says which can be, and when the gait has stopped."""
+    """Tracks the strides of a person's leg: which are plausible, and when the gait has stopped."""
 
     def __init__(self, side: Side, limits: GaitLimits) -> None:
         self.side, self.limits = side, limits
-        self._latest: int | None = None  # heel strike of the leg that was believed last [ns]
-        self._own: deque[float] = deque(maxlen=_OWN_STRIDES)  # periods that were believed [s]
+        self._latest: int | None = None  # the latest accepted heel strike of the leg [ns]
+        self._own: deque[float] = deque(maxlen=_OWN_STRIDES)  # accepted periods [s]
 
     @property
     def median(self) -> float:
@@ -62,23 +62,23 @@ class GaitWatch:
         return statistics.median(self._own) if len(self._own) >= _KNOWN_STRIDES else math.nan
 
     def believes(self, strides: float, elapsed: int) -> bool:
-        """Whether so many strides, not necessarily whole ones, can have taken so long [ns]."""
+        """Whether this many strides, not necessarily whole ones, can have taken this long [ns]."""
         limits, median, seconds = self.limits, self.median, elapsed / NANOSECONDS_PER_SECOND
         least, most = limits.stride_least, limits.stride_most
         if not math.isnan(median):
             factor = max(1 - limits.stride_change, 1e-9)
             least, most = max(least, factor * median), min(most, median / factor)
-        # Of less than a stride only the end is bounded: its parts are anybody's own.
+        # Less than a stride is bounded only from above: how its parts are timed is individual.
         return (strides < 1 or least * strides <= seconds) and seconds <= most * max(strides, 1)
 
     def add(self, strike: int, period: float | None) -> None:
-        """Take a believed heel strike [ns], and the period [s] of the stride that it closes."""
+        """Take an accepted heel strike [ns], and the period [s] of the stride that it closes."""
         self._latest = strike
         if period is not None:
             self._own.append(period)
 
     def stopped(self, now: int, expected: float = math.inf) -> str:
-        """Return why nobody walks at an instant [ns], or ""; a first stride is as ``expected``."""
+        """Return why the gait has stopped, or ""; the first stride may take ``expected`` [s]."""
         if self._latest is None:
             return ""
         stride = statistics.median(self._own or [min(self.limits.stride_most, expected)])

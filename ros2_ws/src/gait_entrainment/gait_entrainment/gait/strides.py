@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Gait events and the strides of one leg; events may be missing, doubled or out of order."""
+"""Gait events and the strides of one leg; events may be missing, repeated or out of order."""
 
 import math
 import statistics
@@ -12,11 +12,11 @@ from gait_entrainment.gait.plausibility import GaitLimits, GaitWatch
 
 # Heel strike and toe-off of each leg.
 PLACES = 4
-# Three strides: by then torque has ended, as if nobody walked.
+# Three strides: by then torque has ended, as it does when the person stops.
 CONVINCING_PLACES = 3 * PLACES
 
-# How many places of the gait are remembered, four strides: enough to tell an event that comes
-# twice from one that comes late, and a bound on memory if a leg's strikes stop coming.
+# Number of places of the gait that are remembered, four strides: enough to tell a repeated event
+# from a late one, and a bound on memory if a leg's strikes stop arriving.
 REMEMBERED_PLACES = 16
 
 
@@ -26,15 +26,15 @@ class GaitEvent:
     A heel strike or a toe-off.
 
     Step numbers identify events, whatever order they arrive in: heel strike n closes step n, and
-    the toe-off of step n is the one that begins its swing, between heel strikes n - 1 and n. Both
-    are of the leg that swings. A run starts with heel strike 0. A source must number its steps so.
+    the toe-off of step n begins its swing, between heel strikes n - 1 and n. Both belong to the
+    swing leg. A run starts with heel strike 0. A source must number its steps this way.
     """
 
-    stamp: int  # instant of the event [ns since the start of the run]
+    stamp: int  # time of the event [ns since the start of the run]
     kind: EventKind
     side: Side  # the leg that strikes or leaves the ground
     step: int
-    uncertainty: float = 0.0  # standard deviation of the stamp [s]; 0 where it is exact
+    uncertainty: float = 0.0  # standard deviation of the stamp [s]; 0 if it is exact
 
     @property
     def place(self) -> int:
@@ -44,7 +44,7 @@ class GaitEvent:
 
 @dataclass(frozen=True, slots=True)
 class Stride:
-    """One stride of a leg: from its heel strike to its next."""
+    """One stride of a leg: from one of its heel strikes to the next."""
 
     number: int  # stride 1 starts at the leg's first heel strike of the run
     side: Side
@@ -52,7 +52,7 @@ class Stride:
     end: int  # heel strike that closes it [ns]
     toe_off: int | None  # toe-off of the leg within it [ns]; None if it is missing
     step_periods: tuple[float, float]  # [s], in order; NaN if the strike between is missing
-    toe_off_uncertainty: float = 0.0  # standard deviation of its stamp [s]; without, of ``end``
+    toe_off_uncertainty: float = 0.0  # standard deviation of its stamp [s]; if missing, ``end``'s
 
     @property
     def period(self) -> float:
@@ -62,29 +62,29 @@ class Stride:
 
 @dataclass(slots=True)
 class EventCounts:
-    """What became of the events received, for people who must judge the source."""
+    """Outcome of the events received, for judging the source."""
 
     accepted: int = 0
     out_of_order: int = 0  # accepted after an event that is later in the gait
     repeated: int = 0  # dropped: the same event again
-    late: int = 0  # dropped: what it belongs to had been closed or given up
+    late: int = 0  # dropped: the stride that it belongs to was already closed or given up
     contradictory: int = 0  # dropped: stamp, side or step disagree with the events before
-    implausible: int = 0  # dropped: no stride of this person lasts so long, or so short
+    implausible: int = 0  # dropped: too long or too short for a stride of this person
     missing: int = 0  # places of the gait, up to the latest, whose event was not accepted
     missed_strides: int = 0  # strides without one of their two heel strikes
 
 
 class StrideTracker:
     """
-    Closes the strides of one leg as its heel strikes come in.
+    Closes the strides of one leg as its heel strikes arrive.
 
-    An event is placed by its step number, so that a missing event changes no other stride's
-    number. Out of order is fine until the leg's next heel strike, which closes one stride and
-    gives up those that still lack a bound. The side of step 0 is taken from the first event. If
-    two events contradict each other, the first to come is believed; and each only if the strides
-    since those before can have taken so long. Three strides of events that fit together, but not
-    what was believed, are believed from then on: no single wrong event silences all that follow.
-    None of them may lie before the end of a stride that was told, in place or in stamp.
+    Events are placed by step number, so a missing event does not change another stride's number.
+    They may be out of order until the leg's next heel strike, which closes one stride and gives up
+    those that still lack a bound. The side of step 0 is taken from the first event. If two events
+    contradict each other, the first to arrive is accepted. Any event is accepted only if the
+    strides since earlier ones can have taken that long. Three strides of events that agree with
+    each other but not with those accepted replace them, so a single wrong event does not block all
+    that follow. None of them may lie before the end of a returned stride, in place or in stamp.
     """
 
     def __init__(self, side: Side, limits: GaitLimits | None = None) -> None:
@@ -95,15 +95,15 @@ class StrideTracker:
         self.latest_strike: int | None = None  # its stamp [ns]
         self._first_step: int | None = None  # step that the leg's first heel strike closes
         self._stamps: dict[int, int] = {}  # remembered events: place -> stamp
-        self._toe_off: GaitEvent | None = None  # of the leg, the latest
+        self._toe_off: GaitEvent | None = None  # the leg's latest
         self._latest_place = -1
         self._strike_place = -1
         self._rival: StrideTracker | None = None  # of dropped events that fit together
         self._closed = (0, -math.inf)  # place and stamp of the latest strike that closed a stride
 
     def add(self, event: GaitEvent, now: float = math.inf) -> Stride | None:
-        """Take one event, none stamped after ``now`` [ns]; return the stride that it closes."""
-        if event.stamp > now:  # has not happened, so it never convinces
+        """Take one event, dropped if later than ``now`` [ns]; return the stride that it closes."""
+        if event.stamp > now:  # has not happened, so it is never convincing
             self.counts.implausible += 1
             return None
         fate = self._fate(event)
@@ -131,7 +131,7 @@ class StrideTracker:
         return self._strike(event, self._first_step)
 
     def _fate(self, event: GaitEvent) -> str:
-        """Return "accepted", or as what the event must be dropped: a field of EventCounts."""
+        """Return "accepted", or why the event must be dropped: a field of EventCounts."""
         place, stamp = event.place, event.stamp
         # Sides alternate with the steps.
         if place < 0 or self._first_step not in (None, self._first_step_if(event)):
@@ -146,14 +146,14 @@ class StrideTracker:
         return "accepted" if self._believes(place, stamp) else "implausible"
 
     def _believes(self, place: int, stamp: int) -> bool:
-        """Whether the strides since the latest event a stride or more before can be."""
+        """Whether the strides since the latest event at least a stride before are plausible."""
         earlier = [p for p in self._stamps if p <= place - PLACES] or list(self._stamps)[:1]
         since = max(earlier, default=place)
         elapsed = stamp - self._stamps.get(since, stamp)
         return self.watch.believes((place - since) / PLACES, elapsed)
 
     def _doubt(self, event: GaitEvent) -> Stride | None:
-        """Drop an event, unless three strides of such fit together: then go on with those."""
+        """Drop an event, unless three strides of such events agree: then go on with those."""
         if event.place < self._closed[0] or event.stamp < self._closed[1]:
             return None
         if self._rival is None or self._rival._fate(event) != "accepted":
@@ -162,7 +162,7 @@ class StrideTracker:
         if self._rival.counts.accepted <= CONVINCING_PLACES:
             return None
         self.__dict__.update(self._rival.__dict__, counts=self.counts)
-        counts = self.counts  # those of places that were wrong are void
+        counts = self.counts  # those of the wrong places are void
         counts.missing = max(self._latest_place + 1 - counts.accepted, 0)
         counts.missed_strides = min(counts.missed_strides, self.stride_in_progress)
         return stride
@@ -172,7 +172,7 @@ class StrideTracker:
         return event.step % 2 if event.side == self.side else 1 - event.step % 2
 
     def _strike(self, event: GaitEvent, first_step: int) -> Stride | None:
-        """Take a heel strike of the leg, the latest so far: close one stride or give some up."""
+        """Take the leg's latest heel strike: close one stride or give some up."""
         started, start = self.stride_in_progress, self.latest_strike
         closed = (event.step - first_step) // 2  # number of the stride that ends here
         self.stride_in_progress, self.latest_strike = closed + 1, event.stamp
@@ -201,7 +201,7 @@ class UnperturbedPeriod:
         self.standard_error = math.nan  # of the mean [s]; NaN with one stride
 
     def settle(self, limits: GaitLimits) -> None:
-        """Set the figures, from the strides that their median allows: a pause is none of them."""
+        """Set the figures from the strides near enough to their median, so without pauses."""
         own = statistics.median(self.periods or [0]) * (1 - limits.stride_change)
         kept = [p for p in self.periods if own <= p <= own / (1 - limits.stride_change) ** 2]
         n, total = len(kept), sum(kept)

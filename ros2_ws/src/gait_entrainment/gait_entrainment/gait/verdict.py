@@ -7,8 +7,8 @@ The entrainment verdict: the gait is shown to follow the pulses, or shown not to
 The lag of an indifferent walker is a random walk: each stride adds pulse period minus stride
 period, so it drifts by D, their mean difference, and wanders with the noise of the strides. The
 lag of a locked walker is stationary. So the gait is entrained if the lag stays put: if its spread
-is small compared with what D would make of it, and with what wandering would. That the slope of
-the lag does not differ from zero is a failure to reject, and calls noise entrained.
+is small compared with that due to D and that due to wandering. A slope of the lag that does not
+differ from zero is only a failure to reject, and would call noise entrained.
 """
 
 import cmath
@@ -34,43 +34,43 @@ class Verdict(enum.IntEnum):
     ENTRAINED = 1  # the lag is shown to stay put, for several strides
     DRIFTING = 2  # drift shown not to be small, never entrained before
     LOST = 3  # drift shown not to be small, entrained before
-    UNTESTABLE = 4  # no number of such pulses could tell
+    UNTESTABLE = 4  # no number of such pulses could decide it
 
 
 class Reason(enum.IntEnum):
-    """Why nothing is claimed."""
+    """Why no claim is made."""
 
-    NONE = 0  # something is: entrained, drifting or lost
-    FEW_PULSES = 1  # fewer than the window takes
-    HOLE = 2  # the same, since the record has a hole
+    NONE = 0  # a claim is made: entrained, drifting or lost
+    FEW_PULSES = 1  # fewer than the window needs
+    HOLE = 2  # the same, because of a hole in the record
     UNCLEAR = 3  # the lag neither stays put nor is shown to drift
-    CREEPING = 4  # the lag moves on smoothly: a slow passage, or an approach that is not over
-    TOO_CLOSE = 5  # pulse period and unperturbed period, to tell them apart
+    CREEPING = 4  # the lag keeps moving smoothly: a slow passage, or an unfinished approach
+    TOO_CLOSE = 5  # pulse period and unperturbed period are too close to tell apart
     BASELINE_UNKNOWN = 6  # fewer than two complete strides before the first pulse
-    NOT_ONE_TO_ONE = 7  # pulses at another rate than one a stride
+    NOT_ONE_TO_ONE = 7  # pulses at a rate other than one per stride
 
 
 @dataclass(frozen=True)
 class VerdictSettings(Checked):
     """
-    Every number in the verdict; raises SettingError for one that is out of range.
+    Every number in the verdict; raises SettingError if one is out of range.
 
-    D is the difference between pulse period and unperturbed period; a spread of the lag is told as
-    the steady drift per stride that would cause it.
+    D is the difference between pulse period and unperturbed period. A spread of the lag is given
+    as the steady drift per stride that would cause it.
     """
 
     window: int = setting(20, "fewest pulses judged at a time", "1", (5, 1000))
     longest_window: int = setting(40, "most pulses judged at a time", "1", (5, 1000))
-    judged_from: int = setting(25, "pulses that make do for a longer window", "1", (5, 1000))
+    judged_from: int = setting(25, "pulses that suffice for a longer window", "1", (5, 1000))
     window_deviations: float = setting(
-        100.0, "drift by D over the window, in deviations of the baseline", "1", (1.0, 1e4)
+        100.0, "drift by D over the window / deviation of the baseline", "1", (1.0, 1e4)
     )
-    spread_margin: float = setting(0.35, "spread of an entrained lag, by D", "1", (0.01, 1.0))
-    scatter_margin: float = setting(0.32, "the same, by the lag's scatter", "1", (0.01, 1.0))
-    quiet_margin: float = setting(0.12, "spread that is always small, by D", "1", (0.001, 1.0))
-    drift_margin: float = setting(0.25, "slope of a lag that drifts, by D", "1", (0.01, 1.0))
+    spread_margin: float = setting(0.35, "spread of an entrained lag / D", "1", (0.01, 1.0))
+    scatter_margin: float = setting(0.32, "the same / scatter of the lag", "1", (0.01, 1.0))
+    quiet_margin: float = setting(0.12, "spread that is always small / D", "1", (0.001, 1.0))
+    drift_margin: float = setting(0.25, "slope of a drifting lag / D", "1", (0.01, 1.0))
     period_margin: float = setting(
-        0.25, "mean stride period of an entrained gait minus pulse period, by D", "1", (0.01, 1.0)
+        0.25, "(mean stride period - pulse period) / D of an entrained gait", "1", (0.01, 1.0)
     )
     successive: int = setting(5, "successive strides that must pass", "1", (1, 1000))
     smallest_difference: float = setting(0.002, "smallest testable D", "s", (0.0, 1.0))
@@ -78,14 +78,14 @@ class VerdictSettings(Checked):
         2.0, "the same in standard errors of the unperturbed period", "1", (0.0, 100.0)
     )
     largest_difference: float = setting(
-        0.25, "largest D at one pulse a stride, by the unperturbed period", "1", (0.01, 0.5)
+        0.25, "largest D at one pulse per stride / unperturbed period", "1", (0.01, 0.5)
     )
-    irregularity: float = setting(0.0, "by which intervals of pulses differ", "s", (0.0, 100.0))
+    irregularity: float = setting(0.0, "planned variation of pulse intervals", "s", (0.0, 100.0))
     stretch_tolerance: float = setting(
         0.010, "distance from the final lag of an entrained stride", "s", (0.0, 1.0)
     )
     stretch_tolerance_deviations: float = setting(
-        2.0, "the same in standard deviations of the lag, if that is more", "1", (0.0, 10.0)
+        2.0, "the same in standard deviations of the lag, if larger", "1", (0.0, 10.0)
     )
 
 
@@ -95,8 +95,8 @@ class Entrainment:
 
     verdict: Verdict
     reason: Reason
-    stretch: int  # of pulses of one train without a hole between them, from 1
-    stride: int  # stride at which the question was asked
+    stretch: int  # number, from 1, of the pulses of one train without a hole between them
+    stride: int  # stride at which the verdict was formed
     stamp: int  # heel strike that closes it [ns]
     since_stride: int  # stride since which this verdict has held
     unperturbed_period: float  # mean stride period before the first pulse [s]; NaN if unknown
@@ -105,7 +105,7 @@ class Entrainment:
     mean_period: float  # mean stride period over the window [s]
     drift: float  # slope of the unwrapped lag [s per stride]; NaN with fewer than three pulses
     drift_interval: float  # half width of its 95 % interval [s per stride]
-    window: int  # pulses that the verdict takes
+    window: int  # pulses that the verdict needs
     spread: float  # of the lag, as the steady drift that would spread it as much [s per stride]
     scatter: float  # of the lag from pulse to pulse [s]; NaN with fewer than three pulses
     phase_locking_value: float  # length of the mean phase vector, 0 to 1; reported, not used
@@ -116,12 +116,12 @@ class _Outliers:
     """
     Finds the last value of a growing sequence above any level, in logarithmic time.
 
-    Keeps the values that no later one exceeds: those decrease, and the last value above a level
+    It keeps the values that no later one exceeds. These decrease, and the last value above a level
     is among them. An entrained lag leaves a handful; only a steady drift keeps them all.
     """
 
     def __init__(self) -> None:
-        self._falling: list[float] = []  # negated: ascending, as bisect wants them
+        self._falling: list[float] = []  # negated, hence ascending as bisect requires
         self._positions: list[int] = []
 
     def add(self, value: float, position: int) -> None:
@@ -139,11 +139,11 @@ class _Outliers:
 
 class EntrainmentTest:
     """
-    Forms the verdict anew at each stride that brings pulses.
+    Forms a new verdict at each stride with pulses.
 
-    A stride without a pulse says nothing new about the pulses and is not asked: so the verdict
-    stands still after the last pulse, and washout does not lose it. The work per stride depends
-    on the window, not on the length of the run.
+    A stride without a pulse adds nothing about the pulses and is skipped, so the verdict stays
+    after the last pulse and washout does not lose it. The work per stride depends on the window,
+    not on the length of the run.
     """
 
     def __init__(self, settings: VerdictSettings) -> None:
@@ -168,7 +168,7 @@ class EntrainmentTest:
     def add(
         self, stride: Stride, pulses: Sequence[PulsePhase], unperturbed: UnperturbedPeriod
     ) -> Entrainment | None:
-        """Take one stride with its pulses; returns None if none of them has a lag."""
+        """Take one stride with its pulses; return None if none of them has a lag."""
         placed = [pulse for pulse in pulses if not math.isnan(pulse.phase_lag)]
         if not placed:
             return None
@@ -218,14 +218,14 @@ class EntrainmentTest:
         )
 
     def _size(self, difference: float, deviation: float) -> int:
-        """Return how many pulses tell drift from wandering; difference and deviation in s."""
+        """Return how many pulses it takes to tell drift from wandering; arguments in s."""
         settings, longest = self._settings, self._window.maxlen or 0
         if not deviation * settings.window_deviations < longest * difference:
             return settings.window if math.isnan(deviation) else longest
         return max(settings.window, math.ceil(settings.window_deviations * deviation / difference))
 
     def _untestable(self, difference: float, unperturbed: UnperturbedPeriod) -> Reason:
-        """Return why no number of such pulses could tell; NONE if it could."""
+        """Return why no number of such pulses could decide; NONE if they could."""
         settings = self._settings
         if math.isnan(unperturbed.standard_error):
             return Reason.BASELINE_UNKNOWN
@@ -239,7 +239,7 @@ class EntrainmentTest:
     def _judge(
         self, drift: Drift, difference: float, *, near: bool, full: bool
     ) -> tuple[Verdict, Reason]:
-        """Return what can be claimed of a window if the mean stride is near the pulse period."""
+        """Return the claim for a window; ``near``: mean stride period and pulse period agree."""
         settings = self._settings
         if not full:
             self._passed = 0
@@ -276,7 +276,7 @@ def _mean_period(start: int, end: int, count: int) -> float:
 
 
 def _phase_locking_value(window: Sequence[PulsePhase]) -> float:
-    # Not sum(): its last bits differ from Python 3.14 on, and a replay must give the same.
+    # Not sum(): its last bits differ from Python 3.14 on, and a replay must give the same bits.
     total = 0j
     for pulse in window:
         total += cmath.exp(2j * math.pi * pulse.phase)

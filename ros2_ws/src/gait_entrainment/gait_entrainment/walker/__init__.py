@@ -4,15 +4,15 @@
 """
 The exact walker (docs/model.md).
 
-    model           the parameters, prepared
+    model           the parameters, prepared for the compiled functions
     single_stance   the inverted pendulum: elliptic integrals
     segment         state between switches, energy, time as a quadrature
-    location        the quadrature, inverted: where at a given time
+    location        position at a given time: the inverse of the quadrature
     transitions     guards and resets
     trajectory      the loop from switch to switch
-    sampling        posture, torques, forces at any instant
+    sampling        posture, torques and forces at any time
     promise         the torque promised by the ankle robot
-    walker          all of it in time
+    walker          the walker itself, advanced in time
 """
 
 from gait_entrainment.walker.sampling import Samples

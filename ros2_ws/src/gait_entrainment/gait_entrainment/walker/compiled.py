@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-How the walker's functions are compiled: numba, kept on disk, to the bit the same every time.
+Compile the walker's functions with numba, cached on disk and reproducible to the bit.
 
-No fastmath: it would let the compiler reorder sums, differently in every place a function is
-inlined, and the walker's results are promised to the bit. Division follows IEEE (a panel that runs
-into a stall yields infinity or NaN and is refused there) instead of raising, which is also what
-lets loops run in vector registers.
+Without fastmath, because it would let the compiler reorder sums differently wherever a function is
+inlined, and the walker's results are promised to the bit. Division follows IEEE instead of raising
+(a panel that runs into a stall yields infinity or NaN and is rejected there), which also allows
+loops to be vectorized.
 """
 
 import contextlib
@@ -26,16 +26,16 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 def _load_numba() -> Any:
     """
-    Load numba without what the walker has no use for, which would slow the start of a command.
+    Import numba without modules that the walker does not need and that slow a command's start.
 
-    Numba uses coverage only while that measures, and scipy's BLAS only for products of matrices.
-    A None among the modules is how Python is told not to find one.
+    Numba uses coverage only while coverage is measured, and scipy's BLAS only for matrix products.
+    A None in `sys.modules` makes the import of a module fail.
     """
     hidden = [name for name in ("coverage", "scipy.linalg") if name not in sys.modules]
     sys.modules.update(dict.fromkeys(hidden))  # type: ignore[arg-type]
     try:
         import numba
-        import numba.np.arraymath  # what looks for BLAS; else it would be loaded at the first step
+        import numba.np.arraymath  # looks for BLAS; otherwise it would do so at the first step
     finally:
         for name in hidden:
             del sys.modules[name]
@@ -48,11 +48,11 @@ config = numba.config
 
 def _cache_folder() -> str:
     """
-    Return the folder for the machine code of these very sources; an empty text if there is none.
+    Return the folder for the machine code of exactly these sources, or "" if there is none.
 
-    Numba drops a kept function only if that function's own file changes. Ours are inlined into one
-    another across files, so each state of all the sources has a folder of its own: where
-    NUMBA_CACHE_DIR says, beside the sources, or in the user's cache.
+    Numba discards a cached function only if that function's own file changes. Ours are inlined
+    into each other across files, so each state of the sources has its own folder: in
+    NUMBA_CACHE_DIR if that is set, next to the sources, or in the user's cache.
     """
     here = Path(__file__).parent
     digest = hashlib.sha256()
@@ -68,8 +68,8 @@ def _cache_folder() -> str:
         if os.access(folder, os.W_OK):
             return str(folder)
     warnings.warn(
-        "The walker is compiled anew in every process, since its machine code cannot be kept: set"
-        " NUMBA_CACHE_DIR to a folder that can be written.",
+        "The walker is recompiled in every process because its machine code cannot be cached. Set"
+        " NUMBA_CACHE_DIR to a writable folder.",
         stacklevel=2,
     )
     return ""
@@ -79,11 +79,11 @@ CACHE_FOLDER = _cache_folder()
 
 
 def compiled(function: Function) -> Function:
-    """Compile at the first call, and keep the machine code on disk for the next process."""
+    """Compile on the first call, and cache the machine code on disk for the next process."""
     before, config.CACHE_DIR = config.CACHE_DIR, CACHE_FOLDER
     try:
-        kept = CACHE_FOLDER != ""
-        dispatcher: Any = numba.njit(cache=kept, nogil=True, error_model="numpy")(function)
+        cached = CACHE_FOLDER != ""
+        dispatcher: Any = numba.njit(cache=cached, nogil=True, error_model="numpy")(function)
     finally:
         config.CACHE_DIR = before
     return cast(Function, dispatcher)

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Where in a segment the walker is at a given time: the quadrature, inverted.
+The walker's position in a segment at a given time: the inverse of the quadrature.
 
-A quintic through value, velocity and acceleration at both ends is a first guess. One quadrature
-tells the time at the guess, and the rest of the way is a second-order Taylor step in time, whose
-error is the cube of the time left.
+A quintic through value, velocity and acceleration at both ends gives a first guess. One quadrature
+gives the time at the guess, and a second-order Taylor step in time covers the rest. Its error goes
+with the cube of the time left.
 """
 
 from typing import Final
@@ -23,10 +23,10 @@ from gait_entrainment.walker.segment import (
 )
 from gait_entrainment.walker.single_stance import pendulum_time
 
-# A Taylor step this short [s] misses by less than 1e-17: the cube, times a jerk of up to 10 / s^3.
+# A Taylor step this short [s] is off by less than 1e-17: its cube times a jerk of up to 10 / s^3.
 LAST_STEP: Final = 1e-6
 
-# Bisection alone would need 60 halvings; Newton steps between them can only be quicker.
+# Bisection alone would need 60 halvings; Newton steps in between can only be faster.
 MOST_STEPS: Final = 100
 
 
@@ -57,7 +57,7 @@ def quintic(span: float, elapsed: float, start: Motion, end: Motion) -> float:
 
 @compiled
 def position_at(model: Model, work: Floats, segment: Segment, elapsed: float) -> float:
-    """Position after `elapsed` seconds of the segment, held within its ends."""
+    """Position after `elapsed` seconds of the segment, clamped to its ends."""
     low, high = segment.position, segment.end
     if elapsed <= 0.0:
         return low

@@ -4,13 +4,13 @@
 """
 The walker's parameters in the form that the compiled functions take.
 
-Speeds enter them squared, through one conserved number, `apex`: the squared angular velocity that
-the mass would have at the apex if no torque acted any more [1/s^2], negative if it would not get
-there. So, with h = 1 - cos(theta),
+Speeds enter squared, through one conserved quantity, `apex`: the squared angular velocity [1/s^2]
+that the mass would have at the apex if no further torque acted, negative if it would not get
+there. With h = 1 - cos(theta),
 
-    theta_dot^2 = apex + (2 g / L) h(theta),    d apex = 2 T d psi / (m L^2),
+    theta_dot^2 = apex + (2 g / L) h(theta),    d apex = 2 T d psi / (m L^2).
 
-constant in single stance, and in double stance the spring's work is a parabola in psi.
+`apex` is constant in single stance. In double stance the spring's work is a parabola in psi.
 """
 
 from typing import Any, Final, Protocol, cast
@@ -24,9 +24,9 @@ from gait_entrainment.parameters import WalkerParameters
 Floats = NDArray[np.float64]
 Stamps = NDArray[np.int64]
 
-# Gauss-Legendre nodes of one panel of double stance, and of a whole single stance. At Table 1 the
-# Legendre coefficients of the whole unperturbed double stance fall by 3 each, so 20 nodes leave
-# 3^-40 of it; those of single stance, which comes near a stall at the apex, fall by 2.2 each.
+# Gauss-Legendre nodes of one panel of double stance, and of a whole single stance. With Table 1
+# the Legendre coefficients of the whole unperturbed double stance fall by a factor of 3 each, so
+# 20 nodes leave 3^-40. In single stance, which is near a stall at the apex, they fall by 2.2 each.
 PANEL_NODES = 20
 SINGLE_STANCE_NODES = 28
 
@@ -35,20 +35,20 @@ NODES: Final = 0
 WEIGHTS: Final = 1
 TAILS: Final = 2
 
-# A panel is accepted if its last two Legendre coefficients are this small beside its mean. They
-# fall like rho^-n and the quadrature error like rho^-2n, so the error is then about their square.
+# A panel is accepted if its last two Legendre coefficients are this small relative to its mean.
+# They fall as rho^-n and the quadrature error as rho^-2n, so the error is about their square.
 TAIL_TOLERANCE = 1e-8
 
-# Pulses up to this fraction of the peak torque are cleared of fly-off by two numbers made once.
+# For pulses up to this fraction of the peak torque, two precomputed numbers can rule out fly-off.
 BOUNDED_PULSE = 0.25
 
-# The bounds that clear a segment without a search are minima on a grid of this many points. What
-# they must leave is far above what a minimum between two points can hide.
+# The bounds that clear a segment without a search are minima on a grid of this many points. The
+# required margin is far larger than what a minimum between two points can hide.
 BOUND_POINTS = 1025
 BOUND_MARGIN = 1e-3  # of the weight, and of the squared rate g / L
 
-# Constants are made in extended precision if the machine has it: an error in the last bit of a
-# constant would add up over the steps, one of the arithmetic averages out.
+# Constants are computed in extended precision if the machine has it: an error in the last bit of
+# a constant would add up over the steps, whereas rounding errors of the arithmetic average out.
 Extended: Any = np.longdouble
 PI: Any = Extended("3.14159265358979323846264338327950288")
 
@@ -57,10 +57,10 @@ class Model(Protocol):
     """
     Constants of one walker. Positions in double stance are psi, in single stance -theta.
 
-    In single stance, and in what gravity does, theta counts from the vertical; in the linkage from
-    the normal of the ground. Only on a slope do the two differ. `apex` is the squared rate that
-    the walker would have at the apex; a hold is the force on the leading or stance leg without the
-    centrifugal part of `apex`.
+    In single stance, and for gravity, theta is measured from the vertical; in the linkage, from
+    the ground's normal. The two differ only on a slope. `apex` is the squared rate that the walker
+    would have at the apex; a hold is the force on the leading or stance leg without the
+    centrifugal part due to `apex`.
     """
 
     mass: float
@@ -75,29 +75,29 @@ class Model(Protocol):
     toe_off_position: float
     swing_hip: float  # angle of the trailing leg at toe-off
     swing_hip_slope: float  # its rate there, per unit of progress through single stance
-    swing_ankle_slope: float  # and that of the ankle
+    swing_ankle_slope: float  # the same for the ankle
     per_energy: float  # squared rate per energy, 2 / (m L^2)
     per_drop: float  # squared rate per relative height, 2 g / L
-    strike_gain: float  # squared rate right before heel strike over that at the apex
-    start_gain: float  # the same right after it: uphill the new leading leg leans further
+    strike_gain: float  # squared rate right before heel strike minus that at the apex
+    start_gain: float  # the same right after it; uphill the new leading leg leans further
     slope_sine: float  # of the angle by which the ground rises
     slope_cosine: float
-    restitution: float  # squared rate after a collision over that before it
+    restitution: float  # squared rate after a collision divided by that before it
     start_apex: float  # `apex` right after a collision in the period-one gait
     toe_off_half_sine: float  # sin(theta / 2)^2 at toe-off
     strike_hold: float  # right before heel strike
     rule: Floats  # Gauss-Legendre, rows: nodes, weights, weights of the last two coefficients
     whole_double_stance: Floats  # unperturbed, rows: gain in squared rate, weights
-    whole_double_stance_apex: float  # from this `apex` on up that quadrature has converged
+    whole_double_stance_apex: float  # from this `apex` up, that quadrature has converged
     whole_single_stance: Floats  # the same for a whole single stance
     whole_single_stance_apex: float
     least_gain: float  # least gain in squared rate over the unperturbed double stance
     least_hold: float  # over the unperturbed double stance
     bounded_pulse: float
-    bounded_hold: float  # the least with a pulse of `bounded_pulse` from heel strike on
+    bounded_hold: float  # the least hold with a pulse of `bounded_pulse` from heel strike on
 
 
-# One record in memory, of which the compiled functions hand on the address only.
+# One record in memory; the compiled functions pass on only its address.
 _SHAPES: Final[dict[str, tuple[int, ...]]] = {
     "rule": (4, PANEL_NODES),
     "whole_double_stance": (2, PANEL_NODES),
@@ -117,8 +117,8 @@ def _gauss_legendre(count: int) -> Floats:
     """
     Rows: nodes, weights, and the weights that give the last two Legendre coefficients.
 
-    numpy's nodes are good to rounding, but near the ends its weights only to 1e-13; one Newton
-    step in extended precision mends both.
+    numpy's nodes are accurate to rounding, but its weights near the ends only to 1e-13. Newton
+    steps in extended precision improve both.
     """
     nodes = np.polynomial.legendre.leggauss(count)[0].astype(Extended)
     for _ in range(2):
@@ -133,10 +133,10 @@ def _gauss_legendre(count: int) -> Floats:
 
 def _converged_apex(whole: Floats, rule: Floats) -> float:
     """
-    Least `apex` from which on up a fixed quadrature (rows: gain, weights) has converged.
+    Least `apex` from which up a fixed quadrature (rows: gain, weights) has converged.
 
-    The slower the walk, the closer the integrand's singularity; so the first of these speeds (from
-    a stall up, by 5 %) that a panel would accept, and every later one too.
+    The slower the walk, the closer the integrand's singularity. So this is the first value, going
+    up from a stall in steps of 5 %, that a panel would accept along with all larger ones.
     """
     gain, weights = whole
     apexes = np.geomspace(1e-3, 1e4, 331) * np.ptp(gain) - gain.min()
@@ -148,7 +148,7 @@ def _converged_apex(whole: Floats, rule: Floats) -> float:
 
 
 class _Extended:
-    """The parameters of a walker on a slope, and functions of the trailing ankle's angle psi."""
+    """A walker's parameters on a slope, and functions of the trailing ankle's angle psi."""
 
     def __init__(self, p: WalkerParameters, slope: float) -> None:
         self.rise = Extended(slope)
@@ -179,12 +179,12 @@ class _Extended:
         return geometry.torque_work(psi - self.start, peak, self.ankle_stiffness)
 
     def gain(self, psi: Any) -> Any:
-        """Squared rate at psi, unperturbed, less `apex` at heel strike."""
+        """Unperturbed squared rate at psi, minus `apex` at heel strike."""
         fall = geometry.drop(*self.lean(psi))
         return self.per_energy * self.work(psi) + self.per_drop * fall
 
     def hold(self, psi: Any, pulse: float) -> Any:
-        """Leading-leg force with a pulse on since heel strike, if `apex` was zero there."""
+        """Leading-leg force with a pulse since heel strike, if `apex` was zero there."""
         torque = pulse + geometry.spring_torque(self, psi)
         squared_rate = self.gain(psi) + self.per_energy * pulse * (psi - self.start)
         carried = geometry.pendulum_force(self, self.lean(psi)[1], squared_rate)
@@ -193,10 +193,10 @@ class _Extended:
 
 def make_model(p: WalkerParameters, slope: float = 0.0) -> Model:
     """
-    Work out the constants of a walker on ground that rises by `slope` [rad].
+    Compute the constants of a walker on ground that rises by `slope` [rad].
 
-    A slope turns gravity against ground and linkage and changes nothing else. It is an extension
-    of the paper; samples of the walker are those of level ground.
+    A slope only turns gravity relative to the ground and the linkage. It is an extension of the
+    paper; samples of the walker assume level ground.
     """
     body = _Extended(p, slope)
     alpha, start, end, per_drop = body.alpha, body.start, body.max_plantarflexion, body.per_drop
@@ -265,7 +265,7 @@ def start_apex(model: Any, speed: float | None) -> float:
     """
     `apex` of a walker right after a heel strike with the mass at `speed` [m/s].
 
-    Without one, that of the period-one gait. Raises ValueError if it is not positive and finite.
+    None means the period-one gait's. Raises ValueError if `speed` is not positive and finite.
     """
     if speed is None:
         return float(model["start_apex"])

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a walker knows about the torque of one ankle robot: its changes, promised so far."""
+"""The torque of one ankle robot as known to the walker: the changes promised so far."""
 
 import itertools
 import math
@@ -11,15 +11,15 @@ import numpy as np
 
 from gait_entrainment.walker.model import Floats, Stamps
 
-# Before all time: the first entry, torque zero, so that every instant has an entry before it.
+# Stamp of the first entry, torque zero: earlier than any time, so every time follows an entry.
 EVER = -(2**62)
 
 
 class PromisedTorque:
     """
-    Torque changes of one side [ns, N m], neighbours always different.
+    Torque changes of one side [ns, N m]; adjacent torques always differ.
 
-    Past the promise the torque counts as zero, until a further promise says otherwise.
+    Past the promise the torque counts as zero until a further promise changes it.
     """
 
     def __init__(self) -> None:
@@ -36,9 +36,9 @@ class PromisedTorque:
         reached: int,
     ) -> int:
         """
-        Append pieces; arguments, result and errors as those of `Walker.extend_torque`.
+        Append pieces; arguments, result and errors as in `Walker.extend_torque`.
 
-        What lies before `reached`, where the walker already is, comes too late and is left out.
+        What lies before `reached`, the time that the walker has reached, is too late and left out.
         """
         borders = [*(int(t) for t in times), valid_until]
         if len(borders) - 1 != len(torques):
@@ -71,7 +71,7 @@ class PromisedTorque:
         return max(0, min(reached, valid_until) - promised)
 
     def cut(self, at: int, reached: int) -> None:
-        """Void the promise from `at` on, or from `reached` if that is later: torque zero."""
+        """Void the promise from `at` on, or from `reached` if that is later: zero torque."""
         at = max(at, reached)
         while self._changes[-1] >= at:
             self._pop()
@@ -79,13 +79,13 @@ class PromisedTorque:
         self.valid_until = min(self.valid_until, at)
 
     def forget(self, before: int) -> None:
-        """Drop what only instants earlier than `before` need."""
+        """Drop the changes that only times before `before` need."""
         while len(self._changes) > 1 and self._changes[1] < before:
             del self._changes[0], self._torques[0]
             self._arrays = None
 
     def arrays(self) -> tuple[Stamps, Floats]:
-        """Stamps [ns] of the changes and the torques [N m] from them on, for the walker."""
+        """Stamps [ns] of the changes, and the torque [N m] from each one on, for the walker."""
         if self._arrays is None:
             self._arrays = np.array(self._changes, np.int64), np.array(self._torques)
         return self._arrays

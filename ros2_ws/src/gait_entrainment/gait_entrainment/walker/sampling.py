@@ -2,15 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Posture, torques and ground reaction forces at any instants of a trajectory.
+Posture, torques and ground reaction forces at any times of a trajectory.
 
-Each sample follows from the start of its segment alone, never from the sample before, so the same
-instant gives the same bits however the instants are asked for.
+Each sample is computed from the start of its segment, never from the previous sample, so the same
+time gives the same bits whichever other times are sampled.
 
 The massless swing leg has no dynamics. For display its hip and ankle follow a cubic in the
-progress of single stance, u = (theta_toe_off - theta) / (theta_toe_off + alpha), that leaves the
-posture of toe-off with its rates and arrives at the posture of the next heel strike, hip and ankle
-at alpha, with rate zero.
+progress of single stance, u = (theta_toe_off - theta) / (theta_toe_off + alpha). It starts with
+the posture and rates of toe-off and ends with the posture of the next heel strike, hip and ankle
+at alpha, at zero rate.
 """
 
 import math
@@ -37,7 +37,7 @@ from gait_entrainment.walker.segment import (
 from gait_entrainment.walker.trajectory import Torques, stiffen
 from gait_entrainment.walker.transitions import NANO
 
-# Places in an array of joints: hip or ankle, plus the side.
+# Indices in an array of joints: hip or ankle, plus the side.
 HIP: Final = 0
 ANKLE: Final = 2
 
@@ -45,10 +45,10 @@ ANKLE: Final = 2
 @dataclass(frozen=True)
 class Samples:
     """
-    The walker at n instants. SI units; joints in the order l_hip r_hip l_ankle r_ankle.
+    The walker at n times, in SI units; joints in the order l_hip, r_hip, l_ankle, r_ankle.
 
-    Hip: angle of the leg from the vertical, foot ahead of the mass positive. Ankle: psi - pi/2,
-    plantarflexion positive. Pairs are [left, right]; world x forward, z up.
+    Hip: angle of the leg from the vertical, positive with the foot ahead of the mass. Ankle:
+    psi - pi/2, plantarflexion positive. Pairs are [left, right]; world x forward, z up.
     """
 
     position: Floats  # (n, 4) joint angles [rad]
@@ -58,13 +58,13 @@ class Samples:
     delivered_torque: Floats  # (n, 2) by the ankle robot [N m], whether it acts or not
     effective_torque: Floats  # (n, 2) the part of it that acts [N m]
     ground_reaction: Floats  # (n, 2, 2) on each leg, [left, right] x [x, z] [N]
-    force: Floats  # (n, 2) its magnitude: F_A of the trailing leg, F_B of the other one [N]
+    force: Floats  # (n, 2) its magnitude: F_A of the trailing leg, F_B of the other [N]
     double_stance: NDArray[np.bool_]  # (n,) whether both feet are on the ground
     leading: NDArray[np.int64]  # (n,) side of the leading leg, in single stance the stance leg
-    unloaded: NDArray[np.bool_]  # (n,) a negative pulse keeps the trailing foot unloaded
+    unloaded: NDArray[np.bool_]  # (n,) whether a negative pulse keeps the trailing foot unloaded
 
 
-# One sample: what the compiled functions fill in of Samples.
+# One sample: the fields of Samples that the compiled functions fill in.
 SAMPLE = np.dtype(
     [
         ("position", np.float64, (4,)),
@@ -93,7 +93,7 @@ def samples_from(table: Any) -> Samples:
 def fill_samples(
     model: Model, log: Log, times: Stamps, robot: Torques, stiffness: Floats, table: Any
 ) -> None:
-    """Fill in `table` (n,) of SAMPLE, zero before, with the walker at `times` [ns]."""
+    """Fill `table` (n,) of SAMPLE, initially zero, with the walker's state at `times` [ns]."""
     work = np.empty(WORK_SIZE)
     rows = np.searchsorted(log["after"], times)
     right = robot.right
@@ -119,7 +119,7 @@ def fill_samples(
 def fill_leading_leg(
     model: Model, segment: Segment, position: float, sine: float, rate: float, row: Any
 ) -> None:
-    """Leading leg, its foot flat: hip and ankle turn together; the force is along the leg."""
+    """Leading leg, foot flat: hip and ankle turn together, and the force is along the leg."""
     leading = segment.leading
     lean = math.asin(sine)
     force = leading_force(model, segment, position)

@@ -2,15 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-A segment: the stretch of motion between two switching instants, and how it is travelled.
+A segment: the walker's motion between two switches, and the time that it takes.
 
-Gait events, changes of the perturbation and the unloading of the trailing foot switch; between
-them the ankle torque falls off linearly in the ankle angle, so energy gives the speed at every
-position in closed form and time is a quadrature over position. A segment is kept as the state at
-its start, with what would end it if the perturbation stayed as it is.
+Gait events, changes of the perturbation and the unloading of the trailing foot are switches.
+Between them the ankle torque falls off linearly in the ankle angle, so energy gives the speed at
+every position in closed form, and time is a quadrature over position. A segment is stored as the
+state at its start, with the switch that would end it if the perturbation did not change.
 
-Position is what grows while the walker moves on: the trailing ankle's angle psi in double stance,
--theta in single stance.
+Position is the coordinate that grows as the walker moves forward: the trailing ankle's angle psi
+in double stance, -theta in single stance.
 """
 
 import math
@@ -55,7 +55,7 @@ class Segment(Protocol):
     """A record of SEGMENT, which the compiled functions change in place."""
 
     stamp: int  # start, whole nanoseconds since the start of the run
-    rest: float  # and what is left of it [s], at most half a nanosecond
+    rest: float  # and the remainder [s], at most half a nanosecond
     after: int  # torque changes later than this stamp are still to come
     began: int  # the switch that began it
     ends: int  # the switch that ends it if the perturbation stays as it is
@@ -66,7 +66,7 @@ class Segment(Protocol):
     apex: float  # squared rate at the apex without further torque [1/s^2] (see `model`)
     perturbation: float  # torque of the ankle robot on the trailing ankle [N m]
     torque: float  # effective ankle torque at the start [N m]
-    stiffness: float  # and by how much it falls off [N m/rad]
+    stiffness: float  # and the rate at which it falls off [N m/rad]
     end: float  # position of the end
     duration: float  # time to the end [s]
     shortfall: float  # what is missing at a fall [J] or fly-off [N]
@@ -76,21 +76,21 @@ SEGMENT = np.dtype([(name, kind) for name, kind in Segment.__annotations__.items
 Log = Any  # an array of SEGMENT, the segments of a stretch in order
 Motion = tuple[float, float, float]  # value, velocity and acceleration of a coordinate
 
-# Widest panel [rad]: keeps the Taylor series of `panel` to rounding.
+# Widest panel [rad]: keeps the Taylor series in `panel` accurate to rounding.
 PANEL_WIDTH: Final = 1.6
 
-# A panel this narrow [rad, or its root up to a stall] is taken as it is.
+# A panel this narrow [rad, or its square root before a stall] is accepted as it is.
 NARROWEST_PANEL: Final = 1e-12
 
-# Up to this width [rad] a panel whose squared rate stays within this part of itself is smooth: the
-# nearest stall is many widths away. If it does not converge, the rounding of that rate is why.
+# Up to this width [rad], a panel over which the squared rate changes by less than this fraction is
+# smooth: the nearest stall is many widths away. If it does not converge, rounding is the cause.
 SMOOTH_PANEL: Final = 1e-3
 SMOOTH_CHANGE: Final = 0.1
 
-# Longest that a segment may take [s]: along a tangent a stall is approached forever.
+# Longest time that a segment may take [s]: a tangential stall is approached indefinitely.
 LONGEST: Final = 1e6
 
-# Of the work space in which quadratures put the integrand at the nodes.
+# Size of the work space in which quadratures store the integrand at the nodes.
 WORK_SIZE: Final = max(PANEL_NODES, SINGLE_STANCE_NODES)
 
 
@@ -102,7 +102,7 @@ def effective_torque(segment: Segment, position: float) -> float:
 
 @compiled
 def gained_apex(model: Model, segment: Segment, position: float) -> float:
-    """`apex` at a position of the segment: the start's, and the torque's work."""
+    """`apex` at a position of the segment: its value at the start plus the torque's work."""
     rotation = position - segment.position
     work = linkage.torque_work(rotation, segment.torque, segment.stiffness)
     return segment.apex + model.per_energy * work
@@ -118,7 +118,7 @@ def leg_sine_at(model: Model, stance: int, position: float) -> float:
 
 @compiled
 def leaned(model: Model, sine: float, cosine: float) -> tuple[float, float]:
-    """Sine and cosine of an angle from the vertical, from those off the ground's normal."""
+    """Sine and cosine of an angle from the vertical, given those from the ground's normal."""
     up, along = model.slope_cosine, model.slope_sine
     return sine * up + cosine * along, cosine * up - sine * along
 
@@ -155,10 +155,10 @@ def leading_force(model: Model, segment: Segment, position: float) -> float:
 @compiled
 def motion(model: Model, segment: Segment, position: float) -> Motion:
     """
-    How a coordinate moves that is smooth in time.
+    Motion of a coordinate that is smooth in time.
 
-    In single stance the position, in double stance sin(theta): psi itself speeds up twentyfold.
-    theta_ddot is half the derivative of theta_dot^2 by theta.
+    In single stance it is the position; in double stance sin(theta), since psi itself speeds up
+    twentyfold. theta_ddot is half the derivative of theta_dot^2 with respect to theta.
     """
     if segment.stance == Stance.SINGLE:
         rate = math.sqrt(max(0.0, squared_rate(model, segment, position)))
@@ -176,7 +176,7 @@ def motion(model: Model, segment: Segment, position: float) -> Motion:
 
 @compiled
 def position_of(model: Model, stance: int, coordinate: float) -> float:
-    """Position where the coordinate of `motion` has this value."""
+    """Position at which the coordinate of `motion` has this value."""
     if stance == Stance.SINGLE:
         return coordinate
     cosine = linkage.ankle_cosine(model, coordinate)
@@ -188,10 +188,10 @@ def panel(
     model: Model, work: Floats, segment: Segment, start: float, end: float
 ) -> tuple[float, bool]:
     """
-    Time over one panel of double stance by Gauss-Legendre, and whether that has converged.
+    Time over one panel of double stance by Gauss-Legendre, and whether it has converged.
 
-    The integrand is (d theta / d psi) / theta_dot. Its sines and cosines come from those of the
-    middle and a short Taylor series, in a loop that runs in vector registers.
+    The integrand is (d theta / d psi) / theta_dot. Its sines and cosines are computed from those
+    at the middle and a short Taylor series, in a loop that can be vectorized.
     """
     nodes = model.rule[NODES]
     middle, half = 0.5 * (start + end), 0.5 * (end - start)
@@ -219,8 +219,8 @@ def stall_panel(
     """
     The same for a segment that ends in a stall, over u = sqrt(stall - psi) from start to end.
 
-    In u the integrand is smooth. The squared rate is what it gains from the stall, where it is
-    zero, back to psi; from the energy its last digits would be lost.
+    The integrand is smooth in u. The squared rate is its gain from the stall, where it is zero,
+    back to psi; computed from the energy, it would lose its last digits.
     """
     middle, half = 0.5 * (start + end), 0.5 * (end - start)
     stall_torque = effective_torque(segment, segment.end)
@@ -254,7 +254,7 @@ def weighed(model: Model, work: Floats, half: float) -> tuple[float, bool]:
 
 @compiled
 def dot(weights: Floats, values: Floats) -> float:
-    """Weighted sum over a panel's nodes, as four sums side by side."""
+    """Weighted sum over a panel's nodes, as four sums in parallel."""
     s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
     for i in range(0, PANEL_NODES, 4):
         s0 += weights[i] * values[i]
@@ -266,7 +266,7 @@ def dot(weights: Floats, values: Floats) -> float:
 
 @compiled
 def short_sine(x: float) -> float:
-    """sin(x) for |x| <= 0.8 to rounding: Taylor to x^17, odd and even terms side by side."""
+    """sin(x) for |x| <= 0.8 to rounding: Taylor to x^17, odd and even terms in parallel."""
     y = x * x
     z = y * y
     p = (1.0 / 6227020800.0 + 1.0 / 355687428096000.0 * z) * z + 1.0 / 362880.0
@@ -278,7 +278,7 @@ def short_sine(x: float) -> float:
 
 @compiled
 def short_cosine(x: float) -> float:
-    """cos(x) for |x| <= 0.8 to rounding: Taylor to x^18, odd and even terms side by side."""
+    """cos(x) for |x| <= 0.8 to rounding: Taylor to x^18, odd and even terms in parallel."""
     y = x * x
     z = y * y
     p = (1.0 / 20922789888000.0 * z + 1.0 / 479001600.0) * z + 1.0 / 40320.0
@@ -290,7 +290,7 @@ def short_cosine(x: float) -> float:
 
 @compiled
 def smooth(model: Model, segment: Segment, start: float, end: float) -> bool:
-    """Whether the speed hardly changes over a panel, so that no narrower one would do better."""
+    """Whether the speed hardly changes over a panel, so a narrower one would be no better."""
     if end - start > SMOOTH_PANEL:
         return False
     square = squared_rate(model, segment, start)

@@ -9,8 +9,8 @@ two angles on the same side of the apex is the integral of
 
     dz / sqrt(z (1 - z) (apex + 4 (g / L) z)),
 
-Carlson's symmetric form R_F (B. C. Carlson, Numerical computation of real or complex elliptic
-integrals, 1995; DLMF 19.29.4), accurate to rounding also beside a stall, where apex is near zero.
+which is Carlson's symmetric form R_F (B. C. Carlson, Numerical computation of real or complex
+elliptic integrals, 1995; DLMF 19.29.4), accurate to rounding even near a stall, with apex near 0.
 """
 
 import math
@@ -19,18 +19,18 @@ from typing import Final
 from gait_entrainment.walker.compiled import compiled
 from gait_entrainment.walker.model import Model
 
-# Turning points this close to the apex, as sin(theta / 2)^2, are not told apart: the last of the
-# way there takes the longer the closer it is, forever at the apex itself.
+# Turning points closer to the apex than this, as sin(theta / 2)^2, are treated as one: the closer
+# the point is, the longer the walker takes to get there, and it never reaches the apex itself.
 NEAREST_TURN: Final = 1e-60
 
 
 @compiled
 def carlson_rf(x: float, y: float, z: float) -> float:
-    """Carlson's R_F by duplication; arguments not negative, at most one of them zero."""
+    """Carlson's R_F by duplication, for non-negative arguments of which at most one is zero."""
     mean = (x + y + z) / 3.0
     off_x, off_y = mean - x, mean - y
-    # The series below is cut after the seventh order: at a spread of 1/280 of the mean, that is
-    # under 1e-17 of the result. Each duplication divides the spread by 4.
+    # The series below is cut after the seventh order. With a spread of 1/280 of the mean, the
+    # error is below 1e-17 of the result. Each duplication divides the spread by 4.
     spread = 280.0 * max(abs(off_x), abs(off_y), abs(mean - z))
     shrink = 1.0
     while spread * shrink > mean:
@@ -69,8 +69,8 @@ def time_on_one_side(
     """
     Time [s] between two angles on one side of the apex, sin(theta / 2)^2 = low < high.
 
-    `low_square` is the squared rate at `low`: at a turning point that is zero, which the energy
-    would give with an error whose root shows in the time.
+    `low_square` is the squared rate at `low`. At a turning point it is zero; the energy would give
+    it with an error, the square root of which would show in the time.
     """
     low_1, high_1 = math.sqrt(low), math.sqrt(high)
     low_2, high_2 = math.sqrt(1.0 - low), math.sqrt(1.0 - high)
@@ -104,7 +104,7 @@ def pendulum_time(per_drop: float, apex: float, start: float, end: float) -> flo
 
 @compiled
 def turning_point(model: Model, apex: float) -> tuple[float, float]:
-    """Where before the apex a walker with apex <= 0 comes to rest, and how long after toe-off."""
+    """Position where a walker with apex <= 0 comes to rest, and the time from toe-off to there."""
     low = max(-apex / (2.0 * model.per_drop), NEAREST_TURN)
     high = model.toe_off_half_sine
     if low >= high:

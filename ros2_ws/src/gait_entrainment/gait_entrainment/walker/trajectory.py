@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-From switch to switch: the loop that every use of the walker runs.
+The loop from switch to switch that every use of the walker runs.
 
 A gait event comes before a torque change of the same stamp, and a change acts only on what comes
-after its stamp. So everything that happens up to a stamp depends on the torque before it alone,
-and an event can be published as soon as that torque is promised.
+after its stamp. So everything that happens up to a stamp depends only on the torque before it, and
+an event can be published as soon as that torque is promised.
 """
 
 from typing import Final, NamedTuple
@@ -37,8 +37,8 @@ class Torques(NamedTuple):
     """
     Torque of the ankle robots: from the stamp changes[i] [ns] on it is torques[i] [N m].
 
-    The changes of the left one come first, those of the right one from index `right` on. Each side
-    begins with an entry before all time, torque zero, and neighbours differ.
+    The left robot's changes come first; the right robot's start at index `right`. Each side begins
+    with an entry earlier than any time, torque zero, and adjacent torques differ.
     """
 
     changes: Stamps
@@ -48,7 +48,7 @@ class Torques(NamedTuple):
 
 @compiled
 def skip_changes(robot: Torques, cursors: Stamps, side: int, after: int) -> bool:
-    """Move a side's cursor to its first change later than `after`; whether there is one."""
+    """Move a side's cursor to its first change later than `after`; return whether it exists."""
     index, end = cursors[side], robot.right if side == 0 else robot.changes.size
     while index < end and robot.changes[index] <= after:
         index += 1
@@ -61,11 +61,11 @@ def proceed(
     model: Model, work: Floats, segment: Segment, robot: Torques, cursors: Stamps, until: int
 ) -> int:
     """
-    Go on to the next switch, writing the segment it begins over `segment`.
+    Go on to the next switch and overwrite `segment` with the segment that it begins.
 
-    `cursors` point to a change of each side that is not later than the next one; at first [0,
-    right]. HELD if the switch comes after `until`, ENDED if the walker falls or flies off before.
-    Such an end comes after a torque change of its own stamp, which may avert it.
+    `cursors` point to a change of each side that is not later than the next one, initially [0,
+    right]. Returns HELD if the switch is later than `until`, ENDED if the walker falls or flies
+    off before. Such an end comes after a torque change of the same stamp, which may avert it.
     """
     end, rest = clock(segment.stamp, segment.rest, segment.duration)
     terminal = segment.ends == Switch.FALL or segment.ends == Switch.FLY_OFF
@@ -90,7 +90,7 @@ def proceed(
     segment.stamp, segment.rest = end, rest
     segment.after = max(segment.after, end - 1)
     if segment.ends == Switch.HEEL_STRIKE:
-        # The stance leg now trails: its torque is what held before this stamp.
+        # The stance leg now trails; its torque is the one in force before this stamp.
         skip_changes(robot, cursors, segment.leading, segment.after)
         collide(model, segment, robot.torques[cursors[segment.leading] - 1], work)
     elif segment.ends == Switch.TOE_OFF:
@@ -102,7 +102,7 @@ def proceed(
 
 @compiled
 def stiffen(model: Model, step: int, stiffness: Floats) -> None:
-    """Write the stiffness of a step's push-off into the model, if it has one of its own."""
+    """Write the stiffness of a step's push-off into the model, if stiffnesses are given."""
     if stiffness.size > 0:
         model.ankle_stiffness = stiffness[step % stiffness.size]
 
@@ -114,14 +114,14 @@ def advance(
     """
     Append to the `count` segments of `log` all that begin by `until`.
 
-    Push-offs have the `stiffness` (n,) of their step, if n > 0.
+    Each push-off has the `stiffness` (n,) of its step, if n > 0.
 
     Returns the new count and HELD, ENDED, or SWITCHED if the log is full.
     """
     work, cursors = np.empty(WORK_SIZE), np.array([0, robot.right])
     while count < log.size:
         log[count] = log[count - 1]
-        # From single stance it goes on to the push-off of the next step.
+        # After single stance comes the push-off of the next step.
         stiffen(model, log[count].step + (log[count].stance == Stance.SINGLE), stiffness)
         outcome = proceed(model, work, log[count], robot, cursors, until)
         if outcome != SWITCHED:

@@ -9,11 +9,11 @@ Guards and resets: what ends a segment, and how the next one begins.
     heel strike      theta = -alpha in single stance         collide
     torque change    the stamp of the change                 change_torque
     unloading        k (mu - psi) + T_p = 0 while T_p < 0    unload
-    fall             theta_dot = 0                           none: the end
-    fly-off          F_B < 0                                 none: the end
+    fall             theta_dot = 0                           none: the walk ends
+    fly-off          F_B < 0                                 none: the walk ends
 
-Each reset writes the next segment over the last and then looks ahead (`look_ahead_*`): which of
-these switches comes first if the perturbation stays as it is, where, and when.
+Each reset overwrites the last segment with the next one and then looks ahead (`look_ahead_*`) for
+the switch that comes first if the perturbation does not change, with its position and time.
 """
 
 import math
@@ -37,8 +37,8 @@ from gait_entrainment.walker.single_stance import pendulum_time, turning_point
 
 NANO: Final = 1e9
 
-# Points of the search for a stall or lift-off. It is made only if the bounds do not rule both
-# out; rate and force bend a few times at most over a double stance, and minima are refined.
+# Number of points in the search for a stall or lift-off, needed only if the bounds do not rule
+# both out. Rate and force have few bends over a double stance, and minima are refined.
 SEARCH_POINTS: Final = 128
 
 
@@ -47,7 +47,7 @@ SEARCH_POINTS: Final = 128
 
 @compiled
 def collide(model: Model, segment: Segment, perturbation: float, work: Floats) -> None:
-    """Heel strike: the speed falls by cos(2 alpha), the legs change roles, the push-off begins."""
+    """Heel strike: the speed is scaled by cos(2 alpha), the legs swap roles, push-off begins."""
     square = segment.apex + model.strike_gain
     segment.apex = model.restitution * square - model.start_gain
     segment.leading = 1 - segment.leading
@@ -81,7 +81,7 @@ def leave_double_stance(model: Model, segment: Segment, work: Floats) -> None:
 def change_torque(
     model: Model, segment: Segment, position: float, perturbation: float, work: Floats
 ) -> None:
-    """Begin a segment with another torque of the ankle robot."""
+    """Begin a segment with a new torque from the ankle robot."""
     segment.apex = gained_apex(model, segment, position)
     segment.position = position
     segment.perturbation = perturbation
@@ -92,7 +92,7 @@ def change_torque(
 
 @compiled
 def unload(model: Model, segment: Segment, work: Floats) -> None:
-    """The pulse has eaten up the spring: the trailing foot is unloaded, double stance goes on."""
+    """The pulse has cancelled the spring: the trailing foot is unloaded, double stance goes on."""
     segment.apex = gained_apex(model, segment, segment.end)
     segment.position = segment.end
     segment.torque, segment.stiffness = 0.0, 0.0
@@ -145,13 +145,13 @@ def look_ahead_double_stance(model: Model, segment: Segment, work: Floats) -> No
         segment.end = min(segment.end, model.max_plantarflexion)
     if not cleared(model, segment):
         search_stall_and_lift_off(model, segment)
-    whole = (
+    precomputed = (
         segment.position == model.double_stance_start
         and segment.ends == Switch.TOE_OFF
         and segment.perturbation == 0.0
         and segment.apex >= model.whole_double_stance_apex
     )
-    if whole:
+    if precomputed:
         segment.duration = whole_time(model.whole_double_stance, work, segment.apex)
     else:
         segment.duration = double_stance_time(model, work, segment, segment.position, segment.end)
@@ -159,11 +159,11 @@ def look_ahead_double_stance(model: Model, segment: Segment, work: Floats) -> No
 
 @compiled
 def whole_time(whole: Floats, work: Floats, apex: float) -> float:
-    """Duration [s] of a whole stance: one quadrature whose geometry was made once."""
+    """Duration [s] of a whole stance: one quadrature with precomputed geometry."""
     gain, weights = whole[0], whole[1]
     for i in range(gain.size):
         work[i] = weights[i] / math.sqrt(apex + gain[i])
-    s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0  # side by side; the number of nodes is a multiple of 4
+    s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0  # in parallel; the number of nodes is a multiple of 4
     for i in range(0, gain.size, 4):
         s0 += work[i]
         s1 += work[i + 1]
@@ -177,9 +177,9 @@ def cleared(model: Model, segment: Segment) -> bool:
     """
     Whether bounds alone rule out a stall and a fly-off in the rest of double stance.
 
-    Compared with the spring alone, a positive pulse only adds speed and lifts in proportion to its
-    torque (the bound between two known pulses is their chord: a minimum of functions linear in the
-    torque is concave); a negative one only takes speed, at most its own work.
+    Compared with the spring alone, a positive pulse only adds speed, and lifts in proportion to
+    its torque (the chord between two known pulses is a bound, since a minimum of functions linear
+    in the torque is concave). A negative pulse only takes speed, at most its own work.
     """
     pulse = segment.perturbation
     turned = segment.position - model.double_stance_start
@@ -200,7 +200,7 @@ def cleared(model: Model, segment: Segment) -> bool:
 
 @compiled
 def margin(model: Model, segment: Segment, position: float, switch: int) -> float:
-    """What must stay positive: the squared rate (fall) or the leading leg's force (fly-off)."""
+    """The value that must stay positive: squared rate (fall) or leading leg's force (fly-off)."""
     if switch == Switch.FALL:
         return squared_rate(model, segment, position)
     return leading_force(model, segment, position)
@@ -208,7 +208,7 @@ def margin(model: Model, segment: Segment, position: float, switch: int) -> floa
 
 @compiled
 def search_stall_and_lift_off(model: Model, segment: Segment) -> None:
-    """End the segment where first its speed or the leading leg's force would go through zero."""
+    """End the segment where its speed or the leading leg's force would first cross zero."""
     end = segment.end
     for switch in (Switch.FALL, Switch.FLY_OFF):
         position, least = first_crossing(model, segment, end, switch)
@@ -219,7 +219,7 @@ def search_stall_and_lift_off(model: Model, segment: Segment) -> None:
 
 @compiled
 def first_crossing(model: Model, segment: Segment, end: float, switch: int) -> tuple[float, float]:
-    """Where a margin first goes negative up to `end`, and the least value it takes there."""
+    """Position up to `end` where a margin first turns negative, and the margin's least value."""
     start = segment.position
     step = (end - start) / SEARCH_POINTS
     least = margin(model, segment, start, switch)
@@ -246,9 +246,9 @@ def first_crossing(model: Model, segment: Segment, end: float, switch: int) -> t
 def minimum(
     model: Model, segment: Segment, low: float, high: float, switch: int
 ) -> tuple[float, float]:
-    """Place and value of a margin's minimum between two positions: golden section."""
+    """Position and value of a margin's minimum between two positions: golden section."""
     ratio = 0.5 * (math.sqrt(5.0) - 1.0)
-    # At a smooth minimum the value no longer depends on the place below sqrt(epsilon).
+    # At a smooth minimum, an interval below sqrt(epsilon) no longer changes the value.
     while high - low > 1e-9:
         inner, outer = high - ratio * (high - low), low + ratio * (high - low)
         if margin(model, segment, inner, switch) < margin(model, segment, outer, switch):
@@ -261,7 +261,7 @@ def minimum(
 
 @compiled
 def root(model: Model, segment: Segment, positive: float, negative: float, switch: int) -> float:
-    """Where a margin goes through zero, to the last bit, from a place above it to one below."""
+    """Position where a margin crosses zero, to the last bit, between `positive` and `negative`."""
     while True:
         middle = 0.5 * (positive + negative)
         if middle <= positive or middle >= negative:
@@ -278,16 +278,16 @@ def root(model: Model, segment: Segment, positive: float, negative: float, switc
 @compiled
 def clock(stamp: int, rest: float, elapsed: float) -> tuple[int, float]:
     """
-    Instant after `elapsed` seconds, as whole nanoseconds and what is left of it [s].
+    Time after `elapsed` seconds, as whole nanoseconds and a remainder [s].
 
-    A double that counts seconds would lose 3e-14 s at each addition after 150 s; this loses none.
+    A double that counts seconds would lose 3e-14 s per addition after 150 s; this loses nothing.
     """
     time = rest + elapsed
-    whole = int(np.rint(time * NANO))
-    return stamp + whole, time - whole / NANO
+    nanoseconds = int(np.rint(time * NANO))
+    return stamp + nanoseconds, time - nanoseconds / NANO
 
 
 @compiled
 def seconds(stamp: int, rest: float) -> float:
-    """Instant as seconds since the start of the run."""
+    """Time in seconds since the start of the run."""
     return stamp / NANO + rest

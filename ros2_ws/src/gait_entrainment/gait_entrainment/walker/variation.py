@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-A walker whose strides vary: the stiffness of each push-off is drawn anew, long-range correlated.
+A walker whose strides vary: each push-off has a random stiffness, with long-range correlation.
 
-More push-off work makes the steps that follow quicker, until the collisions have taken it up.
+More push-off work makes the following steps faster, until the collisions have absorbed it.
 """
 
 from typing import Any, Final
@@ -20,11 +20,11 @@ Seed = int | tuple[int, ...]
 
 # Noise is cut off at this many standard deviations: no step has an absurd push-off.
 TRUNCATION: Final = 3.0
-# What noise leaves at least of a push-off's stiffness.
+# Fraction of a push-off's stiffness that noise leaves at least.
 LEAST: Final = 0.01
-# Steps after which the noise repeats itself: 17 hours of walking.
+# Steps after which the noise repeats: 17 hours of walking.
 REPETITION: Final = 2**16
-# Steps for which a disturbance is followed: less than half of it is left after each.
+# Steps over which a disturbance is followed: less than half of it is left after each.
 MEMORY: Final = 60
 
 
@@ -32,12 +32,12 @@ def step_noise(seed: Seed, steps: int, size: int, hurst: float = 0.5) -> Floats:
     """
     Return fractional Gaussian noise (steps, size) of unit variance, truncated.
 
-    With `hurst` 0.5 it is white; above, up to 1, neighbours resemble each other over long
-    stretches (strides of adults: about 0.75). By circulant embedding (Davies and Harte,
-    Biometrika 74, 95, 1987), which is exact. Raises UsageError for a `hurst` out of range.
+    With `hurst` 0.5 the noise is white; above that, up to 1, it is correlated over many steps
+    (strides of adults: about 0.75). It is made by circulant embedding (Davies and Harte,
+    Biometrika 74, 95, 1987), which is exact. Raises UsageError if `hurst` is out of range.
     """
     if not 0.5 <= hurst < 1:
-        raise UsageError(f"hurst: {hurst:g}; allowed: at least 0.5, which is white, and below 1")
+        raise UsageError(f"hurst: {hurst:g}; allowed: at least 0.5 (white) and below 1")
     generator, covariance = np.random.default_rng(seed), _covariance(steps, hurst)
     circulant = np.concatenate([covariance, covariance[-2:0:-1]])
     spectrum = np.clip(np.fft.fft(circulant).real, 0.0, None)
@@ -55,9 +55,9 @@ def _covariance(lags: int, hurst: float) -> Floats:
 
 def made_for_any_stiffness(model: Any, stiffness: float) -> Any:
     """
-    Return a copy of a walker's constants (`Model`), with a stiffness, that holds for any other.
+    Return a copy of a walker's constants (`Model`) with this stiffness, which may then be changed.
 
-    The whole double stance is made a quadrature each time, and searched for a fall or fly-off.
+    Every double stance is then computed by quadrature and searched for a fall or fly-off.
     """
     made = model.copy()
     made["whole_double_stance_apex"], made["least_gain"] = np.inf, -np.inf
@@ -66,7 +66,7 @@ def made_for_any_stiffness(model: Any, stiffness: float) -> Any:
 
 
 def push_off_stiffness(model: Any, variation: Variation, seed: Seed) -> Floats:
-    """Return the stiffness [N m/rad] of the push-offs of REPETITION steps."""
+    """Return the push-off stiffness [N m/rad] of each of REPETITION steps."""
     noise = step_noise(seed, REPETITION, 1, variation.exponent)[:, 0]
     noise *= variation.coefficient / stride_response(model, variation.exponent)
     return np.asarray(model["ankle_stiffness"] * np.maximum(1 + noise, LEAST))
@@ -74,11 +74,11 @@ def push_off_stiffness(model: Any, variation: Variation, seed: Seed) -> Floats:
 
 def stride_response(model: Any, hurst: float) -> float:
     """
-    Coefficient of variation of the stride period over that of the stiffness, while both are small.
+    Stride period's coefficient of variation divided by the stiffness's, while both are small.
 
-    With u(n) the relative deviation of the stiffness and x(n) that of `apex` from the period-one
-    gait, step n takes T + b u(n) + a x(n), and the collision leaves x(n + 1) = r (x(n) + e u(n)).
-    So the stride period is u filtered, and its variance follows from the autocovariance of u.
+    With u(n) the relative deviation of the stiffness, x(n) the deviation of `apex` from that of
+    the period-one gait, step n takes T + b u(n) + a x(n), and x(n + 1) = r (x(n) + e u(n)) after
+    the collision. So the stride period is a filtered u; the autocovariance gives its variance.
     """
     turn = model["max_plantarflexion"] - model["double_stance_start"]
     stiffness, apex, kept = (model[n] for n in ("ankle_stiffness", "start_apex", "restitution"))

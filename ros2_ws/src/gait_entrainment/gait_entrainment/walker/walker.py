@@ -4,9 +4,9 @@
 """
 The walker in time: torque promises in, gait events and samples out.
 
-The state is kept at the last true switch, never at the instant that was asked for. So neither how
-a run is cut into `advance` calls, nor how a torque profile is cut into promises, nor which
-instants are sampled changes a bit of the result.
+The state is kept at the last actual switch, never at the requested time. So the result is the
+same to the bit however a run is split into `advance` calls or a torque profile into promises, and
+whichever times are sampled.
 """
 
 from collections.abc import Sequence
@@ -31,9 +31,9 @@ from gait_entrainment.walker.variation import made_for_any_stiffness, push_off_s
 @dataclass(frozen=True)
 class Transition:
     """
-    A gait event of the model: its instant [s] and stamp [ns] since the start of the run.
+    A gait event of the model: its time [s] and stamp [ns] since the start of the run.
 
-    The stamp is rounded from the walker's own clock, which resolves more than `time`, a double.
+    The stamp is rounded from the walker's own clock, which has a finer resolution than `time`.
     """
 
     time: float
@@ -55,9 +55,9 @@ class Ending:
     """
     Where and why the walk ended: a limit of the model, not an error.
 
-    What is missing is the energy [J] to get over the rest of the stance for a fall; for a fly-off
-    the force [N] with which the leg would have to pull at most in the rest of the stance. Both
-    hold if the perturbation stays as it was.
+    For a fall, `missing` is the energy [J] needed to get through the rest of the stance; for a
+    fly-off, the largest force [N] with which the leg would have to pull in the rest of the stance.
+    Both assume that the perturbation does not change.
     """
 
     kind: EndingKind
@@ -71,7 +71,7 @@ class Ending:
 
     @property
     def message(self) -> str:
-        """One sentence for people."""
+        """One sentence for the user."""
         where = f"in {self.stance.name.lower()} stance of step {self.step}"
         when = f"at {self.time:.6f} s, leg angle {self.angle:.4f} rad"
         if self.kind == EndingKind.FALL:
@@ -86,8 +86,8 @@ class Walker:
     """
     The ankle-actuated walker, driven by torque promises for both ankles.
 
-    It starts at stamp 0, right after heel strike number 0 of `first_heel_strike`, in the
-    period-one gait or with the mass at `initial_speed` [m/s]. Its strides may vary.
+    It starts at stamp 0, right after heel strike 0 of the side `first_heel_strike`, in the
+    period-one gait or with the mass at `initial_speed` [m/s]. With `variation` its strides vary.
 
     An event comes before a torque change of the same stamp, and a change acts only after its
     stamp: a sample shows the events of its own stamp, but the torque up to it. So everything up to
@@ -106,7 +106,7 @@ class Walker:
         self.parameters = parameters
         self._model = make_model(parameters)
         apex = start_apex(self._model, initial_speed)
-        self._stiffness = np.empty(0)  # of each push-off, by step [N m/rad]; empty: of the model
+        self._stiffness = np.empty(0)  # of each push-off, by step [N m/rad]; empty: the model's
         if variation is not None and variation.coefficient:
             self._stiffness = push_off_stiffness(self._model, variation, seed)
             self._model = made_for_any_stiffness(self._model, self._stiffness[1])
@@ -134,9 +134,9 @@ class Walker:
         """
         Promise the torque of one ankle up to `valid_until_ns`.
 
-        torques[i] [N m] holds from times_ns[i] to the next, the last to `valid_until_ns`; before
-        the first, and without any, the torque is zero. Returns how many nanoseconds of the promise
-        came too late: the walker has gone through them with zero torque.
+        torques[i] [N m] holds from times_ns[i] to the next time, the last to `valid_until_ns`.
+        Before the first, or if there are none, the torque is zero. Returns how many nanoseconds of
+        the promise came too late: the walker has passed them with zero torque.
 
         Raises ValueError if the pieces are out of order, not finite, or contradict an earlier
         promise.
@@ -145,7 +145,7 @@ class Walker:
         return promise.extend(times_ns, torques, int(valid_until_ns), self.time_reached)
 
     def promise(self, profile: TorqueProfile) -> int:
-        """Take what an ankle robot promises; as `extend_torque`."""
+        """Take an ankle robot's promise, as `extend_torque` does."""
         return self.extend_torque(
             profile.side, profile.times, profile.torques, profile.valid_until
         )
@@ -159,8 +159,8 @@ class Walker:
         """
         Walk up to `until_ns` and return the new events with stamps up to it, in order.
 
-        Torque past `valid_until` counts as zero, for good. If the walk ends before, `ending` is
-        set and `time_reached` stays at its stamp.
+        Torque past `valid_until` counts as zero, permanently. If the walk ends before `until_ns`,
+        `ending` is set and `time_reached` stays at its stamp.
         """
         if self.ending is not None:
             return []
@@ -186,9 +186,9 @@ class Walker:
 
     def sample(self, times_ns: Stamps) -> Samples:
         """
-        Sample what the last `advance` went through, both its ends included.
+        Sample the stretch of the last `advance`, including both ends.
 
-        `times_ns` (n,) are stamps [ns] in any order. Raises ValueError for one outside.
+        `times_ns` (n,) are stamps [ns] in any order. Raises ValueError if one is outside.
         """
         times = np.ascontiguousarray(times_ns, np.int64)
         first, last = self._sampled_from, self.time_reached
@@ -208,7 +208,7 @@ class Walker:
         return Torques(changes, torques, left[0].size)
 
     def _forget(self) -> None:
-        """Keep of the log and the torque only what the coming stretch and its samples need."""
+        """Keep only the log entries and torques that the next stretch and its samples need."""
         log = self._log[: self._count]
         first = max(0, int(np.searchsorted(log["after"], self.time_reached)) - 1)
         kept = log[first:].copy()
