@@ -33,7 +33,7 @@ def run_figures(run: RecordedRun) -> dict[str, Any]:
     """
     Return the figures of a run by name.
 
-    Of a robot whose pulses all begin at their command there is no figure of their timing.
+    If all pulses begin at their command, there is no figure of their timing.
     """
     figures = {"stride_period": _stride_period(run), "phase_lag": _phase_lag(run)}
     if timing_summary(timing_outcome(run.timings, run.measured_period)):
@@ -45,13 +45,13 @@ def run_figures(run: RecordedRun) -> dict[str, Any]:
 def draw_figures(run: RecordedRun, folder: Path) -> list[Path]:
     """Draw the figures of a run as PNG and SVG files into a folder; return their paths."""
     drawn = run_figures(run).items()
-    return [path for name, one in drawn for path in drawing.save_figure(one, folder, name)]
+    return [path for name, figure in drawn for path in drawing.save_figure(figure, folder, name)]
 
 
 def _new_figure(
     run: RecordedRun, title: str, height: float = _HEIGHT, *, right: float = 0.15, top: float = 0.6
 ) -> tuple[Any, Any]:
-    """Return a figure and its axes; fitting the margins [inch] would take as long as to draw."""
+    """Return a figure and its axes; fixed margins [inch], as fitting them doubles the time."""
     figure, axes = drawing.new_figure(size=(_WIDTH, height), layout=None)
     figure.subplots_adjust(
         left=0.8 / _WIDTH, right=1 - right / _WIDTH, bottom=0.9 / height, top=1 - top / height
@@ -73,7 +73,7 @@ def _new_figure(
 
 
 def _parts(run: RecordedRun) -> list[tuple[str, Analysis]]:
-    """Return the analysis of each block with its name; of a run without blocks, the whole."""
+    """Return the name and analysis of each block, or of the whole run if it has no blocks."""
     return [(block.name, block.analysis) for block in run.blocks] or [("", run.analysis)]
 
 
@@ -95,22 +95,22 @@ def _add_percent(run: RecordedRun, add_axis: Any, place: str) -> None:
 
 def _stride_period(run: RecordedRun) -> Any:
     figure, axes = _new_figure(run, "Stride period")
-    # Each block has periods of its own; those of a run without blocks hold throughout.
-    for one in run.blocks or [run]:
+    # Each block has its own periods; those of a run without blocks apply throughout.
+    for part in run.blocks or [run]:
         line = {"color": GREY, "ls": "--", "lw": 1.2}
-        if isinstance(one, JudgedBlock):
-            strides = one.first_stride, one.last_stride or one.first_stride
-            axes.plot(strides, [one.measured_period] * 2, label="unperturbed", **line)
-        elif np.isfinite(period := one.measured_period):
+        if isinstance(part, JudgedBlock):
+            strides = part.first_stride, part.last_stride or part.first_stride
+            axes.plot(strides, [part.measured_period] * 2, label="unperturbed", **line)
+        elif np.isfinite(period := part.measured_period):
             axes.axhline(period, label=f"unperturbed {period:.4f} s", **line)
-        if not (pulses := one.analysis.pulses):
+        if not (pulses := part.analysis.pulses):
             continue
         span = pulses[0].stride - 0.5, pulses[-1].stride + 0.5
         axes.axvspan(*span, color=ORANGE, alpha=0.10, lw=0, label="pulses")
         found = np.array([(p.number, p.stride, p.onset) for p in pulses], np.int64)
         count, strides, elapsed = np.diff(found, axis=0).T
-        # None across a pause, nor of pulses by phase, which follow the strides.
-        follows = (strides <= 4 * count) & np.isfinite(one.pulse_period)
+        # No interval across a pause, nor for pulses by phase, which follow the strides.
+        follows = (strides <= 4 * count) & np.isfinite(part.pulse_period)
         intervals = np.where(follows, elapsed / count / NANOSECONDS_PER_SECOND, np.nan)
         line = {"color": ORANGE, "ls": "-.", "lw": 1.2}
         if follows.any():
@@ -125,7 +125,7 @@ def _stride_period(run: RecordedRun) -> Any:
 
 
 def _phase_lag(run: RecordedRun) -> Any:
-    """Draw each lag at its pulse's place in the walk, and the double stance that it refers to."""
+    """Draw each lag at its pulse's place in the walk, with the double stance that it refers to."""
     figure, axes = _new_figure(run, "Phase lag of the pulses", right=0.8)
     strikes = np.sort([e.stamp for e in run.events if e.kind is EventKind.HEEL_STRIKE])
     rows: list[tuple[float, float, float]] = []  # place, lag and double stance [ms]
@@ -150,7 +150,7 @@ def _phase_lag(run: RecordedRun) -> Any:
     axes.plot(places, lags, label="pulse onset", **_DOTTED_LINE)
     for last in (entrainment for _, part in _parts(run) for entrainment in part.entrainments[-1:]):
         if since := last.entrained_since_stride:
-            axes.axvline(since, color=GREEN, lw=1.2, label="from here near its final lag")
+            axes.axvline(since, color=GREEN, lw=1.2, label="near its final lag from here on")
     axes.set(ylabel=f"onset minus {zero} [ms]")
     _add_percent(run, axes.secondary_yaxis, "right")
     _over_strides(figure, axes, run, 20.0)
@@ -158,7 +158,7 @@ def _phase_lag(run: RecordedRun) -> Any:
 
 
 def _over_strides(figure: Any, axes: Any, run: RecordedRun, least: float) -> None:
-    """Shade the strides whose record has holes, show a range of at least so much, add a legend."""
+    """Shade strides with holes, set a range of at least ``least``, add labels and a legend."""
     strides, shaded = run.analysis.strides, set[int]()
     for hole in holes_of(run):
         before = max((s.number for s in strides if s.end <= hole.start), default=0)
@@ -175,7 +175,7 @@ def _over_strides(figure: Any, axes: Any, run: RecordedRun, least: float) -> Non
 
 
 def _pulse_timing(run: RecordedRun) -> Any:
-    """Draw the share of pulses that were sent, and measured, at most so late."""
+    """Draw the distribution of how late pulses were sent, and were measured."""
     title = f"Timing of {len(run.timings)} pulses"
     figure, axes = _new_figure(run, title, _HEIGHT + 0.7, top=1.1)
     for kind, colour, style in (("sent", ORANGE, "--"), ("measured", BLUE, "-")):
@@ -190,13 +190,13 @@ def _pulse_timing(run: RecordedRun) -> Any:
         axes.ecdf(lateness_ms(run.timings, kind), color=colour, ls=style, label=label)
     axes.set(xlabel="onset after its command [ms]", ylabel="share of the pulses", ylim=(0, 1.02))
     _add_percent(run, axes.secondary_xaxis, "top")
-    axes.axvline(0, color=GREY, lw=1.2)  # so that the command is in view
+    axes.axvline(0, color=GREY, lw=1.2)  # keeps the command in view
     _add_legend_below(figure, axes)
     return figure
 
 
 def _ankle_torque(run: RecordedRun) -> Any:
-    """Draw one line of ankle torque per stride, from its heel strike on, as Fig. 7."""
+    """Draw one line of ankle torque per stride, from its heel strike on, as in Fig. 7."""
     rows = drawn_strides(run)
     figure, axes = _new_figure(
         run, "Ankle torque stride by stride", 2.2 + 0.24 * len(rows), right=0.7
@@ -209,13 +209,13 @@ def _ankle_torque(run: RecordedRun) -> Any:
         inside = (torques.stamps >= stride.start) & (torques.stamps < stride.end)
         time = (torques.stamps[inside] - stride.start) / NANOSECONDS_PER_SECOND
         own = torques.intrinsic[inside] * scale
-        whole = own + torques.effective[inside] * scale
+        total = own + torques.effective[inside] * scale
         bar = np.where(torques.delivered[inside] != 0, row + 0.12, np.nan)
         filled = {"color": BLUE, "alpha": 0.35, "lw": 0, "label": "own push-off"}
         axes.fill_between(time, row, row - own, **filled)
         filled = {"color": ORANGE, "lw": 0, "label": "pulse that acts"}
-        axes.fill_between(time, row - own, row - whole, **filled)
-        axes.plot(time, row - whole, color=BLUE, lw=0.6)
+        axes.fill_between(time, row - own, row - total, **filled)
+        axes.plot(time, row - total, color=BLUE, lw=0.6)
         axes.plot(time, bar, color=ORANGE, lw=2, solid_capstyle="butt", label="pulse delivered")
         axes.text(longest * 1.02, row, f"{stride.period:.4f} s", fontsize=7, va="bottom")
     axes.text(longest * 1.02, -0.85, "stride period", fontsize=7)

@@ -22,7 +22,7 @@ from gait_entrainment_bags.reader import BagReader
 FASTEST = float("inf")
 """Rate at which every message is due immediately: the caller sets the pace."""
 
-# In a longer silence [ns] ticks are skipped at this rate: the next log time may be years ahead.
+# `FASTEST` skips the ticks in a longer silence [ns]: the next log time may be years ahead.
 _LONGEST_TICKING = 3600 * NANOSECONDS_PER_SECOND
 # Number of messages that are read ahead while the previous ones are taken.
 _AHEAD = 2000

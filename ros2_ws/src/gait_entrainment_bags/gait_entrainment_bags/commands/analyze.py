@@ -29,9 +29,9 @@ from gait_entrainment_sensors.offline import read_events, read_onsets
 DESCRIPTION = "Analyze a bag again, and compare the result with what was published live."
 EXAMPLES = """examples:
   entrain analyze bags/paper_example            outcome of a recorded run
-  entrain analyze bags/paper_example --json     one JSON object, as of entrain simulate
+  entrain analyze bags/paper_example --json     one JSON object, as from entrain simulate
   entrain analyze bags/mine --onset measured    pulses begin where the measured torque rises
-  entrain analyze bags/mine --figures out --dpi 300    draws the figures into the folder out
+  entrain analyze bags/mine --figures out --dpi 300    also draws figures into the folder out
   entrain analyze theirs --protocol mine.yaml   recorded by ros2 bag record
   entrain analyze --events walk_events.tsv --pulses pulses.tsv --side right
                                                 recorded without this project
@@ -56,7 +56,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="SECONDS",
         help=f"with --events: {TOE_OFF_BIAS.meaning} (default 0)",
     )
-    parser.add_argument("--figures", type=Path, metavar="FOLDER", help="draw figures into it")
+    parser.add_argument("--figures", type=Path, metavar="FOLDER", help="draw figures into FOLDER")
     add_dpi_option(parser)
     cli.add_onset_option(parser, onset=None)
     cli.add_json_option(parser)
@@ -67,8 +67,8 @@ def run(options: argparse.Namespace) -> int:
     if options.bag is None or any(getattr(options, name) is not None for name in TABLES):
         return _of_tables(options)
     drawn = options.figures is not None
-    told = told_of_record(options)
-    recorded = read_run(options.bag, torques=drawn, onset=options.onset, **told)
+    given = told_of_record(options)
+    recorded = read_run(options.bag, torques=drawn, onset=options.onset, **given)
     figures: list[Path] = []
     if drawn:
         with chosen_dpi(options):
@@ -96,31 +96,31 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _of_tables(options: argparse.Namespace) -> int:
-    """Analyze a table of events and one of pulses, and print."""
+    """Analyze a table of events and a table of pulses, and print."""
     lacking = [f"--{name}" for name in (*TABLES, "side") if getattr(options, name) is None]
     if options.bag is not None or lacking:
         wrong = f"missing: {', '.join(lacking)}" if lacking else "not both"
-        raise UsageError(f"give BAG, or else --events, --pulses and --side; {wrong}")
+        raise UsageError(f"give either BAG or --events, --pulses and --side; {wrong}")
     if options.figures is not None or options.onset is not None:
         raise UsageError("--figures and --onset need a BAG")
-    told = told_of_record(options)
+    given = told_of_record(options)
     bias = float(TOE_OFF_BIAS.parse("--toe-off-bias", options.toe_off_bias or "0"))
     events, onsets = read_events(options.events), read_onsets(options.pulses)
-    analysis = analyze(without_bias(events, bias), onsets, told["side"])
+    analysis = analyze(without_bias(events, bias), onsets, given["side"])
     if not analysis.strides:
         raise UsageError(
-            f"{options.events}: holds no stride of the {options.side} leg that can be, from heel "
-            "strike to heel strike; onset is in seconds, and step counts both legs"
+            f"{options.events}: holds no stride of the {options.side} leg of a plausible length, "
+            "heel strike to heel strike; onset is in seconds, and step counts both legs"
         )
     start, end = analysis.strides[0].start, analysis.strides[-1].end
     if not any(start <= onset <= end for onset in onsets):
         raise UsageError(
             f"{options.pulses}: column onset: {onsets[0] / 1e9:g} to {onsets[-1] / 1e9:g} s; "
-            f"allowed: some in the strides, {start / 1e9:g} to {end / 1e9:g} s by the same clock"
+            f"allowed: some in the strides, {start / 1e9:g} to {end / 1e9:g} s on the same clock"
         )
-    periods = periods_of(conducted(told["protocol"], events), analysis)
-    delivered = tuple((told["side"], PulseTiming(onset)) for onset in onsets)
-    run = Run(told["protocol"], tuple(events), delivered, *periods, analysis, ())
+    periods = periods_of(conducted(given["protocol"], events), analysis)
+    delivered = tuple((given["side"], PulseTiming(onset)) for onset in onsets)
+    run = Run(given["protocol"], tuple(events), delivered, *periods, analysis, ())
     outcome = outcome_of(run) | ({"toe_off_bias": bias} if bias else {})
     lines = [summary(outcome), *detection_lines(outcome)]
     print(json.dumps(outcome) if options.json else "\n".join(lines))

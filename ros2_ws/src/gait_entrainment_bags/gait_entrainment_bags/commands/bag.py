@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""entrain bag: what is in a bag, what is wrong with it, rescuing it, tables of it."""
+"""entrain bag: show, check, rescue and export bags."""
 
 import argparse
 import json
@@ -25,24 +25,24 @@ EXAMPLES = """examples:
 """
 _BAG = "folder or .mcap file"
 # What each action does, with examples.
-_INFO = """Say what is in a bag, from its index.
+_INFO = """Show what is in a bag, from its index.
 
 examples:
   entrain bag info bags/paper_example
   entrain bag info recording_0.mcap --json
 """
-_CHECK = """Print one line for each rule that is broken, and which reader stumbles over it.
+_CHECK = """Print one line for each broken rule, and what it means for readers of the bag.
 
 examples:
   entrain bag check bags/paper_example
   entrain bag check bags/*/ --json               one JSON object per bag, one per line
 
-Exit code 1 if a rule is broken that makes a reader fail; warnings alone give 0.
+Exit code 1 if a broken rule makes a reader fail; warnings alone give 0.
 """
-_RECOVER = """Write all that can be read into a new bag, and say what is missing.
+_RECOVER = """Write everything that can be read into a new bag, and report what is missing.
 
 examples:
-  entrain bag recover bags/broken bags/rescued   into a new bag; the old one is left as it is
+  entrain bag recover bags/broken bags/rescued   into a new bag; the old one is not changed
 
 Exit code 1 if there is nothing to rescue.
 """
@@ -60,7 +60,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     for name, run, purpose, text in (
         ("info", _info, "what is in a bag", _INFO),
         ("check", _check, "rules of rosbag2 that a bag breaks", _CHECK),
-        ("recover", _recover, "rescue what can be read of a broken bag", _RECOVER),
+        ("recover", _recover, "rescue what can be read from a broken bag", _RECOVER),
         ("export", _export, "a table per topic", _EXPORT),
     ):
         description, _, examples = text.partition("\n\n")
@@ -77,7 +77,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         else:
             action.add_argument("bag", type=Path, metavar="BAG", help=_BAG)
         if name in ("recover", "export"):
-            action.add_argument("out", type=Path, metavar="OUT", help="folder to make")
+            action.add_argument("out", type=Path, metavar="OUT", help="folder to create")
         if name == "export":
             action.add_argument("--format", choices=FORMATS, default="csv", help="default: csv")
             default = "default: all with messages"
@@ -91,7 +91,7 @@ def _info(options: argparse.Namespace) -> int:
         topics = [(name, bag.topics[name].type, bag.counts[name]) for name in sorted(bag.topics)]
     if options.json:
         columns = ("name", "type", "messages")
-        told = {
+        info = {
             "path": str(bag.path),
             "files": [*map(str, bag.files)],
             "size": bag.size,
@@ -102,7 +102,7 @@ def _info(options: argparse.Namespace) -> int:
             "custom_data": bag.custom_data,
             "ros_distro": bag.ros_distro,
         }
-        print(json.dumps(told))
+        print(json.dumps(info))
         return 0
     print(f"files      {len(bag.files)}, {bag.size / 1e6:.1f} MB")
     for file in bag.files:
@@ -110,7 +110,7 @@ def _info(options: argparse.Namespace) -> int:
     if bag.message_count:
         print(f"start      {_date(bag.start)}")
         print(f"duration   {duration / NANOSECONDS_PER_SECOND:.3f} s")
-    print(f"recorded   with ROS 2 {bag.ros_distro or 'of unknown distribution'}")
+    print(f"recorded   with ROS 2 {bag.ros_distro or '(unknown distribution)'}")
     print(f"messages   {bag.message_count}")
     width = max((len(name) for name in bag.topics), default=0)
     for name, type_name, count in topics:
@@ -177,7 +177,7 @@ def _export(options: argparse.Namespace) -> int:
 
 
 def _date(nanoseconds: int) -> str:
-    """Return an instant as a date of nine digits, UTC."""
+    """Return a time as a UTC date with nine decimals of the second."""
     seconds, rest = divmod(nanoseconds, NANOSECONDS_PER_SECOND)
     date = datetime.fromtimestamp(seconds, timezone.utc)  # 64 bits end in 2554
     return f"{date:%Y-%m-%d %H:%M:%S}.{rest:09d} UTC"

@@ -28,14 +28,14 @@ EXAMPLES = """examples:
   entrain detect walk.csv                       columns time, left_force_z, right_force_z
   entrain detect walk.csv --rate 204.8 --column left_foot_gyro_y_deg=gyr_y ...
   entrain detect walk.csv --detector foot_gyroscope:axis_y=1,toe_off_bias=0.004
-  entrain detect trial.c3d                      force plates, whose feet by the markers
+  entrain detect trial.c3d                      force plates; markers tell the feet apart
   entrain detect bags/mine --detector vertical_force
   entrain detect trial.c3d --detector markers --marker left_heel=L_FCC ...
 columns: docs/sensors.md
 """
-# Detectors in the order in which their signals are looked for.
+# Detectors, in the order in which a file is searched for their signals.
 TRIED = ("vertical_force", "foot_switch", "foot_gyroscope", "shank_gyroscope", "ankle_encoder")
-# What is no detector: it needs the whole recording.
+# Not a detector: it needs the whole recording.
 BY_MARKERS = "markers"
 Found = tuple[list[DetectedEvent], tuple[str, ...]]  # the events, and what is wrong with them
 
@@ -49,12 +49,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--detector",
         metavar="NAME[:OPTION=VALUE,...]",
-        help="default: the first whose columns are there; markers: by position, of C3D",
+        help="default: the first whose columns are found; markers: by position, for C3D",
     )
-    parser.add_argument("--rate", type=float, metavar="HZ", help="instead of a column time [s]")
+    parser.add_argument("--rate", type=float, metavar="HZ", help="replaces a column time [s]")
     for word, meaning in (
-        ("column", "which column of the file a name means"),
-        ("marker", f"which marker of the file is one of {', '.join(MARKERS)}"),
+        ("column", "a column's name in the file"),
+        ("marker", f"name in the file of one of {', '.join(MARKERS)}"),
     ):
         parser.add_argument(
             f"--{word}", action="append", default=[], metavar="NAME=NAME_IN_FILE", help=meaning
@@ -78,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
     taken = {_of_c3d: ("marker", "plates"), _of_table: ("column", "rate")}.get(read, ())
     for name in ("column", "rate", "marker", "plates"):
         if getattr(options, name) and name not in taken:
-            raise UsageError(f"--{name}: {path} is of another kind, which has none")
+            raise UsageError(f"--{name}: does not apply to {path}")
     events, troubles = read(path, options)
     if not events:
         reason = f": {'; '.join(troubles)}" if troubles else ""
@@ -107,7 +107,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _chosen(options: argparse.Namespace) -> Iterator[ChosenDetector]:
-    """Yield the detector that was chosen, or those that are tried in order."""
+    """Yield the chosen detector, or those to try in order."""
     return map(find_detector, [options.detector] if options.detector else TRIED)
 
 
@@ -136,9 +136,9 @@ def _of_c3d(path: Path, options: argparse.Namespace) -> Found:
             f"{BY_MARKERS}"
         )
     sides = None if options.plates is None else _sides(options.plates)
-    found, told = events_on_plates(capture, chosen, sides)
+    found, plate_troubles = events_on_plates(capture, chosen, sides)
     events, troubles = number(found, chosen.name)
-    return events, (*told, *troubles)
+    return events, (*plate_troubles, *troubles)
 
 
 def _sides(text: str) -> list[Side]:
@@ -154,8 +154,8 @@ def _pairs(option: str, given: Sequence[str]) -> dict[str, str]:
     pairs = {}
     for text in given:
         for part in split_options(text):
-            name, equals, there = part.partition("=")
-            if not (name and equals and there):
+            name, equals, in_file = part.partition("=")
+            if not (name and equals and in_file):
                 raise UsageError(f"--{option}: {part!r}; allowed: NAME=NAME_IN_FILE")
-            pairs[name] = there
+            pairs[name] = in_file
     return pairs

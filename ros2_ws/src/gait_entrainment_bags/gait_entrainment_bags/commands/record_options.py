@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Options for what the bag of a recorded run lacks if another recorder made it."""
+"""Options for what the bag of a recorded run may lack if it is from another recorder."""
 
 import argparse
 from pathlib import Path
@@ -19,17 +19,17 @@ def add_record_options(parser: argparse.ArgumentParser, *, needed: bool = True) 
         "--protocol",
         type=Path,
         metavar="FILE",
-        help="the protocol that was conducted (default: as in the bag, if it holds one)",
+        help="the protocol of the run (default: the one in the bag, if any)",
     )
     parser.add_argument(
         "--side",
         choices=[side.name.lower() for side in Side],
-        help="the perturbed leg (default: as in the protocol, else where the robot sat)",
+        help="the perturbed leg (default: as in the protocol, or else the one with the robot)",
     )
 
 
 def told_of_record(options: argparse.Namespace) -> dict[str, Any]:
-    """Return protocol and side as given, None for what is not."""
+    """Return the protocol and the side given as options, None if not given."""
     return {
         "protocol": options.protocol and read_protocol(options.protocol),
         "side": None if options.side is None else Side[options.side.upper()],
