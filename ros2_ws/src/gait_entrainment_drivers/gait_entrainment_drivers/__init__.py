@@ -1,4 +1,4 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Drivers of real ankle robots, emulators of their motors, and the conformance kit."""
+"""Drivers for real ankle robots, motor emulators, and the conformance kit."""

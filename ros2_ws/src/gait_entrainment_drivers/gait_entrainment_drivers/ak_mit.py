@@ -2,19 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-CubeMars AK motors in MIT mode, on the wire.
+The wire format of CubeMars AK motors in MIT mode.
 
-A command is 8 bytes, most significant bit first: position 16, velocity 12, stiffness kp 12,
-damping kd 12, torque 12 bits. A reply is the motor's id, position 16, velocity 12, torque 12
-bits; newer firmware adds temperature and error.
+A command is 8 bytes, most significant bit first: position (16 bits), velocity (12), stiffness kp
+(12), damping kd (12), torque (12). A reply is the motor's id, position (16 bits), velocity (12)
+and torque (12); newer firmware adds a temperature and an error code.
 
-Numbers are scaled by 2^n - 1 over the span and clamped. The manual's 2^n / span overflows at full
-scale, and then decodes as *minus* full torque. Zero lies between two codes and is sent as the
-lower one: on +/-25 N m that is -0.006 N m.
+Values are clamped and scaled by (2^n - 1) / span. The manual's 2^n / span overflows at full scale,
+which then decodes as *minus* full torque. Zero lies between two codes and is sent as the lower
+one: for a range of +/-25 N m that is -0.006 N m.
 
-Public drivers disagree about the ranges, above all of velocity: they depend on motor **and**
-firmware, and a motor does not tell which it is. Check them before anyone is strapped to it, by
-weighing: a motor asked for a torque must show it at a lever on a scale.
+Public drivers disagree about the ranges, especially for velocity: they depend on the motor **and**
+its firmware, and a motor does not report either. Check them by weighing before anyone is strapped
+to it: command a torque and measure it with a lever on a scale.
 """
 
 import math
@@ -30,12 +30,12 @@ ENTER = bytes.fromhex("fffffffffffffffc")
 EXIT = bytes.fromhex("fffffffffffffffd")
 SET_ZERO = bytes.fromhex("fffffffffffffffe")
 
-_Fields = tuple[tuple[float, float, int], ...]  # least and largest value of each, and its bits
+_Fields = tuple[tuple[float, float, int], ...]  # minimum, maximum and bits of each field
 
 
 @dataclass(frozen=True)
 class AkMotor:
-    """Ranges of one motor: symmetric about zero."""
+    """The ranges of one motor, symmetric about zero."""
 
     velocity: float  # [rad/s]
     torque: float  # [N m]
@@ -78,29 +78,29 @@ class Reply:
     position: float  # [rad]
     velocity: float  # [rad/s]
     torque: float  # [N m]
-    error: int = 0  # 0 if all is well, or if the firmware does not tell
-    temperature: float = math.nan  # of the motor [deg C]; NaN if the firmware does not tell
+    error: int = 0  # 0 if there is none, or if the firmware does not report it
+    temperature: float = math.nan  # of the motor [deg C]; NaN if not reported
 
 
 def pack_command(command: Command, motor: AkMotor) -> bytes:
-    """Return the 8 bytes of a command; values out of range are clamped, NaN is refused."""
+    """Encode a command in 8 bytes; out-of-range values are clamped, NaN raises ValueError."""
     return _encode(astuple(command), _of_command(motor)).to_bytes(8, "big")
 
 
 def unpack_command(data: bytes, motor: AkMotor) -> Command:
-    """Return what a command of 8 bytes means to the motor."""
+    """Decode the 8 bytes of a command as the motor does."""
     return Command(*_decode(int.from_bytes(data, "big"), _of_command(motor)))
 
 
 def pack_reply(reply: Reply, motor: AkMotor, length: int, temperature: int = 65) -> bytes:
-    """Return the 6 or 8 bytes of a reply; the temperature byte counts from -40 degrees."""
+    """Encode a reply in 6 or 8 bytes; the temperature byte counts from -40 deg C."""
     bits = _encode((reply.position, reply.velocity, reply.torque), _of_reply(motor))
     data = bytes([reply.motor_id]) + bits.to_bytes(5, "big")
     return data if length == 6 else data + bytes([temperature, reply.error])
 
 
 def unpack_reply(data: bytes, motor: AkMotor) -> Reply | None:
-    """Return a reply of 6 or 8 bytes; None for any other length, which is no reply."""
+    """Decode a reply of 6 or 8 bytes; return None for any other length."""
     if len(data) not in (6, 8):
         return None
     position, velocity, torque = _decode(int.from_bytes(data[1:6], "big"), _of_reply(motor))
@@ -109,7 +109,7 @@ def unpack_reply(data: bytes, motor: AkMotor) -> Reply | None:
 
 
 def resolution(motor: AkMotor) -> float:
-    """Return one step of the torque code [N m]."""
+    """Return the torque resolution, one step of the code [N m]."""
     return 2 * motor.torque / 0xFFF
 
 
@@ -132,7 +132,7 @@ def _encode(values: Iterable[float], fields: _Fields) -> int:
         if value != value:
             raise ValueError("NaN cannot be sent to a motor")
         share = (min(max(value, low), high) - low) / (high - low)
-        # The small term keeps a value that was decoded from a code on that code, despite rounding.
+        # The small term makes a value decoded from a code encode to that code despite rounding.
         code = code << bits | int(share * ((1 << bits) - 1) + 1e-6)
     return code
 

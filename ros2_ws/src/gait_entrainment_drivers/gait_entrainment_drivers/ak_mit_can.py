@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Driver of a CubeMars AK motor in MIT mode on any bus that python-can knows."""
+"""Driver for a CubeMars AK motor in MIT mode on any bus that python-can supports."""
 
 import time
 from dataclasses import dataclass
@@ -17,21 +17,21 @@ from gait_entrainment_drivers.host_timed import HostTimedRobot
 
 @dataclass(frozen=True)
 class AkMitCanOptions(CanMotorOptions):
-    """Bus, motor and transmission."""
+    """Options of the bus, the motor and the transmission."""
 
-    motor: str = setting("AK80-9", "type, which fixes the ranges", choices=tuple(ak_mit.MOTORS))
-    motor_id: int = setting(1, "id of the motor", "", (1, 127))
-    host_id: int = setting(0, "id to which the motor replies", "", (0, 2047))
+    motor: str = setting("AK80-9", "type, which sets the ranges", choices=tuple(ak_mit.MOTORS))
+    motor_id: int = setting(1, "motor id", "", (1, 127))
+    host_id: int = setting(0, "id that the motor replies to", "", (0, 2047))
 
     def __post_init__(self) -> None:
-        """Check every field, and that commands and replies can be told apart."""
+        """Check every field, and that commands and replies have different ids."""
         super().__post_init__()
         if self.host_id == self.motor_id:
-            raise LimitError(f"driver: host_id: {self.host_id}; allowed: not the motor_id")
+            raise LimitError(f"driver: host_id: {self.host_id}; allowed: any id but motor_id")
 
 
 class AkMotorOnCan(CanMotor):
-    """The motor, as the torque loop sees it; docs/drivers.md has wiring and hazards."""
+    """The motor as the torque loop sees it; see docs/drivers.md for wiring and hazards."""
 
     PROTOCOL = "in MIT mode"
     CHECK = "mode and motor_id"
@@ -42,20 +42,20 @@ class AkMotorOnCan(CanMotor):
         self._resolution = ak_mit.resolution(self._motor) * abs(options.ratio)
 
     def open(self) -> None:
-        """Connect, and see that the motor answers without an error."""
+        """Connect, and check that the motor answers without an error."""
         self._open_bus()
-        # Leaving motor mode is harmless whatever the motor is doing, and is answered.
+        # Leaving motor mode is harmless in any state, and the motor answers it.
         reply = self._ask(lambda: self._tell(ak_mit.EXIT), self._reply)
         if reply.error:
             raise DeviceError(
                 f"{self.name} reports: {_fault(reply.error).meaning} "
-                "Remove the cause and switch the motor off and on"
+                "Remove the cause and power-cycle the motor"
             )
 
     def enable(self) -> None:
         """Enter motor mode at zero torque."""
-        # The motor holds its last command, also across modes: zero before and after. A reply does
-        # not say to what: the one to zero must not be taken for one to a frame that got lost.
+        # The motor keeps its last command across modes: send zero before and after. A reply does
+        # not say what it answers: drop the one to zero, lest it pass for one to a lost frame.
         self._ask(lambda: self._command(0.0), self._reply)
         self.forget()
         self._ask(lambda: self._tell(ak_mit.ENTER), self._reply)
@@ -69,7 +69,7 @@ class AkMotorOnCan(CanMotor):
         if reply is None:
             return None
         measured = reply.torque * ratio
-        if abs(measured) < self._resolution:  # zero has no code of its own
+        if abs(measured) < self._resolution:  # zero has no exact code
             measured = 0.0
         faults = (_fault(reply.error),) if reply.error else ()
         return Reading(
@@ -81,7 +81,7 @@ class AkMotorOnCan(CanMotor):
         )
 
     def disable(self) -> None:
-        """Ask for zero and leave motor mode."""
+        """Command zero torque and leave motor mode."""
         self._command(0.0)
         self._tell(ak_mit.EXIT)
 
@@ -92,7 +92,7 @@ class AkMotorOnCan(CanMotor):
         self._send(self._options.motor_id, data)
 
     def _reply(self, message: Any) -> ak_mit.Reply | None:
-        """Understand a reply of this motor to the host; anything else is no reply."""
+        """Decode this motor's reply to the host; return None for any other frame."""
         if message.arbitration_id == self._options.motor_id:
             self._note_command(message)
         if message.arbitration_id != self._options.host_id:
@@ -105,7 +105,7 @@ class AkMotorOnCan(CanMotor):
 
 
 class AkMitCanRobot(HostTimedRobot):
-    """See the module's docstring; docs/drivers.md has wiring and hazards."""
+    """See the module's docstring, and docs/drivers.md for wiring and hazards."""
 
     Options = AkMitCanOptions
     Device = AkMotorOnCan

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""ak_motor_emulator: the motor's side of MIT mode, as a process. See motor_emulator.py."""
+"""ak_motor_emulator: an emulated AK motor in MIT mode, as a process. See motor_emulator.py."""
 
 import sys
 
@@ -10,7 +10,7 @@ from gait_entrainment_drivers.motor_emulator import EmulatedMotor, Frames, run_e
 
 
 class EmulatedAkMotor(EmulatedMotor):
-    """A motor that any frame feeds, and whose watchdog drops the command; it always replies."""
+    """A motor that always replies; any frame feeds its watchdog, which drops the command."""
 
     def __init__(
         self,
@@ -30,13 +30,13 @@ class EmulatedAkMotor(EmulatedMotor):
         self.command = 0.0
 
     def obey(self, identifier: int, data: bytes, *, remote: bool, now: float) -> Frames:
-        """Obey a frame; replies go to the host's id, which is 0."""
+        """Handle a frame; replies go to host id 0."""
         if identifier != self.motor_id or remote:
             return []
         return [(0, self.receive(data, now))]
 
     def receive(self, data: bytes, now: float) -> bytes:
-        """Obey the data of a frame at a time [s] and return those of the reply."""
+        """Handle a frame's data at a time [s]; return the reply's data."""
         self.feed(now)
         if data == ak_mit.ENTER:
             self.enabled = True
@@ -52,7 +52,7 @@ def main() -> int:
     """Run the emulator."""
     return run_emulator(
         "ak_motor_emulator",
-        "The motor's side of a CubeMars AK motor in MIT mode, on a CAN bus.",
+        "Emulate a CubeMars AK motor in MIT mode on a CAN bus.",
         lambda options: EmulatedAkMotor(
             ak_mit.MOTORS[options.motor],
             options.motor_id,
@@ -60,9 +60,9 @@ def main() -> int:
             options.timeout,
             options.reply_bytes,
         ),
-        motor={"choices": ak_mit.MOTORS, "default": "AK80-9", "help": "type of the motor"},
+        motor={"choices": ak_mit.MOTORS, "default": "AK80-9", "help": "motor type"},
         motor_id={"type": int, "default": 1, "help": "1 to 127"},
-        reply_bytes={"type": int, "choices": (6, 8), "default": 8, "help": "length of a reply"},
+        reply_bytes={"type": int, "choices": (6, 8), "default": 8, "help": "reply length"},
     )
 
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A CAN bus by python-can, with one line for whatever keeps it from opening."""
+"""Open a CAN bus with python-can, and report any failure in one line."""
 
 from typing import Any
 
@@ -12,13 +12,13 @@ from gait_entrainment.robot.faults import DeviceError
 
 def open_bus(interface: str, channel: str, bitrate: int, port: int) -> can.BusABC:
     """
-    Open a bus; raises DeviceError if python-can does not know the interface or cannot open it.
+    Open a bus; raise DeviceError if python-can does not know the interface or cannot open it.
 
-    The port is that of udp_multicast, 0 for python-can's own. It keeps two buses on one machine
-    apart; two groups on one port hear each other, since Linux hands a datagram to every socket
-    of the port.
+    ``port`` is the UDP port of udp_multicast; 0 is python-can's default. Two buses on one machine
+    need different ports: groups on the same port hear each other, because Linux delivers a
+    datagram to every socket on its port.
     """
-    # udp_multicast has no bit rate; the others take it, or ignore it if the system sets it.
+    # udp_multicast has no bit rate; other interfaces use it, or ignore it if the system sets it.
     settings: dict[str, Any] = {"bitrate": bitrate}
     if interface == "udp_multicast":
         settings = {"port": port} if port else {}
@@ -34,7 +34,7 @@ def open_bus(interface: str, channel: str, bitrate: int, port: int) -> can.BusAB
 
 
 def send(bus: can.BusABC, identifier: int, data: bytes = b"", *, remote: bool = False) -> None:
-    """Send a frame with an 11-bit id; a remote frame asks for the data."""
+    """Send a frame with an 11-bit id; a remote frame requests data."""
     bus.send(
         can.Message(
             arbitration_id=identifier, data=data, is_extended_id=False, is_remote_frame=remote

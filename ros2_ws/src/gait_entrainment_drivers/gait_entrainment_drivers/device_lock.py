@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-One device, one master: whoever opens a device holds it until it lets go, or dies in whatever way.
+One device, one master: a process that opens a device holds it until it releases it or ends.
 
-What is held is the name of a socket in Linux's abstract namespace, which needs no file and of
-which nothing is left once its process has ended. It reaches as far as the network namespace: two
-containers that share a serial line are not kept apart.
+The lock is the name of a socket in Linux's abstract namespace. It needs no file, and nothing is
+left of it once its process has ended in any way. It applies within one network namespace: it does
+not keep apart two containers that share a serial line.
 """
 
 import errno
@@ -24,10 +24,10 @@ _LONGEST_COMMAND = 80
 
 
 class DeviceLock:
-    """Holds a device, by its address, until released; DeviceError names who holds it already."""
+    """Holds a device by its address until released; DeviceError names its current holder."""
 
     def __init__(self, address: str) -> None:
-        # An address may be longer than a socket's name.
+        # An address may be longer than a socket's name can be.
         name = f"\0{_PREFIX}{hashlib.sha256(address.encode()).hexdigest()}"
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
@@ -37,22 +37,22 @@ class DeviceLock:
             self._socket.close()
             if error.errno != errno.EADDRINUSE:
                 raise
-            raise DeviceError(f"{address} is in use by {_holder(name)}: end that first") from None
+            raise DeviceError(f"{address} is in use by {_holder(name)}: end it first") from None
 
     def release(self) -> None:
-        """Let others open the device."""
+        """Let other processes open the device."""
         self._socket.close()
 
 
 def _holder(name: str) -> str:
-    """Return who listens at a socket's name, in words."""
+    """Describe the process that listens on a socket, by the socket's name."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as asker, suppress(OSError):
         asker.connect(name)
         data = asker.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
         process = Path(f"/proc/{_CREDENTIALS.unpack(data)[0]}")
-        # The torque loop itself says nothing to a person: its parent is what was started.
+        # The user does not know the torque loop itself, but started its parent.
         parent = (process / "status").read_text().partition("PPid:")[2].split()[0]
         command = Path(f"/proc/{parent}/cmdline").read_text(errors="replace").replace("\0", " ")
-        told = command.strip()[:_LONGEST_COMMAND] + "..." * (len(command) > _LONGEST_COMMAND)
-        return f"process {parent} ({told})"
+        text = command.strip()[:_LONGEST_COMMAND] + "..." * (len(command) > _LONGEST_COMMAND)
+        return f"process {parent} ({text})"
     return "another process"

@@ -4,22 +4,22 @@
 """
 An emulated ankle robot with the flaws of a real one, in simulated time.
 
-The device has a torque loop of its own at 1 kHz. At each tick k, counted from the start of the
-run, it takes the torque asked for at the tick minus the transport delay, in steps of its
-resolution and within its peak torque; lets its torque follow as a first-order lag, no faster than
-its torque rate; and holds it until the next tick. So the delivered torque is piecewise constant by
-definition, and the walker integrates it exactly. The rise time (10 to 90 %) of a first-order lag
-is 0.35 / bandwidth.
+The device has its own torque loop at 1 kHz. At each tick, counted from the start of the run, it
+takes the torque requested one transport delay earlier, limits it to the peak torque and rounds it
+to the resolution. Its torque follows as a first-order lag, no faster than the torque rate, and is
+held until the next tick. The delivered torque is therefore piecewise constant by definition, and
+the walker integrates it exactly. The rise time (10 to 90 %) of a first-order lag is
+0.35 / bandwidth.
 
-Three things are random: by how much each pulse comes late (uniform, up to ``jitter``), the ticks
-whose command is lost (the last one holds), and the noise of the measured torque. Each has a
-generator of its own that is drawn from once per pulse or tick: the same seed gives the same
-numbers, however a run is cut into promises.
+Three things are random: the lateness of each pulse (uniform, up to ``jitter``), the ticks whose
+command is lost (the previous one holds), and the noise of the measured torque. Each has its own
+generator, which is drawn from once per pulse or tick: the same seed gives the same numbers,
+however a run is cut into promises.
 
 Not modelled: interaction with the leg (back-drivability, inertia, friction, a joint that moves
-against the torque), thermal limits, saturation by speed, cable stretch and backlash, drift of the
-bias, a drifting clock, and how the torque runs down after a stop or a cancellation: it is zero at
-once. Noise is white.
+against the torque), thermal limits, speed saturation, cable stretch and backlash, drift of the
+bias, a drifting clock, and the decay of the torque after a stop or a cancellation: it is zero
+immediately. Noise is white.
 """
 
 import math
@@ -36,7 +36,7 @@ from gait_entrainment.robot.simulated import SimulatedRobot
 from gait_entrainment.settings import Checked, setting
 
 _TICK = 1_000_000  # of the device's torque loop [ns]
-_BLOCK = 1024  # random numbers that are drawn at a time
+_BLOCK = 1024  # random numbers drawn at a time
 
 
 @dataclass(frozen=True)
@@ -51,11 +51,11 @@ class EmulatedOptions(Checked):
     bandwidth: float = setting(20.0, "torque bandwidth (-3 dB) of the lag", "Hz", (0.5, 300.0))
     peak_torque: float = setting(25.0, "largest torque", "N m", (0.1, 200.0))
     torque_rate: float = setting(2000.0, "steepest change of torque", "N m/s", (1.0, 1e6))
-    delay: float = setting(0.005, "from command to device", "s", (0.0, 0.5))
-    jitter: float = setting(0.002, "by which a pulse comes late at most", "s", (0.0, 0.1))
+    delay: float = setting(0.005, "transport delay from command to device", "s", (0.0, 0.5))
+    jitter: float = setting(0.002, "largest lateness of a pulse", "s", (0.0, 0.1))
     resolution: float = setting(0.01, "step of the torque command", "N m", (1e-4, 5.0))
     noise: float = setting(0.1, "standard deviation of the measured torque", "N m", (0.0, 10.0))
-    bias: float = setting(0.0, "of the measured torque", "N m", (-10.0, 10.0))
+    bias: float = setting(0.0, "bias of the measured torque", "N m", (-10.0, 10.0))
     loss: float = setting(0.001, "share of the ticks whose command is lost", "1", (0.0, 0.9))
     state_rate: float = setting(500.0, "states per second; a divisor of 1000", "Hz", (1.0, 1000.0))
 
@@ -86,11 +86,11 @@ class EmulatedAnkleRobot(SimulatedRobot):
         self._follow = -math.expm1(-2 * math.pi * options.bandwidth * _TICK / 1e9)
         self._largest_step = options.torque_rate * _TICK / 1e9
         self._delay = round(options.delay * 1e9)
-        self._late: list[int] = []  # by how much each pulse of the train comes late [ns]
+        self._late: list[int] = []  # lateness of each pulse of the train [ns]
         self.begin(0)
 
     def begin(self, start: int) -> None:
-        """Start a run: its random numbers begin anew."""
+        """Start a run; its random numbers start over."""
         super().begin(start)
         jitter, loss, noise = np.random.SeedSequence(self._seed).spawn(3)
         self._jitter = np.random.default_rng(jitter)
@@ -100,17 +100,17 @@ class EmulatedAnkleRobot(SimulatedRobot):
         self._tick = 0  # the next one
 
     def schedule(self, train: PulseTrain) -> None:
-        """Take over a train; how late each of its pulses will come is drawn here."""
+        """Take over a train, and draw the lateness of each of its pulses."""
         super().schedule(train)
         late = self._jitter.random(len(train.pulses)) * self._options.jitter
         self._late += [round(seconds * 1e9) for seconds in late]
 
     def cancel(self) -> None:
-        """Drop the train; the torque is zero at once."""
+        """Drop the train; the torque is zero immediately."""
         super().cancel()
         self._late = []
-        self._command = 0.0  # that the device holds [N m]
-        self._torque = 0.0  # that it delivers [N m]
+        self._command = 0.0  # held by the device [N m]
+        self._torque = 0.0  # delivered by it [N m]
 
     def _changes(self, begin: int, until: int) -> Iterator[tuple[int, float]]:
         yield begin, self._torque
@@ -124,13 +124,13 @@ class EmulatedAnkleRobot(SimulatedRobot):
     def _advance(self, instant: int) -> None:
         """Run the device's torque loop once, at a tick [ns]."""
         options = self._options
-        asked = self._asked(instant - self._delay)
+        requested = self._requested(instant - self._delay)
         if next(self._loss) >= options.loss:
-            limited = min(max(asked, -options.peak_torque), options.peak_torque)
+            limited = min(max(requested, -options.peak_torque), options.peak_torque)
             self._command = round(limited / options.resolution) * options.resolution
         gap = self._command - self._torque
         if gap:
-            if abs(gap) < options.resolution / 2:  # nearer than it can tell: arrived
+            if abs(gap) < options.resolution / 2:  # less than the resolution can show: arrived
                 self._torque = self._command
             else:
                 step = gap * self._follow
@@ -138,10 +138,10 @@ class EmulatedAnkleRobot(SimulatedRobot):
         noise = next(self._noise)
         if self._tick % self._ticks_per_state == 0:
             measured = self._torque + options.bias + options.noise * noise
-            self._states.append(RobotState(instant, asked, measured, math.nan))
+            self._states.append(RobotState(instant, requested, measured, math.nan))
 
-    def _asked(self, instant: int) -> float:
-        """Return the torque [N m] that the train asks for, each pulse late by its jitter."""
+    def _requested(self, instant: int) -> float:
+        """Return the torque [N m] that the train requests, each pulse late by its jitter."""
         train = self._train
         if train is None:
             return 0.0
@@ -149,11 +149,11 @@ class EmulatedAnkleRobot(SimulatedRobot):
         if number < 0:
             return 0.0
         if instant < train.onsets[number] + self._late[number] and number > 0:
-            number -= 1  # the pulse before may come so late that it is still on
+            number -= 1  # the previous pulse may be so late that it is still on
         return train.pulses[number].torque_at(instant - self._late[number])
 
 
 def _draws(draw: Callable[[int], np.ndarray]) -> Iterator[float]:
-    """Yield random numbers one at a time, drawn in blocks: a call for each would be slow."""
+    """Yield random numbers singly, but draw them in blocks: one call per number would be slow."""
     while True:
         yield from draw(_BLOCK).tolist()

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Robots whose pulses are timed by the host: the contract's side of a torque loop.
+Robots whose pulses are timed by the host: the driver contract on top of a torque loop.
 
-The loop is a process of its own (torque_loop.py). Here its samples become promises and states, and
-plans are handed to it.
+The loop is a separate process (torque_loop.py). This module sends trains to it, and turns its
+samples into promises and states.
 """
 
 import contextlib
@@ -41,36 +41,36 @@ _ANSWER_TIMEOUT = 2.0
 _REMEMBERED = 10_000
 _LOOP_ENDED = Fault(
     "torque_loop_ended",
-    "The process that streams torque has ended: the device's own watchdog must bring zero. If "
-    "torque is felt, cut the power.",
+    "The process that streams torque has ended: the device's own watchdog must bring the torque "
+    "to zero. If torque is felt, cut the power.",
 )
 _LOOP_SILENT = Fault(
     "torque_loop_silent",
-    "The process that streams torque fell silent for longer than the limit: it, or a call of its "
-    "driver, is frozen. The device's own watchdog must bring zero. If torque is felt, cut "
-    "the power.",
+    "The process that streams torque was silent for longer than the limit: it or a call of its "
+    "driver is frozen. The device's own watchdog must bring the torque to zero. If torque is "
+    "felt, cut the power.",
 )
 
 
 @dataclass(frozen=True)
 class LoopOptions(MonitorSettings):
-    """How the torque loop runs, and what it holds the readings against."""
+    """How the torque loop runs, and how it checks the readings."""
 
     rate: float = setting(500.0, "torque commands per second", "Hz", (50.0, 1000.0))
     silence: float = setting(0.05, "longest silence of the device", "s", (0.005, 1.0))
-    lateness: float = setting(0.05, "by which the loop may wake up late", "s", (0.005, 1.0))
+    lateness: float = setting(0.05, "longest delay in waking up the loop", "s", (0.005, 1.0))
     host_silence: float = setting(
         0.2, "longest silence of the robot's process, or of the loop itself", "s", (0.02, 5.0)
     )
     bandwidth: float = setting(
         30.0,
-        "torque bandwidth (-3 dB) of the device, which it is held against",
+        "torque bandwidth (-3 dB) of the device, by which its readings are judged",
         "Hz",
         (1.0, 500.0),
     )
 
     def capabilities(self, peak_torque: float) -> Capabilities:
-        """Return those of a device that measures its torque, of a peak [N m]."""
+        """Return the capabilities of a device that measures its torque, for a peak [N m]."""
         return Capabilities(
             peak_torque,
             torque_rate=math.inf,
@@ -83,11 +83,11 @@ class LoopOptions(MonitorSettings):
 
 class HostTimedRobot(AnkleRobot):
     """
-    A device to which the host streams torque at a fixed rate, from a process of its own.
+    A device to which the host streams torque at a fixed rate, from a separate process.
 
     A driver names its device, a TorqueDevice; its options must have the fields of LoopOptions.
-    A state's stamp is the instant at which the command was sent; what it measured is up to one
-    round trip younger. After a fault the loop goes on and commands zero torque.
+    A state's stamp is the time at which the command was sent; the measurement is up to one round
+    trip later. After a fault the loop continues and commands zero torque.
     """
 
     Device: ClassVar[type[TorqueDevice]]
@@ -106,16 +106,16 @@ class HostTimedRobot(AnkleRobot):
         self._held = 0.0  # torque of the last sample that was promised [N m]
         self._promised = 0  # up to this instant [ns]; 0 until a run begins
         self._offset = time.time_ns() - time.monotonic_ns()  # from steady time to stamps
-        self._done: dict[str, str] = {}  # answers of the loop: error texts
-        # The loop ends its torque by itself if it is late, and comes no more often than its rate.
+        self._done: dict[str, str] = {}  # the loop's answers: error texts
+        # The loop ends its torque by itself if it is late, and reports once per period at most.
         self._patience = max(options.host_silence, options.lateness + 2 / options.rate)
-        self._streams, self._heard_at = False, 0.0  # the loop, and when it was heard last [s]
+        self._streams, self._heard_at = False, 0.0  # whether the loop streams; last heard at [s]
         self._latest = 0  # stamp of its latest sample [ns]
 
     # Lifecycle
 
     def configure(self) -> None:
-        """Start the loop and let it connect."""
+        """Start the loop and have it connect."""
         self._faults, self._train, self._done = (), None, {}
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
@@ -123,7 +123,7 @@ class HostTimedRobot(AnkleRobot):
                 [sys.executable, "-m", _LOOP, str(theirs.fileno())],
                 pass_fds=[theirs.fileno()],
                 stdin=subprocess.DEVNULL,
-                env={**os.environ, "PYTHONSAFEPATH": "1"},  # of modules in the working folder
+                env={**os.environ, "PYTHONSAFEPATH": "1"},  # no modules of the working folder
                 start_new_session=True,  # a terminal's Ctrl-C and Ctrl-Z are for the parent
             )
         self._link = Link(ours)
@@ -131,19 +131,19 @@ class HostTimedRobot(AnkleRobot):
         self._ask("open", _START_TIMEOUT)
 
     def activate(self) -> None:
-        """Let the loop enable the device and stream zero torque."""
+        """Have the loop enable the device and stream zero torque."""
         self._promised = 0
         self._ask("enable")
         self._streams = True
 
     def deactivate(self) -> None:
-        """Let the loop bring the torque to zero and disable the device."""
+        """Have the loop bring the torque to zero and disable the device."""
         self._train, self._streams = None, False
         if self._process is not None and _LOOP_ENDED not in self._faults:
             self._ask("disable")
 
     def close(self) -> None:
-        """End the loop, which brings the torque to zero on its way out."""
+        """End the loop, which brings the torque to zero before it exits."""
         process, link = self._process, self._link
         self._process = self._link = None
         if process is None or link is None:
@@ -159,20 +159,20 @@ class HostTimedRobot(AnkleRobot):
     # A run
 
     def begin(self, start: int) -> None:
-        """Start the account of a run."""
+        """Start the record of a run."""
         self.cancel()
         self._listen()
         self._promised, self._latest, self._states = start, time.time_ns(), []
-        # Stamps from before are of another offset, if the wall clock was set meanwhile.
+        # Earlier stamps have another offset if the wall clock was set meanwhile.
         self._held = self._samples[-1][1] if self._samples else 0.0
         self._samples = []
         self._offset = time.time_ns() - time.monotonic_ns()
 
     def schedule(self, train: PulseTrain) -> None:
-        """Hand over a train; LimitError if its first onset is over already."""
+        """Hand over a train; raise LimitError if its first onset is in the past."""
         late = time.monotonic_ns() + self._offset - train.onsets[0]
         if late > 0:
-            raise LimitError(f"onset: is over by {late / NANOSECONDS_PER_SECOND:.3g} s")
+            raise LimitError(f"onset: {late / NANOSECONDS_PER_SECOND:.3g} s in the past")
         self._train = self._train.followed_by(train) if self._train else train
         self._tell("train", train.shifted(-self._offset))
 
@@ -182,7 +182,7 @@ class HostTimedRobot(AnkleRobot):
         self._tell("cancel")
 
     def stop(self) -> None:
-        """Drop the train for good: the loop's next command is zero."""
+        """Drop the train permanently; the loop's next command is zero."""
         self._train = None
         self._tell("stop")
 
@@ -191,7 +191,7 @@ class HostTimedRobot(AnkleRobot):
         self._listen()
         begin = self._promised
         known = [sample for sample in self._samples if sample[0] < until]
-        # The last sample holds until a later one is known: it is told with that.
+        # The last sample holds until a later one is known, and is promised with that one.
         end = until if len(known) < len(self._samples) else known[-1][0] if known else begin
         end = max(end, begin)
         self._samples = [sample for sample in self._samples if sample[0] >= end]
@@ -203,7 +203,7 @@ class HostTimedRobot(AnkleRobot):
         return profile
 
     def read(self) -> Sequence[RobotState]:
-        """Return one state for each command that was answered, and each one without an answer."""
+        """Return a state for each answered command and, after a fault, for each unanswered one."""
         self._tell("alive")
         self._listen()
         states, self._states = self._states, []
@@ -215,7 +215,7 @@ class HostTimedRobot(AnkleRobot):
         process = self._process
         if process is None:
             raise DeviceError("the torque loop is not running; configure first")
-        # It stops itself, so that no command is half sent.
+        # It stops itself, because no command may be sent only in part.
         self._tell("freeze")
         give_up = time.monotonic() + _ANSWER_TIMEOUT
         try:
@@ -234,7 +234,7 @@ class HostTimedRobot(AnkleRobot):
             self._link.send(*message)
 
     def _ask(self, kind: str, timeout: float = _ANSWER_TIMEOUT) -> None:
-        """Let the loop do something; raise DeviceError if it cannot, or does not answer."""
+        """Have the loop do something; raise DeviceError if it fails or does not answer."""
         link, give_up = self._link, time.monotonic() + timeout
         if link is None:
             raise DeviceError("the torque loop is not running; configure first")
@@ -252,7 +252,7 @@ class HostTimedRobot(AnkleRobot):
             raise DeviceError(error)
 
     def _listen(self) -> None:
-        """Take what the loop has told."""
+        """Take the loop's messages."""
         if self._link is None:
             return
         try:
@@ -280,7 +280,7 @@ class HostTimedRobot(AnkleRobot):
                 (self.identity,) = content
 
     def _miss(self, fault: Fault) -> None:
-        """Report that the loop is not heard any more, at the instant that it told of last."""
+        """Report that the loop is no longer heard, with the stamp of its latest sample."""
         if fault not in self._faults:
             self._train, self._faults = None, (*self._faults, fault)
             state = RobotState(self._latest, 0.0, math.nan, math.nan, self._faults)
@@ -290,7 +290,7 @@ class HostTimedRobot(AnkleRobot):
         stamp, reading = sample.sent + self._offset, sample.reading
         self._late.append(sample.late)
         self._latest = stamp
-        if not self._promised:  # nobody asks for samples until a run begins
+        if not self._promised:  # samples are not used until a run begins
             self._samples, self._states = self._samples[-1:], self._states[-1:]
         if reading is not None:
             self._samples.append((stamp, reading.torque))

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The link between a robot's process and its torque loop: messages that nobody waits for.
+The link between a robot's process and its torque loop: messages that are sent without waiting.
 
-A message is a pickled tuple, its first element the kind of message; a long one comes in several
-packets. The loop never blocks: what the other side does not take at once is kept and sent with the
-next packet, so that a robot's process that was held up has lost no sample.
+A message is a pickled tuple whose first element is the kind of message; a long one takes several
+packets. The loop never blocks: what the other side does not take immediately is kept and sent with
+the next packet, so a robot's process that was held up loses no samples.
 """
 
 import pickle
@@ -19,9 +19,9 @@ from typing import Any
 
 from gait_entrainment_drivers.device import Reading
 
-# Samples in one message at most: the loop is not to be held up by it.
+# Most samples in one message, which must not hold up the loop.
 _MESSAGE_SAMPLES = 200
-# It has to fit into a socket's buffer. Its first byte says whether more of its message comes.
+# A packet must fit into a socket's buffer. Its first byte says if its message continues.
 _LARGEST_PACKET = 1 << 16
 _MORE, _LAST = b"+", b"."
 
@@ -33,21 +33,21 @@ class Sample:
     sent: int  # steady time [ns]
     commanded: float  # [N m]
     reading: Reading | None
-    late: float  # by how much the command came late [s]
+    late: float  # delay of the command [s]
 
 
 class Link:
-    """One end of the link; any thread may send, a stop among others."""
+    """One end of the link; any thread may send, for example a stop."""
 
     def __init__(self, end: socket.socket) -> None:
         self._socket = end
         end.setblocking(False)
-        self._waiting: deque[bytes] = deque()  # packets that have not been sent yet
-        self._begun = b""  # of a message whose last packet has not come yet
-        self._sending = threading.RLock()  # nobody waits while it is held: sends do not block
+        self._waiting: deque[bytes] = deque()  # packets not sent yet
+        self._begun = b""  # of a message whose last packet has not arrived yet
+        self._sending = threading.RLock()  # held only briefly: sends do not block
 
     def fileno(self) -> int:
-        """Return the descriptor that becomes readable with a message."""
+        """Return the descriptor that becomes readable when a message arrives."""
         return self._socket.fileno()
 
     def send(self, *message: Any) -> None:
@@ -60,7 +60,7 @@ class Link:
             self._flush()
 
     def send_samples(self, samples: list[Any]) -> None:
-        """Send samples as far as the other side takes them, and empty the list by as many."""
+        """Send as many samples as the other side takes, and remove them from the list."""
         with self._sending:
             self._flush()
             while samples and not self._waiting:
@@ -68,7 +68,7 @@ class Link:
                 del samples[:_MESSAGE_SAMPLES]
 
     def received(self) -> list[Any]:
-        """Return the messages since the last call; EOFError if the other side has ended."""
+        """Return the messages since the last call; raise EOFError if the other side has ended."""
         messages: list[Any] = []
         while True:
             try:
@@ -87,7 +87,7 @@ class Link:
                 self._begun = b""
 
     def first(self) -> Any:
-        """Wait for the first message, a short one, and leave those behind it."""
+        """Wait for the first message, which is short; leave later ones unread."""
         select.select([self._socket], [], [])
         return pickle.loads(self._socket.recv(_LARGEST_PACKET)[1:])
 
@@ -99,8 +99,8 @@ class Link:
         except BlockingIOError:
             pass
         except ConnectionError:
-            self._waiting.clear()  # nobody is left to tell; `received` says so
+            self._waiting.clear()  # the other side has ended, which `received` reports
 
     def close(self) -> None:
-        """Close this end: the other one sees it."""
+        """Close this end, which the other end notices."""
         self._socket.close()

@@ -2,14 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The motor's side of a CAN bus as a process of its own: what the emulators share.
+Code shared by the motor emulators: the motor's side of a CAN bus, as a separate process.
 
-An emulator speaks on any python-can bus that crosses processes and does to its users what a real
-motor does: it holds the last command when frames stop, unless its own watchdog is switched on
-(real ones have it off by default); frames get lost; errors come up.
+An emulator runs on any python-can bus that connects processes, and has the hazards of a real
+motor: it holds the last command when frames stop, unless its own watchdog is switched on (real
+motors have it off by default); frames get lost; errors occur.
 
 Its torque follows the command as a first-order lag. Not modelled: motion (position and velocity
-are zero), heat, supply, arbitration and load of the bus, bit errors.
+are zero), heat, supply, bus arbitration and load, bit errors.
 """
 
 import argparse
@@ -33,21 +33,21 @@ from gait_entrainment_drivers.can_bus import open_bus, send
 Frames = list[tuple[int, bytes]]  # id and data of each
 
 _PRIORITY = 60  # above the loop that times the torque
-# How often the emulator looks after itself while no frame comes [s].
+# Update period of the emulator while no frame arrives [s].
 _TICK = 0.001
-# Name, type, default and meaning of what every emulator takes.
+# Name, type, default and meaning of the options that every emulator has.
 _OPTIONS: tuple[tuple[str, Callable[[str], object], object, str], ...] = (
     ("--interface", str, "udp_multicast", "python-can interface"),
-    ("--channel", str, "239.74.163.2", "channel of the bus"),
-    ("--port", int, 0, "UDP port of udp_multicast; 0: python-can's own"),
-    ("--bandwidth", float, 30.0, "bandwidth of the torque [Hz]"),
-    ("--timeout", float, 0.0, "the motor's own watchdog [s]; 0 is off"),
-    ("--loss", float, 0.0, "share of the frames that get lost"),
-    ("--seed", int, 0, "seed of the losses"),
-    ("--error", lambda text: int(text, 0), 0, "error that comes up"),
+    ("--channel", str, "239.74.163.2", "bus channel"),
+    ("--port", int, 0, "UDP port of udp_multicast; 0 is python-can's default"),
+    ("--bandwidth", float, 30.0, "torque bandwidth [Hz]"),
+    ("--timeout", float, 0.0, "timeout of the motor's own watchdog [s]; 0 is off"),
+    ("--loss", float, 0.0, "share of frames that are lost"),
+    ("--seed", int, 0, "random seed of the losses"),
+    ("--error", lambda text: int(text, 0), 0, "error that the motor reports"),
     ("--error-after", float, 0.0, "from the first torque to the error [s]"),
     ("--silent-after", float, math.inf, "from the first torque to the last answer [s]"),
-    ("--trace", Path, None, "file for time [ns], command and torque [N m], a line each"),
+    ("--trace", Path, None, "file for time [ns], command and torque [N m], one line per update"),
 )
 
 
@@ -55,8 +55,8 @@ class EmulatedMotor(ABC):
     """
     The motor itself, without a bus: frames in, replies out, torque as a function of time.
 
-    ``bandwidth`` is that of the torque [Hz]. The motor's own watchdog acts when it was not fed for
-    longer than ``timeout`` [s]; 0 switches it off.
+    ``bandwidth`` [Hz] is that of the torque. The motor's own watchdog expires when it is not fed
+    for longer than ``timeout`` [s]; 0 switches it off.
     """
 
     def __init__(self, bandwidth: float, timeout: float) -> None:
@@ -89,10 +89,10 @@ class EmulatedMotor(ABC):
 
     @abstractmethod
     def obey(self, identifier: int, data: bytes, *, remote: bool, now: float) -> Frames:
-        """Obey a frame at a time [s] and return the replies: none if it is for another motor."""
+        """Handle a frame at a time [s]; return the replies, none if it is for another motor."""
 
     def spontaneous(self, now: float) -> Frames:  # noqa: ARG002
-        """Return frames that the motor sends without being asked."""
+        """Return frames that the motor sends without a request."""
         return []
 
 
@@ -103,10 +103,10 @@ def run_emulator(
     **more: dict[str, Any],
 ) -> int:
     """
-    Run a program that emulates a motor, until SIGINT or SIGTERM; 1 if the bus cannot be opened.
+    Run a motor emulator until SIGINT or SIGTERM; return 1 if the bus cannot be opened.
 
-    ``make`` makes the motor from the options; ``more`` are further ones, by their names, as
-    argparse takes them.
+    ``make`` creates the motor from the options; ``more`` are further options, by name, with
+    their arguments for argparse.
     """
     parser = argparse.ArgumentParser(
         name, description=description, formatter_class=argparse.ArgumentDefaultsHelpFormatter
@@ -123,7 +123,7 @@ def run_emulator(
     except DeviceError as error:
         print(f"{name}: {error}", file=sys.stderr)
         return 1
-    with suppress(PermissionError):  # it stands for hardware, which waits for nobody
+    with suppress(PermissionError):  # it represents hardware, which never waits
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
     print(f"{name}: ready", flush=True)
     trace = options.trace.open("w", buffering=1) if options.trace else nullcontext()

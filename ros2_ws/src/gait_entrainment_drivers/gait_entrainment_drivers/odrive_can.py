@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Driver of an ODrive axis by CANSimple on any bus that python-can knows."""
+"""Driver for an ODrive axis with CANSimple on any bus that python-can supports."""
 
 import contextlib
 import itertools
@@ -17,34 +17,34 @@ from gait_entrainment_drivers.can_motor import ANSWER_TIMEOUT, CanMotor, CanMoto
 from gait_entrainment_drivers.device import Reading
 from gait_entrainment_drivers.host_timed import HostTimedRobot
 
-# An axis that does not send its heartbeat this often [s] is asked for it: it can be switched off.
+# If no heartbeat arrives for this long [s], one is requested: an axis can have it switched off.
 HEARTBEAT_PERIOD = 0.15
-# Without one for this long [s], though asked again and again, its errors cannot be seen.
+# Without one for this long [s], despite repeated requests, the axis's errors cannot be seen.
 HEARTBEAT_LOST = 0.5
-# An axis cannot be asked for its mode, and a frame may be lost: it is told so often.
+# An axis does not report its mode, and a frame may be lost: the mode is sent this many times.
 _MODE_FRAMES = 4
 NO_HEARTBEAT = Fault(
-    "no_heartbeat", "The axis sends no heartbeat, not even on request: its errors cannot be seen."
+    "no_heartbeat", "The axis sends no heartbeat, even on request: its errors cannot be seen."
 )
-# What only a host sends.
+# Commands that only a host sends.
 _COMMANDS = (odrive.SET_STATE, odrive.SET_MODE, odrive.SET_TORQUE)
 
 
 @dataclass(frozen=True)
 class OdriveCanOptions(CanMotorOptions):
-    """Bus, axis and transmission."""
+    """Options of the bus, the axis and the transmission."""
 
     node_id: int = setting(0, "node id of the axis", "", (0, 62))
     motor_torque: float = setting(
         18.0,
-        "peak torque of the motor: the axis's current limit times torque constant",
+        "peak torque of the motor: the axis's current limit times its torque constant",
         "N m",
         (0.01, 200.0),
     )
 
 
 class OdriveAxis(CanMotor):
-    """The axis, as the torque loop sees it; docs/drivers.md has wiring and hazards."""
+    """The axis as the torque loop sees it; see docs/drivers.md for wiring and hazards."""
 
     PROTOCOL = "by CANSimple"
     CHECK = "node_id"
@@ -52,19 +52,19 @@ class OdriveAxis(CanMotor):
     def __init__(self, options: OdriveCanOptions) -> None:
         super().__init__(options, f"ODrive {options.node_id}", options.motor_torque)
         self._heartbeat = odrive.Heartbeat(0, odrive.IDLE)
-        self._beat_at = 0.0  # when it came [s, steady]
-        self._errors = 0  # bits that are set, or for which it disarmed since it was enabled
-        self._old_reason: int | None = None  # of a disarming before that
+        self._beat_at = 0.0  # when it arrived [s, steady]
+        self._errors = 0  # bits that are set, or disarmed the axis since it was enabled
+        self._old_reason: int | None = None  # of an earlier disarming
         self._angle = self._velocity = math.nan  # of the motor [rad], [rad/s]
-        self._angle_at = 0.0  # when they came [s, steady]
-        # One of them in each tick: either is needed less often than the torque.
+        self._angle_at = 0.0  # when they arrived [s, steady]
+        # One of these per tick: both are needed less often than the torque.
         self._questions = itertools.cycle((odrive.ENCODER, odrive.ERRORS))
 
     def open(self) -> None:
-        """Connect, and see that the axis answers; its errors are cleared."""
+        """Connect, check that the axis answers, and clear its errors."""
         self._open_bus()
         self._reach(odrive.IDLE)
-        with contextlib.suppress(DeviceError):  # firmware before 0.6 does not say
+        with contextlib.suppress(DeviceError):  # firmware before 0.6 does not report it
             self.identity = self._ask(
                 lambda: self._command(odrive.VERSION, remote=True), self._version
             )
@@ -78,7 +78,7 @@ class OdriveAxis(CanMotor):
         self._require_zero_torque("is it calibrated?")
 
     def exchange(self, torque: float, timeout: float) -> Reading | None:
-        """Ask for torque, position, velocity and errors, then send a torque."""
+        """Request torque, position, velocity and errors, then send a torque."""
         ratio, peak = self._options.ratio, self._options.motor_torque
         if time.monotonic() - self._beat_at > HEARTBEAT_PERIOD:
             self._command(odrive.HEARTBEAT, remote=True)
@@ -104,7 +104,7 @@ class OdriveAxis(CanMotor):
         )
 
     def disable(self) -> None:
-        """Ask for zero and leave closed-loop control."""
+        """Command zero torque and leave closed-loop control."""
         self._command(odrive.SET_TORQUE, odrive.pack_torque(0.0, 0.0))
         self._command(odrive.SET_STATE, odrive.STATE.pack(odrive.IDLE))
 
@@ -112,12 +112,12 @@ class OdriveAxis(CanMotor):
         """
         Bring the axis to a state without errors, at zero torque.
 
-        Its errors are cleared: to get here is the explicit step that recovery takes, and a
-        watchdog that expired while nobody was connected is no news. What comes back stays.
+        Its errors are cleared: this is recovery's explicit step, and a watchdog that expired while
+        no host was connected is expected. Errors that return are kept.
         """
 
         def request() -> None:
-            # The torque command feeds the watchdog too.
+            # The torque command also feeds the watchdog.
             self._command(odrive.SET_TORQUE, odrive.pack_torque(0.0, 0.0))
             self._command(odrive.CLEAR_ERRORS, bytes(1))
             self._command(odrive.SET_STATE, odrive.STATE.pack(state))
@@ -129,14 +129,14 @@ class OdriveAxis(CanMotor):
                 faults = " ".join(fault.meaning for fault in odrive.faults_of(heartbeat.error))
                 raise DeviceError(
                     f"{self.name} stays in state {heartbeat.state} instead of {state}. {faults} "
-                    "Remove the cause, see that it is calibrated, and switch it off and on"
+                    "Remove the cause, check that it is calibrated, and power-cycle it"
                 )
 
     def _command(self, command: int, data: bytes = b"", *, remote: bool = False) -> None:
         self._send(odrive.frame_id(self._options.node_id, command), data, remote=remote)
 
     def _beat(self, message: Any) -> odrive.Heartbeat | None:
-        """Note what a frame says; return the heartbeat if it is one."""
+        """Note a frame's content; return the heartbeat if it is one."""
         node, command = divmod(message.arbitration_id, 32)
         data = bytes(message.data)
         if node != self._options.node_id:
@@ -156,20 +156,20 @@ class OdriveAxis(CanMotor):
         return None
 
     def _version(self, message: Any) -> str | None:
-        """Return what a frame says of the versions, in words, if it does."""
-        told = odrive.unpack(odrive.VERSIONS, bytes(message.data))
+        """Describe the versions if a frame contains them."""
+        versions = odrive.unpack(odrive.VERSIONS, bytes(message.data))
         wanted = odrive.frame_id(self._options.node_id, odrive.VERSION)
-        if told is None or message.arbitration_id != wanted:
+        if versions is None or message.arbitration_id != wanted:
             self._beat(message)
             return None
-        _, *hardware, major, minor, revision, unreleased = told
+        _, *hardware, major, minor, revision, unreleased = versions
         return (
             f"ODrive {'.'.join(map(str, hardware))}, firmware {major}.{minor}.{revision}"
             f"{' (not released)' if unreleased else ''}"
         )
 
     def _torque(self, message: Any) -> float | None:
-        """Note what a frame says; return the torque of the motor [N m] if it is in it."""
+        """Note a frame's content; return the motor torque [N m] if it contains it."""
         if message.arbitration_id != odrive.frame_id(self._options.node_id, odrive.TORQUES):
             self._beat(message)
             return None
@@ -178,7 +178,7 @@ class OdriveAxis(CanMotor):
 
 
 class OdriveCanRobot(HostTimedRobot):
-    """See the module's docstring; docs/drivers.md has wiring and hazards."""
+    """See the module's docstring, and docs/drivers.md for wiring and hazards."""
 
     Options = OdriveCanOptions
     Device = OdriveAxis

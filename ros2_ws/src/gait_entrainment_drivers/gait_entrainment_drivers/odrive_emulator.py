@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""odrive_emulator: an ODrive axis that speaks CANSimple, as a process. See motor_emulator.py."""
+"""odrive_emulator: an emulated ODrive axis with CANSimple, a process. See motor_emulator.py."""
 
 import sys
 
@@ -12,7 +12,7 @@ _HEARTBEAT_PERIOD = 0.1  # [s]
 
 
 class EmulatedOdrive(EmulatedMotor):
-    """An axis that an error disarms until it is cleared, and that torque commands feed."""
+    """An axis that an error disarms until cleared; torque commands feed its watchdog."""
 
     def __init__(self, node: int, bandwidth: float, timeout: float) -> None:
         super().__init__(bandwidth, timeout)
@@ -28,18 +28,18 @@ class EmulatedOdrive(EmulatedMotor):
             self.enabled, self._reason = False, self.error
 
     def expire(self) -> None:
-        """Report the watchdog if torque was possible."""
+        """Report the expired watchdog if torque was possible."""
         if self.enabled:
             self.error |= odrive.WATCHDOG_EXPIRED
 
     def obey(self, identifier: int, data: bytes, *, remote: bool, now: float) -> Frames:
-        """Obey a frame; only questions, which are remote frames, are answered."""
+        """Handle a frame; only requests, which are remote frames, are answered."""
         node, command = divmod(identifier, 32)
         if node != self._node:
             return []
         self.advance(now)
         if remote:
-            return self._tell(command)
+            return self._answer(command)
         if command == odrive.SET_TORQUE:
             self.feed(now)
             if self._mode == odrive.TORQUE_MODE:
@@ -59,9 +59,9 @@ class EmulatedOdrive(EmulatedMotor):
         if now - self._beat_at < _HEARTBEAT_PERIOD:
             return []
         self._beat_at = now
-        return self._tell(odrive.HEARTBEAT)
+        return self._answer(odrive.HEARTBEAT)
 
-    def _tell(self, what: int) -> Frames:
+    def _answer(self, what: int) -> Frames:
         answers = {
             odrive.HEARTBEAT: odrive.pack_heartbeat(
                 odrive.Heartbeat(self.error, odrive.CLOSED_LOOP if self.enabled else odrive.IDLE)
@@ -78,7 +78,7 @@ def main() -> int:
     """Run the emulator."""
     return run_emulator(
         "odrive_emulator",
-        "An ODrive axis by CANSimple, on a CAN bus.",
+        "Emulate an ODrive axis with CANSimple on a CAN bus.",
         lambda options: EmulatedOdrive(options.node_id, options.bandwidth, options.timeout),
         node_id={"type": int, "default": 0, "help": "0 to 62"},
     )

@@ -2,21 +2,21 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-pytest plugin: the conformance kit for the tests of an outside driver package.
+pytest plugin: the conformance kit for the tests of an external driver package.
 
-In pytest's configuration, or by the option ``--ankle-robot``, one names the drivers::
+Name the drivers in pytest's configuration, or with the option ``--ankle-robot``::
 
     [tool.pytest.ini_options]
     ankle_robots = ["my_robot:channel=can0"]
 
-and a test that takes the fixture ``ankle_robot_check`` runs once for each driver and check::
+A test that takes the fixture ``ankle_robot_check`` runs once for each driver and check::
 
     def test_my_robot_keeps_its_promises(ankle_robot_check):
         ankle_robot_check()
 
 A driver that applies real torque is skipped unless ``--arm-ankle-robot`` is given.
 
-The kit is imported where it is used, so that a pytest that checks no driver does not wait for it.
+The kit is imported where it is used, so that it does not delay pytest if no driver is checked.
 """
 
 from collections.abc import Callable
@@ -45,7 +45,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Make one test of each driver and check."""
+    """Make one test for each driver and check."""
     if _FIXTURE not in metafunc.fixturenames:
         return
     from gait_entrainment_drivers.conformance.checks import CHECKS
@@ -66,7 +66,7 @@ def ankle_robot_check(request: pytest.FixtureRequest) -> Callable[[], None]:
     text, check = request.param
     driver = find_driver(text)
     if not (driver.simulated or request.config.getoption("--arm-ankle-robot")):
-        pytest.skip(f"{driver.name} applies real torque: say --arm-ankle-robot")
+        pytest.skip(f"{driver.name} applies real torque: add --arm-ankle-robot")
 
     def run() -> None:
         result = run_check(check, DriverBench(driver))

@@ -2,13 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Stopping without ROS: whoever drives an ankle robot listens on a socket of this machine.
+Stopping without ROS: every process that drives an ankle robot listens on a local socket.
 
-The socket has a name in Linux's abstract namespace. That needs no file, no home folder and no
-writable disk, vanishes with its process, and is found in /proc/net/unix. A request is one
-datagram; the answer says what the device measured. No discovery, no executor and no other reader
-is in the way. Everyone who can reach the machine's network namespace may stop a robot: stopping
-is safe.
+The socket has a name in Linux's abstract namespace. It needs no file, home folder or writable
+disk, vanishes with its process, and is listed in /proc/net/unix. A request is one datagram; the
+answer reports what the device measured. No discovery, executor or other reader can delay it. Any
+process that can reach the machine's network namespace may stop a robot: stopping is safe.
 """
 
 import errno
@@ -26,20 +25,20 @@ from pathlib import Path
 
 PREFIX = "gait_entrainment/stop/"
 _SOCKETS = Path("/proc/net/unix")
-# Variable with the descriptor of a socket that the script ``entrain`` has opened for a run.
+# Variable with the descriptor of a socket that the script ``entrain`` opened for a run.
 _OPENED = "GAIT_ENTRAINMENT_STOP_SOCKET"
 _LARGEST_ANSWER = 4096
-# Of a name: a socket's is short, and what looks for it splits at blanks.
+# For names: a socket's name is short, and the list of sockets is split at blanks.
 _LONGEST_NAME = 60
 _UNFIT = re.compile(r"[^\w/.:+-]", re.ASCII)
 
 
 @dataclass(frozen=True)
 class StopAnswer:
-    """What a robot answers to a stop."""
+    """A robot's answer to a stop."""
 
-    done: bool  # what the answerer vouches for is done: see the message
-    message: str  # for people, in one line; says "zero" only of a torque that was measured
+    done: bool  # whether the sender confirms what its message states
+    message: str  # one line for people; "zero" only for a measured torque
 
 
 NO_ANSWER = StopAnswer(False, "does not answer")
@@ -47,10 +46,10 @@ NO_ANSWER = StopAnswer(False, "does not answer")
 
 class StopListener:
     """
-    The end of the channel at the robot: requests are polled, or waited for by ``select``.
+    The robot's end of the channel: requests are polled, or awaited with ``select``.
 
-    ``name`` is what the robot is called in answers, such as the driver's name. The first listener
-    of a run has the name and the socket that the script ``entrain`` has opened.
+    ``name`` identifies the robot in answers, such as the driver's name. The first listener of a
+    run takes the socket that the script ``entrain`` opened, with its name.
     """
 
     def __init__(self, name: str) -> None:
@@ -58,12 +57,12 @@ class StopListener:
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM, fileno=opened)
         self._socket.setblocking(False)
         self._socket.set_inheritable(False)
-        # What a child held open would be stopped in vain.
+        # A stop sent to a socket that a child kept open would have no effect.
         os.register_at_fork(after_in_child=self.close)
         if opened:
             return
         short = _UNFIT.sub("_", name)[-_LONGEST_NAME:]
-        # A process may hold several robots of one name.
+        # A process may hold several robots with the same name.
         for number in itertools.count(1):
             more = f"-{number}" if number > 1 else ""
             try:
@@ -74,19 +73,19 @@ class StopListener:
                     raise
 
     def fileno(self) -> int:
-        """Return the descriptor that becomes readable with a request."""
+        """Return the descriptor that becomes readable when a request arrives."""
         return self._socket.fileno()
 
     def requests(self) -> list[str | bytes | None]:
-        """Return the addresses of those who asked for a stop since the last call, None without."""
+        """Return the senders of stop requests since the last call, None for an unnamed one."""
         found: list[str | bytes | None] = []
         with suppress(BlockingIOError):
-            while len(found) < 100:  # who floods the channel does not hold up the listener
+            while len(found) < 100:  # a flood of requests must not hold up the listener
                 found.append(self._socket.recvfrom(16)[1])
         return found
 
     def answer(self, addresses: Iterable[str | bytes | None], answer: StopAnswer) -> None:
-        """Answer requests; whoever asked and is gone misses nothing."""
+        """Answer requests; senders that are gone are ignored."""
         data = json.dumps(asdict(answer)).encode()
         for address in addresses:
             if address is not None:
@@ -94,13 +93,13 @@ class StopListener:
                     self._socket.sendto(data, address)
 
     def close(self) -> None:
-        """Listen no more."""
+        """Stop listening."""
         self._socket.close()
 
 
 def listening() -> list[str]:
-    """Return the names of all robots of this machine that can be stopped: NAME/PROCESS."""
-    # Other programs name their sockets as they like.
+    """Return the names, NAME/PROCESS, of all robots on this machine that can be stopped."""
+    # Sockets of other programs may have any name.
     lines = _SOCKETS.read_text(errors="replace").splitlines()[1:]
     names = (line.split()[-1] for line in lines)
     marker = f"@{PREFIX}"
@@ -109,9 +108,9 @@ def listening() -> list[str]:
 
 def stop_all(timeout: float = 0.5) -> dict[str, StopAnswer]:
     """
-    Ask every robot of this machine to bring its torque to zero, as the script ``entrain`` does.
+    Ask every robot on this machine to bring its torque to zero, as the script ``entrain`` does.
 
-    Returns the answers by name; one that does not come within ``timeout`` [s] is NO_ANSWER.
+    Returns the answers by name; one that is missing after ``timeout`` [s] is NO_ANSWER.
     """
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as asker:
         asker.setblocking(False)
@@ -123,18 +122,18 @@ def stop_all(timeout: float = 0.5) -> dict[str, StopAnswer]:
             if select.select([asker], [], [], left)[0]:
                 data, address = asker.recvfrom(_LARGEST_ANSWER)
                 sender = os.fsdecode(address or b"").removeprefix(f"\0{PREFIX}")
-                with suppress(ValueError, TypeError):  # it is of another version
+                with suppress(ValueError, TypeError):  # the sender has another version
                     if sender in answers:
                         answers[sender] = StopAnswer(**json.loads(data))
         return answers
 
 
 def _ask(asker: socket.socket, name: str) -> bool:
-    """Ask one robot; False if it has ended in between, and its torque with it."""
+    """Ask one robot; return False if it has ended meanwhile, and its torque with it."""
     try:
         asker.sendto(b"stop", f"\0{PREFIX}{name}")
     except ConnectionRefusedError:
         return False
-    except BlockingIOError:  # its queue is full: it has not listened for long
+    except BlockingIOError:  # its queue is full: it has not read for a long time
         pass
     return True

@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The torque loop: a process of its own that streams torque to one device, and does nothing else.
+The torque loop: a separate process that streams torque to one device and does nothing else.
 
 No ROS, no threads, garbage collection frozen; SCHED_FIFO and locked memory if the system permits
-(docs/safety.md says how to permit it, and what is lost without). Its parent, the robot's process,
-talks to it over a socket (link.py): plans come in, samples go out, and neither ever waits for the
-other. If the parent ends or falls silent, or anybody asks for a stop, torque goes to zero here.
+them (docs/safety.md describes how to permit them, and the cost of not doing so). Its parent, the
+robot's process, uses a socket (link.py): trains come in, samples go out, and neither side waits.
+If the parent ends or falls silent, or any process requests a stop, torque goes to zero here.
 
     python -m gait_entrainment_drivers.torque_loop DESCRIPTOR     started by host_timed.py
 """
@@ -34,33 +34,33 @@ from gait_entrainment_drivers.stop_channel import StopAnswer, StopListener
 
 DEVICE_SILENT = Fault(
     "device_silent",
-    "The device sent no reply for longer than the limit: see to its power and wiring, or to what"
+    "The device sent no reply for longer than the limit: check its power and wiring, and what"
     " else loads this computer.",
 )
 HOST_LOOP_LATE = Fault(
     "host_loop_late",
-    "The loop that times the torque woke up later than the limit: see to what else loads this"
+    "The loop that times the torque woke up later than the limit: check what else loads this"
     " computer.",
 )
 DRIVER_SLOW = Fault(
     "driver_slow",
-    "The driver's exchange takes longer than its timeout: see to its bus, or to load.",
+    "The driver's exchange takes longer than its timeout: check its bus and the load.",
 )
 HOST_SILENT = Fault(
     "host_silent",
-    "The process that holds the robot fell silent for longer than the limit: it is frozen, or "
+    "The process that holds the robot was silent for longer than the limit: it is frozen, or "
     "this computer is overloaded.",
 )
-# Before the device is disabled it is asked for zero torque: this often, so that a lost frame does
-# not matter, and on until torque has run down to this share of its scale, or for this long [s].
+# Before the device is disabled, zero torque is sent this many times, in case a frame is lost, and
+# then until torque has fallen to this share of its scale, or for this long [s].
 _ZERO_TICKS = 5
 _RUN_DOWN_SHARE = 0.02
 _RUN_DOWN_TIME = 0.2
-# Torque that was ended has this long to fall [s].
+# After it is ended, torque has this long to fall [s].
 _FALL_TIME = 0.15
-# While nothing is streamed: how often the stop channel and the parent are looked after [s].
+# Polling period of the stop channel and the parent while nothing is streamed [s].
 _IDLE_PERIOD = 0.02
-# Below the kernel's own threads, above everything of a user.
+# Below the kernel's own threads, above all user processes.
 _PRIORITY = 50
 _MCL_CURRENT_AND_FUTURE = 3
 _PR_SET_PDEATHSIG = 1
@@ -81,16 +81,16 @@ class TorqueLoop:
         self._train: PulseTrain | None = None  # onsets in steady time
         self._faults: tuple[Fault, ...] = ()
         self._enabled = self._closing = False
-        self._halted = False  # no torque in the life of this process any more
+        self._halted = False  # no more torque for the life of this process
         self._samples: list[Sample] = []  # not handed over yet
-        self._askers: list[str | bytes | None] = []  # of a stop, not answered yet
+        self._askers: list[str | bytes | None] = []  # senders of a stop, not answered yet
         self._ended_at = math.inf  # when torque was ended [s]
         self._measured = math.nan  # torque measured last [N m]
-        self._took = 0.0  # the latest exchange [s]
+        self._took = 0.0  # duration of the latest exchange [s]
         self._heard_at = self._answered_at = self._due = time.monotonic()
 
     def serve(self) -> None:
-        """Serve until the parent says so, or is gone."""
+        """Serve until the parent closes the loop or is gone."""
         try:
             while not self._closing:
                 if self._enabled:
@@ -135,16 +135,16 @@ class TorqueLoop:
         del self._samples[:-30_000]  # the parent may be frozen for hours
         self._answer_stops(now)
         self._link.send_samples(self._samples)
-        # After a hiccup it goes on from now: commands that were missed are not made up for, and
-        # several short hiccups are not one long one.
+        # After a hiccup the loop continues from now: missed commands are not made up for, and
+        # several short hiccups do not add up to a long one.
         self._due = max(self._due + self._period, now)
 
     def _exchange(self, torque: float, late: float, now: float) -> Reading | None:
-        """Exchange a torque for a reading, judged; whatever else comes, zero is sent on and on."""
+        """Exchange a torque for a reading and judge it; after any exception, zero is sent."""
         try:
             if late > self._period:
                 self._device.forget()
-            # Most of the period at most: an answer that comes later is read with the next one.
+            # Wait for most of the period at most: a later answer is read with the next one.
             reading = self._device.exchange(torque, 0.8 * self._period)
             if reading is not None:
                 for fault in (*reading.faults, *self._monitor.judge(reading, now)):
@@ -152,11 +152,11 @@ class TorqueLoop:
             return reading
         except Exception as error:
             text = f"{type(error).__name__}: {error}"
-            self._end_torque(Fault(DRIVER_FAILED.name, f"The driver cannot send: {text}."))
+            self._end_torque(Fault(DRIVER_FAILED.name, f"The driver's exchange failed: {text}."))
             return None
 
     def _end_torque(self, fault: Fault | None = None) -> None:
-        """Ask for zero torque from now on, for this reason, for good."""
+        """Command zero torque from now on, permanently, for this reason."""
         self._train = None
         if not self._halted:
             self._halted, self._ended_at = True, time.monotonic()
@@ -165,7 +165,7 @@ class TorqueLoop:
             self._link.send("faults", self._faults)
 
     def _answer_stops(self, now: float) -> None:
-        """Answer those who asked for a stop once torque has fallen, or does not fall."""
+        """Answer the senders of a stop once torque has fallen, or does not fall in time."""
         ended = now - self._ended_at
         fell = abs(self._measured) <= self._near_zero
         current = now - self._answered_at < self._settings.silence
@@ -178,8 +178,8 @@ class TorqueLoop:
                 True, f"torque is zero, latched ({self._measured:+.2f} N m measured)"
             )
         elif ended > _FALL_TIME:
-            told = f"{self._measured:+.2f} N m measured" if current else "nothing measured"
-            answer = StopAnswer(False, f"zero is asked for, but {told}: cut the power")
+            measured = f"{self._measured:+.2f} N m measured" if current else "nothing measured"
+            answer = StopAnswer(False, f"zero is commanded, but {measured}: cut the power")
         else:
             return
         self._stop_channel.answer(self._askers, answer)
@@ -188,7 +188,7 @@ class TorqueLoop:
     # Listening
 
     def _listen(self) -> None:
-        """Take stops and what the parent says."""
+        """Take stop requests and the parent's messages."""
         askers = self._stop_channel.requests()
         if askers:
             self._end_torque(STOPPED)
@@ -200,7 +200,7 @@ class TorqueLoop:
         try:
             messages = self._link.received()
         except EOFError:
-            self._closing = True  # the parent has ended, however that came
+            self._closing = True  # the parent has ended
             return
         for kind, *content in messages:
             self._heard_at = time.monotonic()
@@ -217,7 +217,7 @@ class TorqueLoop:
             self._end_torque()  # the parent knows why
         elif kind == "freeze":
             os.kill(os.getpid(), signal.SIGSTOP)
-            self._listen()  # whoever lets it go on has said before what then
+            self._listen()  # what to do next was sent before it was continued
         elif kind in ("open", "enable", "disable", "close"):
             error = ""
             try:
@@ -236,7 +236,7 @@ class TorqueLoop:
         try:
             self._device.enable()
         except BaseException:
-            # How far it got is not known, and nothing is streamed that would bring zero.
+            # How far it got is unknown, and nothing is streamed that would bring zero torque.
             with contextlib.suppress(Exception):
                 self._device.disable()
             raise
@@ -244,7 +244,7 @@ class TorqueLoop:
         self._due = self._answered_at = self._heard_at = time.monotonic()
 
     def _disable(self) -> None:
-        """Bring the torque to zero, then disable; each step even if the one before fails."""
+        """Bring the torque to zero, then disable; do each step even if the previous one fails."""
         if not self._enabled:
             return
         self._train, self._enabled = None, False
@@ -258,7 +258,7 @@ class TorqueLoop:
                     self._answered_at, self._measured = time.monotonic(), torque
             ticks += 1
             time.sleep(self._period)
-        self._answer_stops(time.monotonic())  # nobody would, once it is disabled
+        self._answer_stops(time.monotonic())  # no later call answers them
         with contextlib.suppress(Exception):
             self._device.disable()
 
@@ -267,10 +267,10 @@ class TorqueLoop:
 
 
 def prefer_this_process() -> str:
-    """Ask for real-time scheduling and locked memory; return what was not permitted, in words."""
+    """Request real-time scheduling and locked memory; return a text of what was not permitted."""
     gc.collect()
     gc.freeze()
-    gc.disable()  # nothing in the loop makes reference cycles
+    gc.disable()  # nothing in the loop creates reference cycles
     refused = []
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
@@ -282,10 +282,10 @@ def prefer_this_process() -> str:
 
 
 def main() -> int:
-    """Serve the parent at the other end of the socket whose descriptor is given."""
+    """Serve the parent at the other end of the socket with the given descriptor."""
     for number in (signal.SIGINT, signal.SIGHUP, signal.SIGTSTP, signal.SIGQUIT):
-        signal.signal(number, signal.SIG_IGN)  # the parent obeys them, and then says so here
-    # A loop that is frozen when its parent dies goes on, and sees that.
+        signal.signal(number, signal.SIG_IGN)  # the parent obeys them, and then informs the loop
+    # A frozen loop whose parent dies is continued, and notices.
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGCONT)
     link = Link(socket.socket(fileno=int(sys.argv[1])))
     device_type, options = link.first()

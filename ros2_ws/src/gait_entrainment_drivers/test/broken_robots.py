@@ -261,7 +261,7 @@ class Hangs(IdealAnkleRobot):
 # Each with the checks that must catch it, and a word of the sentence.
 BROKEN = [
     (NoPeakTorque, "construction", "peak_torque: 0"),
-    (UnexplainedOptions, "construction", "rate does not tell its meaning"),
+    (UnexplainedOptions, "construction", "rate does not state its meaning"),
     (CannotReconnect, "lifecycle", "port is still open"),
     (CannotReconnect, "reconnecting", "port is still open"),
     (FailsToDeactivate, "lifecycle", "Deactivating failed: driver_failed"),
@@ -276,7 +276,7 @@ BROKEN = [
     (WrongSign, "pulses", "had -"),
     (OnsetsNotTold, "pulses", "Onsets"),
     (HalfTheImpulse, "pulses", "had 0.6 N m s"),
-    (DependsOnTheCuts, "cuts", "asked in pieces"),
+    (DependsOnTheCuts, "cuts", "promised in pieces"),
     (Overshoots, "at_limits", "torque_exceeded"),
     (Saturates, "at_limits", "reached 10 N m"),
     (CannotRefuse, "beyond_limits", "although every train was refused"),
@@ -298,7 +298,7 @@ BROKEN = [
     (RateInKilohertz, "states", "States came at 5.* Hz; promised: 0.5 Hz"),
     (CommandsNotTold, "states", "No state shows"),
     (ComesLate, "timing", r"\+80.0 ms"),
-    (ComesEarly, "timing", "show in no state"),
+    (ComesEarly, "timing", "do not appear in the states"),
     (Dawdles, "prompt_calls", "Nine in ten calls"),
     (Hangs, "prompt_calls", "slowest 2"),
 ]  # fmt: skip

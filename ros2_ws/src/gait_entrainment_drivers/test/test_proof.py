@@ -84,7 +84,7 @@ def test_without_a_home_nothing_is_proved_and_keeping_says_why(monkeypatch):
     monkeypatch.setenv("XDG_STATE_HOME", "relative/is/ignored")
     monkeypatch.setattr(Path, "home", no_home)
     assert proof_of("x") is None
-    with pytest.raises(DeviceError, match=r"cannot be kept: .*home directory.*XDG_STATE_HOME"):
+    with pytest.raises(DeviceError, match=r"cannot be stored: .*home directory.*XDG_STATE_HOME"):
         keep_proof("x", 0.05)
 
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""entrain driver: which ankle robots there are, and whether one keeps its promises."""
+"""entrain driver: list the ankle robot drivers, and check whether one keeps its promises."""
 
 import argparse
 import json
@@ -19,17 +19,17 @@ from gait_entrainment_drivers.conformance.bench import DriverBench, Result, Tole
 from gait_entrainment_drivers.conformance.checks import CHECKS, silent_host
 from gait_entrainment_drivers.proof import keep_proof
 
-# Where the check of a running node is found: it needs ROS, which this package does not know.
+# Entry point group of the check of a running node: it needs ROS, which this package does not.
 NODE_CHECK = "gait_entrainment.node_check"
-_TORQUE = Setting("height of the pulses", unit="N m", least=0, most=30, least_excluded=True)
-DESCRIPTION = "Ankle robot drivers: NAME, or NAME:OPTION=VALUE,OPTION=VALUE."
+_TORQUE = Setting("pulse height", unit="N m", least=0, most=30, least_excluded=True)
+DESCRIPTION = "Ankle robot drivers, given as NAME or NAME:OPTION=VALUE,OPTION=VALUE."
 EXAMPLES = """examples:
-  entrain driver list                       every driver, with its options
+  entrain driver list                       all drivers and their options
   entrain driver check emulated:delay=0.01  does it keep every promise of the contract?
   entrain driver check my_robot --arm --json
-  entrain driver prove my_robot --arm       does its torque end when this computer is silent?
-  entrain driver check --node perturbator   any node that speaks the perturbator's topics
-  entrain driver check --node perturbator --real-time --arm      one that holds a real robot
+  entrain driver prove my_robot --arm       does its torque end when this computer falls silent?
+  entrain driver check --node perturbator   any node with the perturbator's topics
+  entrain driver check --node perturbator --real-time --arm      one that drives a real robot
 """
 
 
@@ -38,24 +38,24 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(required=True, metavar="ACTION")
     listing = actions.add_parser(
         "list",
-        help="every driver that is installed",
-        description="List every driver that is installed, and its options: NAME=DEFAULT, unit,"
-        " meaning, what is allowed.",
+        help="list the installed drivers",
+        description="List every installed driver and its options: NAME=DEFAULT, unit, meaning,"
+        " allowed values.",
     )
     listing.set_defaults(run=list_drivers)
     check = actions.add_parser(
         "check",
-        help="the conformance kit",
-        description="Hold a driver, or a node, against every promise of the contract"
-        " (docs/drivers.md). Exit code 1 if one is broken.",
+        help="run the conformance kit",
+        description="Check a driver or a node against every promise of the contract"
+        " (docs/drivers.md). The exit code is 1 if one is broken.",
     )
     check.set_defaults(run=check_driver)
     prove = actions.add_parser(
         "prove",
-        help="the one check without which no real robot is armed",
+        help="run only the check that arming a real robot requires",
         description="Prove that the device brings its torque to zero by itself when its host falls"
-        " silent. What is proved is remembered on this computer, for exactly these options of the"
-        " driver. `check` proves it too.",
+        " silent. The proof is stored on this computer, for exactly these driver options. `check`"
+        " includes this proof.",
     )
     prove.set_defaults(run=prove_driver)
     prove.add_argument("driver", metavar="NAME[:OPTION=VALUE,...]", help="driver")
@@ -66,7 +66,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     checked.add_argument(
         "--node",
         metavar="NAME",
-        help="check from outside a node that speaks the perturbator's topics, in any language",
+        help="check a node with the perturbator's topics, in any language, from outside",
     )
     check.add_argument(
         "--side",
@@ -77,7 +77,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     check.add_argument(
         "--real-time",
         action="store_true",
-        help="the node holds a real robot: check it by the wall clock",
+        help="the node drives a real robot: check it on the wall clock",
     )
     for action in (check, prove):
         action.add_argument(
@@ -93,7 +93,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def list_drivers(options: argparse.Namespace) -> int:
-    """Print every driver; one that cannot be loaded says why."""
+    """Print every driver, or why it cannot be loaded."""
     found = {name: _description(name) for name in driver_names()}
     if options.json:
         print(json.dumps(found))
@@ -119,26 +119,26 @@ def _description(name: str) -> dict[str, Any]:
         {
             "name": name,
             "default": getattr(robot.Options, name),
-            "meaning": told.meaning,
-            "unit": told.unit,
-            "allowed": told.allowed,
-            **({"choices": told.choices} if told.choices else {}),
-            **({"range": (told.least, told.most)} if told.kind in (int, float) else {}),
+            "meaning": rule.meaning,
+            "unit": rule.unit,
+            "allowed": rule.allowed,
+            **({"choices": rule.choices} if rule.choices else {}),
+            **({"range": (rule.least, rule.most)} if rule.kind in (int, float) else {}),
         }
-        for name, told in settings_of(robot.Options).items()
+        for name, rule in settings_of(robot.Options).items()
     ]
     return {"summary": text.partition("\n")[0], "options": options}
 
 
 def check_driver(options: argparse.Namespace) -> int:
-    """Run the conformance kit on a driver or a node; 1 if a promise is broken."""
+    """Run the conformance kit on a driver or a node; return 1 if a promise is broken."""
     if options.node is not None:
         return _report(options.node, _check_node(options, _tolerances(options)), options.json)
     return _report(options.driver, _check_driver(options, CHECKS), options.json)
 
 
 def prove_driver(options: argparse.Namespace) -> int:
-    """Run the check of a silent host on a driver; 1 if the device holds its last command."""
+    """Run the silent-host check on a driver; return 1 if the device holds its last command."""
     if find_driver(options.driver).simulated:
         raise LimitError(f"{options.driver} applies no real torque: there is nothing to prove")
     return _report(options.driver, _check_driver(options, (silent_host,)), options.json)
@@ -151,14 +151,14 @@ def _tolerances(options: argparse.Namespace) -> Tolerances:
 def _check_driver(
     options: argparse.Namespace, checks: Iterable[Callable[[Any], None]]
 ) -> Iterator[Result]:
-    """Check a driver; what a real device proves of a silent host is remembered."""
+    """Check a driver, and store what silent_host proves about a real device."""
     tolerances, driver = _tolerances(options), find_driver(options.driver)
     if not driver.simulated:
         if not options.arm:
             raise LimitError(
-                f"{driver.name} applies real torque: see that nobody wears it, then say --arm"
+                f"{driver.name} applies real torque: make sure nobody wears it, then add --arm"
             )
-        # Without this, a device that is not there would break every promise alike.
+        # Without this, a missing device would be reported as breaking every promise.
         with driver.make(Side.RIGHT) as robot:
             robot.configure()
     bench = DriverBench(driver, tolerances)
@@ -180,7 +180,7 @@ def _check_node(options: argparse.Namespace, tolerances: Tolerances) -> Iterator
 
 
 def _report(name: str, results: Iterable[Result], as_json: bool) -> int:
-    """Print the results as they come; return the exit code."""
+    """Print the results as they arrive; return the exit code."""
     done = []
     for result in results:
         done.append(result)

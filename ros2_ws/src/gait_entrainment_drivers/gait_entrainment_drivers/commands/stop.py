@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""entrain stop: torque to zero, latched, for every ankle robot that this machine drives."""
+"""entrain stop: bring every ankle robot driven by this machine to zero torque, latched."""
 
 import argparse
 import json
@@ -11,21 +11,21 @@ from dataclasses import asdict
 from gait_entrainment_drivers.stop_channel import stop_all
 
 DESCRIPTION = (
-    "Bring the torque of every ankle robot that this machine drives to zero, latched, and say "
-    "what the device measures. Needs no ROS, no home folder and no writable disk. Exit code 0 if "
-    "every robot confirmed it. No substitute for a switch in the hand: see docs/safety.md."
+    "Bring every ankle robot driven by this machine to zero torque, latched, and print what the "
+    "device measures. Needs no ROS, home folder or writable disk. The exit code is 0 if every "
+    "robot confirmed the stop. This is no substitute for a hand-held switch: see docs/safety.md."
 )
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-    # Whoever is in a hurry mistypes: nothing keeps it from stopping.
+    # People mistype in a hurry: superfluous words do not prevent the stop.
     parser.add_argument("words", nargs="*", help=argparse.SUPPRESS)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Stop everything; 1 if there is nothing to stop, or somebody did not confirm it."""
+    """Stop every robot; return 1 if there is none, or if one did not confirm the stop."""
     answers = stop_all()
     if options.json:
         print(json.dumps({"stopped": {name: asdict(a) for name, a in answers.items()}}))
@@ -33,8 +33,8 @@ def run(options: argparse.Namespace) -> int:
         for name, answer in answers.items():
             print(f"{name}: {answer.message}")
     if not answers:
-        nobody = "no robot is driven by this machine: if one pushes, cut its power"
-        print(f"entrain stop: {nobody}", file=sys.stderr)
+        reason = "no robot is driven by this machine: if one pushes, cut its power"
+        print(f"entrain stop: {reason}", file=sys.stderr)
         return 1
     if options.words:
         print(f"entrain stop: unknown words: {' '.join(options.words)}", file=sys.stderr)

@@ -4,8 +4,8 @@
 """
 The promises of an ankle robot: each check is a function whose docstring is the promise.
 
-A check is given a bench with an unconfigured robot on it. It returns if the promise is kept, and
-raises BrokenPromiseError, with one sentence, if it is not.
+A check receives a bench with an unconfigured robot. It returns if the promise is kept, and raises
+BrokenPromiseError, with one sentence, if it is broken.
 """
 
 import itertools
@@ -32,14 +32,14 @@ from gait_entrainment_drivers.conformance.bench import (
 def construction(bench: DriverBench) -> None:
     """Constructing a driver sets its side, options and capabilities."""
     options = bench.driver.options
-    require(is_dataclass(options), "Options is no dataclass.")
+    require(is_dataclass(options), "Options is not a dataclass.")
     for option in fields(options):
         explained = "setting" in option.metadata
-        require(explained, f"The option {option.name} does not tell its meaning and unit.")
+        require(explained, f"The option {option.name} does not state its meaning and unit.")
 
 
 def lifecycle(bench: Bench) -> None:
-    """Configure, activate, begin, deactivate and close work in this order, twice over."""
+    """Configure, activate, begin, deactivate and close work in this order, twice in a row."""
     for _ in range(2):
         bench.start()
         bench.run(0.1)
@@ -50,7 +50,7 @@ def lifecycle(bench: Bench) -> None:
 
 
 def order(bench: Bench) -> None:
-    """Nothing is done before its turn: no train without configure, activate, arm and begin."""
+    """No train is accepted before configure, activate, arm and begin."""
     for name, step in bench.steps():
         bench.require_refused(bench.train(), f"before {name}")
         if name in ("configure", "activate"):
@@ -85,7 +85,7 @@ def pulses(bench: Bench) -> None:
 
 
 def shapes(bench: Bench) -> None:
-    """Pulses that are not square have the impulse of their shape."""
+    """Non-square pulses have the impulse of their shape."""
     bench.start()
     onset, step = bench.now + nanoseconds(bench.lead), nanoseconds(PERIOD)
     pulses = (
@@ -101,7 +101,7 @@ def shapes(bench: Bench) -> None:
 
 
 def cuts(bench: Bench) -> None:
-    """What is delivered does not depend on how it is asked for."""
+    """The delivered torque does not depend on how it is divided into promises."""
     if not bench.simulated:  # the torque of a real device is never the same twice
         return
     delivered = []
@@ -118,14 +118,14 @@ def cuts(bench: Bench) -> None:
         bench.robot.close()
     require(
         delivered[0] == delivered[1],
-        "The same seed and train gave another torque when asked in pieces.",
+        "The same seed and train gave another torque when promised in pieces.",
     )
 
 
 def at_limits(bench: DriverBench) -> None:
     """A pulse at the limits is delivered without a fault."""
     bench.start()
-    # Full torque is for a device on its own: a real one gets what its user asked for.
+    # Only a simulated device gets full torque: a real one gets what its user chose.
     top = bench.largest_torque if bench.simulated else bench.height
     duration = min(bench.longest_pulse, bench.limits.impulse / top)
     bench.schedule(torque=top, duration=duration, period=2 * duration)
@@ -137,7 +137,7 @@ def at_limits(bench: DriverBench) -> None:
 
 
 def beyond_limits(bench: Bench) -> None:
-    """A train beyond a limit, late, overlapping, or with NaN is refused and changes nothing."""
+    """A train beyond a limit, late, overlapping or not finite is refused and changes nothing."""
     bench.start()
     bench.run(0.1)
     for changes in (
@@ -160,16 +160,16 @@ def beyond_limits(bench: Bench) -> None:
 
 
 def in_turn(bench: Bench) -> None:
-    """A second train is refused if it comes before one under way is over, else it follows."""
+    """A second train is refused if it overlaps the one under way; otherwise it follows."""
     bench.start()
     train = bench.schedule(count=2)
     bench.run(bench.lead + 0.05)
-    bench.require_refused(bench.train(), "while another one was under way")
+    bench.require_refused(bench.train(), "that overlaps the one under way")
     later = bench.schedule(first_onset=train.end + nanoseconds(PERIOD))
     bench.run(4 * PERIOD)
     expected = [*train.onsets, *later.onsets]
     require(
-        bench.onsets == expected, f"Pulses at {expected} ns were scheduled, {bench.onsets} came."
+        bench.onsets == expected, f"Pulses at {expected} ns were scheduled, not {bench.onsets}."
     )
 
 
@@ -184,7 +184,7 @@ def cancelling(bench: Bench) -> None:
 
 
 def stopping_in_mid_pulse(bench: Bench) -> None:
-    """After a stop from elsewhere in mid-pulse, torque is zero until closed and configured."""
+    """After a stop in mid-pulse, torque stays zero until the robot is closed and configured."""
     bench.start()
     since = bench.run_into_pulse()
     bench.stop()
@@ -201,7 +201,7 @@ def stopping_in_mid_pulse(bench: Bench) -> None:
 
 
 def stopping_in_every_state(bench: Bench) -> None:
-    """Stop and close raise in no state; after a stop the driver itself delivers no torque."""
+    """Stop and close never raise in any state; after a stop the bare driver delivers no torque."""
     for last in itertools.count():
         bench.renew(guarded=False)
         steps: list[tuple[str, Callable[[], object]]] = [
@@ -229,18 +229,18 @@ def stopping_in_every_state(bench: Bench) -> None:
 
 
 def deactivating(bench: Bench) -> None:
-    """After deactivating in mid-pulse the torque is zero, and no train is taken any more."""
+    """After deactivating in mid-pulse the torque is zero, and trains are refused."""
     bench.start()
     since = bench.run_into_pulse()
     bench.robot.deactivate()
     bench.require_refused(bench.train(), "after deactivating")
-    with suppress(DeviceError):  # nothing more need be promised
+    with suppress(DeviceError):  # no further promise is required
         bench.run(0.5)
     bench.require_zero(since, "deactivating")
 
 
 def reconnecting(bench: Bench) -> None:
-    """Closed in mid-pulse and configured again, it is at zero torque and delivers anew."""
+    """A robot closed in mid-pulse and configured again starts at zero and delivers again."""
     bench.start()
     bench.run_into_pulse()
     bench.robot.close()
@@ -251,18 +251,18 @@ def reconnecting(bench: Bench) -> None:
 
 
 def new_run(bench: Bench) -> None:
-    """A new run forgets the train of the one before, and profiles adjoin from its start on."""
+    """A new run drops the train of the run before, and its profiles adjoin from its start."""
     bench.start()
     bench.schedule(first_onset=bench.now + nanoseconds(bench.lead + 0.2))
     bench.run(0.1)
     bench.begin()
     bench.run(bench.lead + 0.5)
-    bench.require_no_torque("of the run before in the new one")
+    bench.require_no_torque("from the train of the run before")
 
 
 def stale_commands(bench: DriverBench) -> None:
     """If the experiment falls silent in mid-pulse, the torque goes to zero and latches."""
-    if bench.simulated:  # nobody to push; the run stands still with its experiment
+    if bench.simulated:  # no device; the run stops when its experiment does
         return
     bench.limits = DeviceLimits(silence=0.1)
     bench.renew()
@@ -277,7 +277,7 @@ def stale_commands(bench: DriverBench) -> None:
         bench.look()
     silent = EXPERIMENT_SILENT in bench.robot.faults
     require(silent, "The experiment's silence was not noticed.")
-    bench.require_zero(since + nanoseconds(0.1), "the limit of the experiment's silence")
+    bench.require_zero(since + nanoseconds(0.1), "the limit on the experiment's silence")
 
 
 def silent_host(bench: DriverBench) -> None:
@@ -299,7 +299,7 @@ def silent_host(bench: DriverBench) -> None:
 
 
 def _after_silence(bench: DriverBench, seconds: float) -> tuple[float, float]:
-    """Let the host be silent in mid-pulse; return for how long [s], and the torque then [N m]."""
+    """Silence the host in mid-pulse; return for how long [s], and the torque afterwards [N m]."""
     bench.renew(guarded=False)  # the guard would end the torque
     bench.start()
     bench.run_into_pulse()
@@ -322,16 +322,16 @@ def _after_silence(bench: DriverBench, seconds: float) -> tuple[float, float]:
             require(pushed, "not provable: the pulse was over before the host fell silent.")
             silence = (after[0].stamp - before[-1].stamp) / NANOSECONDS_PER_SECOND
             return silence, after[0].measured
-    raise BrokenPromiseError(f"not provable: no reading came after {seconds:g} s of silence.")
+    raise BrokenPromiseError(f"not provable: no reading arrived after {seconds:g} s of silence.")
 
 
 def states(bench: Bench) -> None:
-    """States come at the promised rate, ascending, with finite torques, and without faults."""
+    """States arrive at the promised rate, in order, with finite torques and without faults."""
     bench.start()
     bench.schedule(count=2)
     bench.run(1.2)
     shown = bench.wait_for(lambda: any(state.commanded for state in bench.states))
-    require(shown, "No state shows that the device was asked for the pulses.")
+    require(shown, "No state shows that the pulses were commanded.")
     able, stamps = bench.robot.capabilities, [state.stamp for state in bench.states]
     ascending = all(a < b for a, b in itertools.pairwise(stamps))
     require(ascending, "The stamps of the states are not ascending.")
@@ -347,13 +347,13 @@ def states(bench: Bench) -> None:
         bench.figures["state_rate_hz"] = rate = len(stamps) / 1.2
         least = bench.tolerances.state_rate * able.state_rate
         require(
-            least <= rate <= 2 * able.state_rate,  # in another unit it is a thousand times as much
+            least <= rate <= 2 * able.state_rate,  # a rate in the wrong unit is off by 1000
             f"States came at {rate:.0f} Hz; promised: {able.state_rate:g} Hz.",
         )
 
 
 def timing(bench: Bench) -> None:
-    """Pulses are measured when they were commanded, up to the device's lag."""
+    """Pulses are measured at their commanded onsets, within the allowed lag."""
     bench.start()
     count = 20 if bench.simulated else 8
     train = bench.schedule(count=count, duration=0.12, period=0.3)
@@ -361,7 +361,7 @@ def timing(bench: Bench) -> None:
     bench.wait_for(lambda: bench.states and bench.states[-1].stamp >= train.end)
     late = lateness_ms(timings_of(train.pulses, bench.states), "measured")
     missing = count - len(late)
-    require(not missing, f"{missing} of {count} pulses show in no state.")
+    require(not missing, f"{missing} of {count} pulses do not appear in the states.")
     bench.figures |= _distribution("", late)
     early, most = -1e3 * bench.tolerances.early, 1e3 * bench.tolerances.onset
     require(
@@ -372,7 +372,7 @@ def timing(bench: Bench) -> None:
 
 
 def prompt_calls(bench: DriverBench) -> None:
-    """Promise and read return at once, so that nobody waits for the device."""
+    """Promise and read return promptly, without waiting for the device."""
     bench.start()
     bench.schedule(count=2)
     bench.run(1.0)
@@ -404,11 +404,11 @@ def _require_no_error(call: Callable[[], object], what: str) -> None:
     except BrokenPromiseError:
         raise
     except Exception as error:
-        told = f"Calling {what} raised {type(error).__name__}: {error}."
-        raise BrokenPromiseError(told) from None
+        sentence = f"Calling {what} raised {type(error).__name__}: {error}."
+        raise BrokenPromiseError(sentence) from None
 
 
-# What every bench can be asked.
+# For every bench.
 COMMON = (
     lifecycle,
     order,
@@ -427,5 +427,5 @@ COMMON = (
     states,
     timing,
 )
-# And what only a driver can be: topics show no capabilities, limits and durations of calls.
+# For drivers only: topics do not show capabilities, limits or the duration of calls.
 CHECKS = (construction, *COMMON, at_limits, stale_commands, silent_host, prompt_calls)
