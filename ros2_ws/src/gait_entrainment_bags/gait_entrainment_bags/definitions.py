@@ -6,7 +6,7 @@ Definitions of message types: as installed, and as the text that makes a bag rea
 
 They are read from the ``share`` folders of a ROS 2 installation, without ROS itself. The text of
 a message comes from its ``.msg`` file and its hash from the ``.json`` type description next to
-it; messages inside services and actions have no ``.msg`` file, so the latter also gives the text.
+it. Messages inside services and actions have no ``.msg`` file: both come from the description.
 """
 
 import json

@@ -115,7 +115,7 @@ class ProfileOrder:
         return void, hole, profile
 
     def hole_up_to(self, instant: int) -> tuple[int, int] | None:
-        """Return the span that no profile covers, up to the latest time of the record."""
+        """Return the span that no profile covers before an instant, the record's latest time."""
         due = self._due_from or 0
         return (int(due), instant) if instant > due else None
 

@@ -40,8 +40,8 @@ class BagWriter(AbstractContextManager["BagWriter"]):
     """
     A bag that is being recorded; not thread-safe.
 
-    The folder is created, and its files are named after it, as by rosbag2. Messages of
-    ``chunk_size`` bytes are compressed together by ``zstd``, ``lz4`` or ``none``. A chunk that is
+    The folder is created, and its files are named after it, as by rosbag2. Messages are
+    compressed in chunks of ``chunk_size`` bytes by ``zstd``, ``lz4`` or ``none``. A chunk that is
     not full is completed by the first `write` after ``flush_interval`` seconds; if messages may
     stop arriving, also call `flush`, from a timer on steady time. A new file begins once the
     current one holds ``max_bytes`` bytes, or spans ``max_duration`` seconds of log time (0:

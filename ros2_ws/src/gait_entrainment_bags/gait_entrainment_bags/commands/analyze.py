@@ -109,8 +109,8 @@ def _of_tables(options: argparse.Namespace) -> int:
     analysis = analyze(without_bias(events, bias), onsets, given["side"])
     if not analysis.strides:
         raise UsageError(
-            f"{options.events}: holds no stride of the {options.side} leg of a plausible length, "
-            "heel strike to heel strike; onset is in seconds, and step counts both legs"
+            f"{options.events}: holds no plausible stride of the {options.side} leg, from heel "
+            "strike to heel strike; onset is in seconds, and step counts both legs"
         )
     start, end = analysis.strides[0].start, analysis.strides[-1].end
     if not any(start <= onset <= end for onset in onsets):

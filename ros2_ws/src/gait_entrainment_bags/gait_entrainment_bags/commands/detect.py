@@ -145,7 +145,7 @@ def _sides(text: str) -> list[Side]:
     known = {side.name.lower(): side for side in Side}
     words = text.split(",")
     if unknown := [word for word in words if word not in known]:
-        raise UsageError(f"--plates: {unknown[0]!r}; allowed: left, right, with commas between")
+        raise UsageError(f"--plates: {unknown[0]!r}; allowed: left, right, separated by commas")
     return [known[word] for word in words]
 
 

@@ -70,7 +70,7 @@ def test_tables_that_do_not_fit_together_are_refused(capsys, tables):
     events.write_text("\n".join(line for line in rows.splitlines() if "right" not in line))
     code, _, err = entrain(capsys, "analyze", *tables, "--side=right")
     assert (code, err.count("\n")) == (2, 1)
-    assert f"{events}: holds no stride of the right leg" in err
+    assert f"{events}: holds no plausible stride of the right leg" in err
     events.write_text(rows)
     pulses.write_text("onset [ms]\n100\n1700\n")
     code, _, err = entrain(capsys, "analyze", *tables, "--side=right")
