@@ -1,4 +1,4 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The operator's page: what a run does, in a browser, with a stop that works."""
+"""The operator's page: a run in a browser, with a stop that works."""

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is done from the page: the stop, and the commands that it starts."""
+"""Actions of the page: the stop, and the commands that it starts."""
 
 import asyncio
 import os
@@ -16,48 +16,48 @@ from typing import Protocol
 from gait_entrainment.errors import EntrainmentError
 from gait_entrainment_drivers.stop_channel import stop_all
 
-_TOLD = 12  # last lines of a command
-_PULSES = "ok    limits"  # how the line of a checklist begins that tells the pulses
-# Threads of the stop alone, which no other action takes, and those that it waits for.
-_STOPS, _ASKED = ThreadPoolExecutor(16, "stop"), ThreadPoolExecutor(16, "ask")
+_LINES = 12  # last lines of a command
+_PULSES = "ok    limits"  # start of the line of a checklist that reveals the pulses
+# Threads for the stop alone, which no other action uses, and threads that it waits for.
+_STOPS, _CALLS = ThreadPoolExecutor(16, "stop"), ThreadPoolExecutor(16, "ask")
 
 
 class ActionError(EntrainmentError):
-    """An action from the page that cannot be done now, or nobody answered."""
+    """An action of the page is impossible now, or there was no answer."""
 
 
 class Nodes(Protocol):
-    """What the page asks of the nodes; a bag offers none of it."""
+    """What the page can request from the nodes; a bag offers none of it."""
 
     def ask(self, what: str, reason: str = "") -> str:
         """
-        Stop or arm the robot; have the session pause, go on or repeat a block for a reason.
+        Stop or arm the robot; have the session pause, continue or repeat a block for a reason.
 
         ``what`` is one of stop, arm, pause, go_on and repeat. Returns the answer; raises
-        ActionError for a refusal, or if nobody answers.
+        ActionError if the request is refused or not answered.
         """
 
     def note(self, text: str) -> str:
         """Publish a note."""
 
     def offered(self) -> set[str]:
-        """Return what of all that somebody answers."""
+        """Return which of these requests are available."""
 
 
 def stop(nodes: Nodes | None) -> list[str]:
     """
     Bring every robot of this machine to zero torque, as `entrain stop` does; return the answers.
 
-    The one that is shown may be elsewhere: asked over ROS, too, it answers if there is none here.
+    The robot shown may be elsewhere: if none is here, the answer is that to a request over ROS.
     """
-    asked = _ASKED.submit(_ask_over_ros, nodes)
+    over_ros = _CALLS.submit(_ask_over_ros, nodes)
     answers = stop_all()
     lines = [f"{name}: {answer.message}" for name, answer in answers.items()]
     done = all(answer.done for answer in answers.values())
     if not answers:
-        done, answer = asked.result()
+        done, answer = over_ros.result()
         lines = [answer]
-    return lines if done else [*lines, "not everybody confirmed the stop: cut the power"]
+    return lines if done else [*lines, "not every robot confirmed the stop: cut the power"]
 
 
 def _ask_over_ros(nodes: Nodes | None) -> tuple[bool, str]:
@@ -68,17 +68,17 @@ def _ask_over_ros(nodes: Nodes | None) -> tuple[bool, str]:
 
 
 async def stop_at_once(nodes: Nodes | None) -> list[str]:
-    """Stop as ``stop`` does, whatever else the web server waits for."""
+    """Stop as ``stop`` does, even while the web server waits for other actions."""
     return await asyncio.get_running_loop().run_in_executor(_STOPS, stop, nodes)
 
 
 class Command:
     """
-    What the page may start, or the checklist before it, one at a time.
+    The command that the page may start, or its checklist, one at a time.
 
-    It is a process of its own: a run outlives the page that started it. ``words`` are those of
-    `entrain run` or `entrain session`; without any, there is nothing to start. A run of which the
-    page is a ``heartbeat`` is told so.
+    It is a separate process: a run outlives the page that started it. ``words`` are the arguments
+    of `entrain` for a run or session; without any, there is nothing to start. ``heartbeat`` makes
+    the page a heartbeat of the run.
     """
 
     def __init__(self, words: Sequence[str], *, heartbeat: bool = False) -> None:
@@ -91,19 +91,19 @@ class Command:
 
     @property
     def runs(self) -> bool:
-        """Whether a command goes on."""
+        """Whether a command is running."""
         return self._process is not None and self._process.poll() is None
 
     def start(self, *, preflight: bool = False) -> str:
-        """Start it, or its checklist; ActionError if one of them goes on."""
+        """Start it, or its checklist; ActionError if either is running."""
         kind, *options = self.words
         words = [*self.words, *self._heartbeat]
         if preflight:
             session = ["--session"] if kind == "session" else []
             words = ["preflight", *session, *options]
-        with self._starting:  # a double click comes in two threads
+        with self._starting:  # a double click arrives in two threads
             if self.runs:
-                raise ActionError(f"entrain {self.name} goes on: wait for its end, or stop it")
+                raise ActionError(f"entrain {self.name} is running: wait for its end, or stop it")
             self.name = words[0]
             self._output.seek(0)
             self._output.truncate()
@@ -119,15 +119,15 @@ class Command:
 
     def told(self, *, outcome: bool = True) -> list[str]:
         """
-        Return the last lines that the command has printed, and how it ended.
+        Return the last lines that the command printed, and how it ended.
 
-        Without ``outcome`` nothing that tells the condition: of a run that ended well the latter.
+        Without ``outcome``, nothing that reveals the condition: for a good run only how it ended.
         """
         if self._process is None:
             return []
         size = os.fstat(self._output.fileno()).st_size
         text = os.pread(self._output.fileno(), 8192, max(size - 8192, 0)).decode(errors="replace")
-        lines = [line.rpartition("\r")[2] for line in text.splitlines()][-_TOLD:]
+        lines = [line.rpartition("\r")[2] for line in text.splitlines()][-_LINES:]
         code = self._process.poll()
         if self.name == "run" and not (outcome or code):
             lines = []
@@ -138,7 +138,7 @@ class Command:
 
 
 def attempted(action: Callable[[], str]) -> tuple[bool, str]:
-    """Do an action; return whether it was done, and what to tell."""
+    """Try an action; return whether it was done, and the message to show."""
     try:
         return True, action()
     except EntrainmentError as error:

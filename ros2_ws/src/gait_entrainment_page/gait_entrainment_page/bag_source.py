@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A recorded bag as the page shows it: the view as it was at any instant of the record."""
+"""A recorded bag as the page shows it: the view at any time of the record."""
 
 import threading
 from pathlib import Path
@@ -12,17 +12,17 @@ from gait_entrainment_bags import BagError, BagReader
 from gait_entrainment_bags import topic_names as names
 from gait_entrainment_page.view import KEPT, SAMPLED, View
 
-# What is sampled is read from the bag around the instant that is shown, this much of it [ns]. The
-# rest is decoded once: a bag of hours has some ten thousand messages of it.
+# Sampled topics are read from the bag for this long before the time shown [ns]. The others are
+# decoded once: a bag of hours has some ten thousand such messages.
 _WINDOW = 8 * NANOSECONDS_PER_SECOND
 
 
 class BagSource:
     """
-    Shows a bag, a folder or an ``.mcap`` file, at the instant that is asked for.
+    Shows a bag, a folder or an ``.mcap`` file, at the requested time.
 
-    ``start`` and ``end`` are the first and the last instant [ns]; ``lacking`` names what the bag
-    does not hold and the page would show. Raises BagError if it is no bag or has no gait events.
+    ``start`` and ``end`` are the first and the last time [ns]; ``lacking`` names what the page
+    would show but the bag lacks. Raises BagError if it is not a bag or has no gait events.
     """
 
     def __init__(self, path: Path, *, blinded: bool = False) -> None:
@@ -39,10 +39,10 @@ class BagSource:
         ]
         self._messages.sort(key=lambda entry: entry[0])
         if not self._messages:
-            raise BagError(f"{path}: nothing to show: no message of a gait event or a stride")
+            raise BagError(f"{path}: nothing to show: no gait event and no stride")
         self.start, self.end = self._messages[0][0], self._messages[-1][0]
         wanted = {
-            names.EXPERIMENT_STATE: "phases of the protocol",
+            names.EXPERIMENT_STATE: "parts of the protocol",
             names.STRIDES: "strides",
             names.ENTRAINMENT: "verdicts",
             names.ROBOT_STATE: "states of the robot",
@@ -58,16 +58,16 @@ class BagSource:
         self.show(self.end)
 
     def show(self, instant: int) -> None:
-        """Bring the view to an instant [ns], unless another is asked for before its turn comes."""
-        self._asked_for = instant
-        with self._lock:  # of the reader: the view stays free meanwhile
-            if instant != self._asked_for:
+        """Bring the view to a time [ns], unless another one is requested meanwhile."""
+        self._requested = instant
+        with self._lock:  # of the reader: the view itself stays free
+            if instant != self._requested:
                 return
             samples = self._samples(instant)
             fresh = View(blinded=self.view.blinded)
             fresh.version = self.view.version + 1
             entries = [entry for entry in self._messages if entry[0] <= instant]
-            # Readings come before the stride that cuts them out.
+            # Readings must come before the stride that they belong to.
             entries = sorted([*samples, *entries], key=lambda entry: entry[0])
             for _, topic, message in entries:
                 fresh.take(topic, message)

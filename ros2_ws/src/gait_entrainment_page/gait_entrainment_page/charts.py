@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The charts of the page as options of ECharts; each would tell a blinded operator the condition.
+The charts of the page as ECharts options; each would reveal the condition to a blinded operator.
 
-Colours are those of Okabe and Ito (2008), which colour-blind people tell apart; lines differ in
-their dashes too.
+Colours are those of Okabe and Ito (2008), which colour-blind people can tell apart; lines also
+differ in their dashes.
 """
 
 import math
@@ -16,9 +16,9 @@ from gait_entrainment_page.view import View
 
 BLUE, VERMILLION, GREEN = "#0072B2", "#D55E00", "#009E73"
 BLACK, GREY = "#1A1A1A", "#5F6B76"
-_FONT = 17  # [px], to be read from two metres
-_LARGEST = 1e9  # nothing that is shown is so large: what is lies outside
-_DARK_GREEN = "#00704F"  # of letters on the shade
+_FONT = 17  # [px], readable from two metres
+_LARGEST = 1e9  # larger values lie outside the chart
+_DARK_GREEN = "#00704F"  # of text on the shading
 
 Options = dict[str, Any]
 Points = list[list[float]]
@@ -59,7 +59,7 @@ def lag_chart(view: View) -> Options:
         right = _axis("%", low * per_cent, high * per_cent)
         chart["grid"]["right"] = 62
         chart["yAxis"].append(right | {"splitLine": {"show": False}})
-        # ECharts shows an axis that a series uses.
+        # ECharts shows an axis only if a series uses it.
         chart["series"].append({"type": "line", "yAxisIndex": 1, "data": [], "name": ""})
     return chart
 
@@ -71,11 +71,11 @@ def torque_chart(view: View) -> Options:
     series = [_line("commanded", commanded, BLACK, "dashed", step="end")]
     if measured or not commanded:
         name = "computed (simulated robot)" if view.simulated else "measured"
-        # What is computed is told where it changes.
+        # A computed torque is reported only when it changes.
         series.append(_line(name, measured, BLUE, step="end" if view.simulated else False))
         series[-1]["lineStyle"]["width"] = 3
     else:
-        series[0]["name"] = "commanded (this robot measures none)"
+        series[0]["name"] = "commanded (not measured by this robot)"
     if view.torque and view.toe_off > 0 and view.double_stance > 0:
         begin, end = view.toe_off - view.double_stance, view.toe_off
         series[0]["markArea"] = _shade({"xAxis": begin}, {"xAxis": end}, "top")
@@ -99,7 +99,7 @@ def _shade(begin: Options, end: Options, position: str) -> Options:
 
 
 def _range(values: list[float], least: float) -> tuple[float, float]:
-    """Return a range that holds values and is not shorter than ``least``."""
+    """Return a range that contains the values and is not shorter than ``least``."""
     values = [value for value in values if abs(value) < _LARGEST]
     if not values:
         return 0.0, 1.0

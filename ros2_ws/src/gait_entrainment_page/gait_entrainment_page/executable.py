@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the executable of the node runs."""
+"""Entry point of the node's executable."""
 
 from gait_entrainment_nodes import executable
 

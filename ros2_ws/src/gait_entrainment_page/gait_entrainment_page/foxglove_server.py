@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The messages that the page looks at, for Foxglove, without a bridge (package foxglove-sdk)."""
+"""The messages that the page receives, for Foxglove without a bridge (package foxglove-sdk)."""
 
 from typing import Any
 

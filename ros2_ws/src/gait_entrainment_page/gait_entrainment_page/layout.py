@@ -30,7 +30,7 @@ from gait_entrainment_page.view import SESSION, View
 TICK = 0.1
 _WORDS = 5
 _CHARTS = 10
-# Less room than this on the disk of the record is told as a warning [bytes].
+# Less free space than this on the record's disk is marked [bytes].
 _LITTLE = 2 * 10**9
 _HEAD = """<link rel="stylesheet" href="/static/page.css?{0}">
 <script src="/static/page.js?{0}"></script>""".format(time.time_ns())  # never an earlier version
@@ -41,7 +41,7 @@ _OF_SESSION = {
     "repeat": "Repeat the block",
 }
 _BLINDED = (
-    "Blinded: torque, periods, lag, verdict and names of blocks are hidden; STOP, limits and "
+    "Blinded: torque, periods, lag, verdict and block names are hidden; STOP, limits and "
     "faults are not."
 )
 _HEARTBEAT = (
@@ -51,12 +51,12 @@ _HEARTBEAT = (
 
 class Page:
     """
-    The page, served from when it is made until it is closed; it tells people where.
+    The page, served from its creation until it is closed; it prints its address.
 
-    ``view`` gives what is shown, ``seat`` and ``access`` tell who acts, and who may, and
-    ``listener`` is the socket to serve at. ``nodes`` can be asked and ``command`` started; for a
-    ``bag`` they are None. The page may be the operator's ``heartbeat``; the disk of the folder
-    ``record`` is looked after.
+    ``view`` returns what is shown, ``seat`` and ``access`` define who acts and who may, and
+    ``listener`` is the socket to serve on. ``nodes`` take requests and ``command`` can be started;
+    for a ``bag`` they are None. The page may be the operator's ``heartbeat``; it shows the free
+    disk space of the folder ``record``.
     """
 
     def __init__(
@@ -85,18 +85,18 @@ class Page:
         access.tell(self._server.port)
 
     def close(self) -> None:
-        """Serve no more."""
+        """Stop serving."""
         self._server.close()
 
-    # Without NiceGUI, so that nothing of it is in the way
+    # Without NiceGUI, so that it cannot get in the way
 
     async def _stop(self) -> list[str]:
-        """Stop every robot of this machine; whoever may look may stop."""
+        """Stop every robot of this machine; anyone who may look may stop."""
         return await stop_at_once(self.nodes)
 
     async def _alive(self, request: Request) -> dict[str, float]:
         role, browser = state_of(request)
-        # A page in the background says neither: another one of its browser may be in front.
+        # A page in the background sends neither: another page of its browser may be in front.
         watching = _WATCHING.get(await request.body())
         if role == ACT and watching is not None:
             self.seat.heard(browser, watching=watching)
@@ -112,7 +112,7 @@ class Page:
         ui.timer(TICK, shown.tick)
 
     def chart_options(self) -> tuple[Any, list[dict[str, Any]]]:
-        """Return what the charts show and its version; made once for all browsers."""
+        """Return version and options of the charts; made once for all browsers."""
         view = self.view()
         with view.lock:
             version = (id(view), view.version)
@@ -143,10 +143,10 @@ class Shown:
         """Whether this browser is the operator's."""
         return self.may_act and self.page.seat.holder == self.browser
 
-    # What it is made of
+    # Its elements
 
     def build(self) -> None:
-        """Make the elements."""
+        """Create the elements."""
         with ui.element("header"):
             with ui.element("div").classes("top"):
                 with ui.element("div").classes("facts"):
@@ -181,7 +181,7 @@ class Shown:
         self.tick()
 
     def _gait(self) -> None:
-        """Make what tells whether the gait follows, and what the robot does."""
+        """Create what shows whether the gait follows, and what the robot does."""
         self._chart("Stride period against pulse period", "w5 first")
         self._chart("Phase lag", "w4 first")
         with self._panel("Is the gait entrained?", "w3 first"):
@@ -257,7 +257,7 @@ class Shown:
     # What a click does
 
     async def _act(self, action: Callable[[], str]) -> bool:
-        """Do what the operator asks for, and tell how it went; return whether it was done."""
+        """Do what the operator requests and show the result; return whether it was done."""
         if not self.acts:
             self.answer = "Another browser is the operator: take over first."
             return False
@@ -276,14 +276,14 @@ class Shown:
             await self._say(self.page.nodes.note)
 
     async def _say(self, action: Callable[[str], str]) -> None:
-        """Do something with what was typed: a note, or a reason."""
+        """Do something with the typed text: a note, or a reason."""
         if await self._act(partial(action, one_line(self.note.value or ""))):
             self.note.value = ""
 
-    # How it is kept up to date
+    # How it is updated
 
     def tick(self) -> None:
-        """Bring the browser up to date."""
+        """Update the browser."""
         view = self.page.view()
         with view.lock:
             legs = (view.legs, view.side, view.pushes)
@@ -320,7 +320,7 @@ class Shown:
         self._set("alarm", alarm)
         if bag is not None:
             self._set("instant", _clock((view.now - bag.start) / NANOSECONDS_PER_SECOND))
-        troubles = [("told", line) for line in view.troubles][-2:]
+        troubles = [("trouble", line) for line in view.troubles][-2:]
         self._rows("robot", view.robot_words() + troubles)
         self._rows("sensors", view.sensor_words())
         self._rows("record", self._record_words(view))
@@ -328,16 +328,16 @@ class Shown:
         self._acting(view)
 
     def _acting(self, view: View) -> None:
-        """Say who acts, and offer what can be done now."""
+        """Show who acts, and enable what can be done now."""
         if self.acts:
             seat = "You are the operator."
         elif not self.may_act:
-            seat = "You look on. STOP works here too."
+            seat = "You are looking on. STOP also works here."
         elif not self.page.seat.holder:
-            seat = "Nobody is the operator yet."
+            seat = "There is no operator yet."
         else:
             away = "" if self.page.seat.watched else " and is away"
-            seat = f"Another browser is the operator{away}. STOP works here too."
+            seat = f"Another browser is the operator{away}. STOP also works here."
         self._set("seat", seat)
         command, nodes = self.page.command, self.page.nodes
         offered = nodes.offered() if nodes is not None else set()
@@ -354,9 +354,9 @@ class Shown:
                 button.set_enabled(self.acts)
             else:
                 button.set_enabled(self.acts and usable.get(name, name in offered))
-        told = command.told(outcome=not view.blinded) if command is not None else []
-        self._set("answer", "\n".join([self.answer, *told[-4:]]).strip())
-        # The script must know it, and that what is shown is of now.
+        lines = command.told(outcome=not view.blinded) if command is not None else []
+        self._set("answer", "\n".join([self.answer, *lines[-4:]]).strip())
+        # The script must know this, and that what is shown is current.
         known = {"heartbeat": self.page.heartbeat, "acting": self.acts}
         ui.run_javascript(f"entrain.told({json.dumps(known)})")
 
@@ -364,17 +364,17 @@ class Shown:
         if self.page.bag is not None:
             return [("bag", self.page.bag.path.name), ("holds", self.page.bag.record)]
         nodes = {name.rpartition("/")[2]: state for name, state in view.nodes.items()}
-        if (player := nodes.get("bag_player")) is not None:  # what else is heard was recorded
+        if (player := nodes.get("bag_player")) is not None:  # everything else heard was recorded
             return [("replay", player.message)]
         recorder = nodes.get("bag_recorder")
-        rows = [("record", recorder.message if recorder else "no recorder is heard")]
+        rows = [("record", recorder.message if recorder else "no recorder heard")]
         if recorder and "messages" in recorder.values:
             rows.append(("messages", recorder.values["messages"]))
         if self.page.record:
             record = Path(self.page.record)  # which the recorder may not have made yet
             place = next(path for path in (record, *record.parents) if path.exists())
             free = shutil.disk_usage(place).free
-            little = ": little" if free < _LITTLE else ""
+            little = ": not much" if free < _LITTLE else ""
             rows.append(("disk", f"{free / 1e9:.1f} GB free{little}"))
         rows += [
             (name.rpartition("/")[2], f"{level}: {message}" if level != "ok" else message)
@@ -388,7 +388,7 @@ class Shown:
             self.labels[name].set_text(text)
 
     def _rows(self, name: str, rows: Sequence[tuple[str, str]]) -> None:
-        """Show names and values, made anew only if the names have changed."""
+        """Show names and values; the elements are rebuilt only if the names have changed."""
         element, cells = self.rows[name]
         keys = [key for key, _ in rows]
         if cells is None or [key for key, _ in cells] != keys:

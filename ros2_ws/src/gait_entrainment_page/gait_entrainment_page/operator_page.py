@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-operator_page: the page of a live run or a replay, as a node that looks on.
+operator_page: the page of a live run or a replay, as a node that only looks on.
 
-Nobody waits for it. Messages wait in subscriptions without an executor until they are taken, some
-times a second; samples are subscribed to only while time passes as it does for a walker. If it
-is the operator's heartbeat, it publishes a sign of life for as long as the page is watched.
+No node waits for it. Messages stay in subscriptions without an executor until they are taken, a
+few times a second; samples are subscribed to only while time passes at a walking pace. If it is
+the operator's heartbeat, it publishes a sign of life as long as the page is watched.
 """
 
 import contextlib
@@ -39,17 +39,17 @@ from gait_entrainment_page.access import Access, Seat, listen
 from gait_entrainment_page.actions import ActionError, Command
 from gait_entrainment_page.view import View
 
-# How often messages are taken, and the heartbeat is published if it is wanted [s]; where nobody
-# could follow, it is enough to look now and then.
+# Periods of taking messages, and of publishing the heartbeat if there is one [s]; idle while
+# samples are skipped.
 PERIOD, IDLE_PERIOD = 0.05, 0.25
 MOST_AT_ONCE = 1000
 # How long a node may take to answer [s].
 ANSWER_TIMEOUT = 3.0
-# Beyond this pace, against the wall clock, samples are not looked at: nobody could follow.
+# Above this pace, relative to the wall clock, samples are skipped: nobody could follow them.
 FASTEST = 4.0
-# While it loads, which takes seconds: a third of the share of who walks or records.
+# While it loads, which takes seconds: a third of the share of a node that walks or records.
 _NICENESS = 5
-# Instants of a run that differ from the wall clock by more are simulated or recorded [ns].
+# Times of a run that differ more from the wall clock are simulated or recorded [ns].
 _ANOTHER_TIME = 60 * NANOSECONDS_PER_SECOND
 
 LOOKED_AT = (
@@ -81,18 +81,18 @@ SERVICES: dict[str, tuple[Any, str]] = {
 class Settings:
     """Parameters of the node."""
 
-    host: str = setting("127.0.0.1", "address to serve the page at; another one asks for a token")
+    host: str = setting("127.0.0.1", "address to serve the page at; any other requires a token")
     port: int = setting(8080, "port of the page; 0: a free one", "1", (0, 65535))
     heartbeat: bool = setting(False, "the page is the operator's sign of life")
     heartbeat_timeout: float = setting(
         1.0, "longest silence of the operator's browser", "s", (0.2, 10.0)
     )
-    blinded: bool = setting(False, "do not show what would tell the condition")
+    blinded: bool = setting(False, "hide everything that would reveal the condition")
     foxglove: int = setting(
         0, "port of a Foxglove connection to the same data; 0: none", "1", (0, 65535)
     )
-    record: str = setting("", "folder of the record, whose disk is looked after")
-    command: tuple[str, ...] = texts("words of the entrain run or session that the page may start")
+    record: str = setting("", "folder of the record, whose free disk space is shown")
+    command: tuple[str, ...] = texts("entrain run or session command that the page may start")
 
     def __post_init__(self) -> None:
         if self.blinded and self.foxglove:
@@ -103,7 +103,7 @@ class OperatorPage(Participant):
     """ROS side of the page."""
 
     settings: Settings
-    # It waits for nobody, but its turn does not come before that of others.
+    # It waits for no node, and must not run before the others.
     real_time = False
 
     def __init__(self) -> None:
@@ -121,11 +121,11 @@ class OperatorPage(Participant):
         self.offer(topics.OPERATOR_NOTES)
         if settings.heartbeat:
             self.offer(topics.OPERATOR_HEARTBEAT)
-        self._services_asked = {n: self.create_client(k, s) for n, (k, s) in SERVICES.items()}
-        self._wishes: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._service_clients = {n: self.create_client(k, s) for n, (k, s) in SERVICES.items()}
+        self._requests: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
         self._readers: dict[str, tuple[topics.Topic, RawReader]] = {}
         for topic in LOOKED_AT:
-            # A writer of the latest state overwrites: a reader that hangs does not hold it up.
+            # A writer of the latest state overwrites it: a hanging reader does not block it.
             lasting = topic.qos is topics.LATEST_STATE
             self._look_at(topic, topic.qos if lasting else topics.LOOKING_ON)
         self._follow(not self.get_parameter("use_sim_time").value)
@@ -151,7 +151,7 @@ class OperatorPage(Participant):
         self._readers[topic.name] = topic, RawReader(self, topic.type, topic.name, qos)
 
     def _follow(self, wanted: bool) -> None:
-        """Look at the samples, or no longer: then whoever walks is not kept waiting for us."""
+        """Subscribe to the samples or unsubscribe, so that the walker does not wait for this."""
         policy = os.SCHED_OTHER if wanted else os.SCHED_BATCH
         for thread in map(int, os.listdir("/proc/self/task")):
             with contextlib.suppress(ProcessLookupError):
@@ -167,13 +167,13 @@ class OperatorPage(Participant):
         return self._due
 
     def on_deadline(self) -> None:
-        """Take what has come, do what was asked for, and say that somebody watches."""
+        """Take messages, carry out requests, and publish the heartbeat of a watched page."""
         following = topics.JOINT_STATES.name in self._readers
         self._due = time.monotonic() + (PERIOD if following else IDLE_PERIOD)
         if self.settings.heartbeat and self.page.seat.watched:
             self.publish(topics.OPERATOR_HEARTBEAT, String(data=self.get_name()))
-        while not self._wishes.empty():
-            self._wishes.get()()
+        while not self._requests.empty():
+            self._requests.get()()
         taken = [
             (received, topic, data)
             for topic, reader in self._readers.values()
@@ -203,11 +203,11 @@ class OperatorPage(Participant):
     # Acting, from the threads of the web server
 
     def offered(self) -> set[str]:
-        """Return what of SERVICES somebody answers."""
-        return {name for name, client in self._services_asked.items() if client.service_is_ready()}
+        """Return the names of the SERVICES that are available."""
+        return {n for n, client in self._service_clients.items() if client.service_is_ready()}
 
     def note(self, text: str) -> str:
-        """Publish a note, with the run's own time where that is not the wall clock's."""
+        """Publish a note, stamped with the run's own time if that is not the wall clock's."""
 
         def publish() -> None:
             now = time.time_ns()
@@ -215,20 +215,20 @@ class OperatorPage(Participant):
             stamp = self.view.now if simulated else now
             self.publish(topics.OPERATOR_NOTES, Note(header=header(stamp), text=text))
 
-        self._wishes.put(publish)
+        self._requests.put(publish)
         return "noted"
 
     def ask(self, what: str, reason: str = "") -> str:
-        """Ask one of SERVICES; ActionError if it refuses or does not answer."""
+        """Call one of SERVICES; ActionError if it refuses or does not answer."""
         kind, service = SERVICES[what]
         request = kind.Request(reason=reason) if kind is AskSession else kind.Request()
         answered = futures.Future[Any]()
 
-        def ask() -> None:
-            asked = self._services_asked[what].call_async(request)
-            asked.add_done_callback(lambda done: answered.set_result(done.result()))
+        def call() -> None:
+            sent = self._service_clients[what].call_async(request)
+            sent.add_done_callback(lambda done: answered.set_result(done.result()))
 
-        self._wishes.put(ask)
+        self._requests.put(call)
         try:
             answer = answered.result(ANSWER_TIMEOUT)
         except futures.TimeoutError:
@@ -243,7 +243,7 @@ class OperatorPage(Participant):
 
 
 def _load() -> None:
-    """Load the web server, and let who has work to do come first meanwhile."""
+    """Load the web server, at a low priority so that busy nodes go first."""
     os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)  # of this thread alone
     importlib.import_module("gait_entrainment_page.layout")
 

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The web server of the page, in a thread of its own, and the gate in front of the page.
+The web server of the page, in its own thread, and the gate in front of the page.
 
 The gate sees every request, websockets included. It refuses names that this host does not have
-(a stranger's site that resolves to it), requests that another site makes, and, beyond this host
-or where a token was chosen, whoever brings no token.
+(a foreign site that resolves to it), requests made by another site, and, if the page is served
+beyond this host or a token was chosen, requests without a token.
 """
 
 import logging
@@ -24,14 +24,14 @@ from starlette.websockets import WebSocketClose
 
 from gait_entrainment_page.access import Access
 
-# Who the browser is, and what it may: one name for each port, as cookies know no ports.
+# Cookies with the browser's identity and token: one name per port, as cookies ignore ports.
 _BROWSER, _TOKEN = "entrain_page_browser", "entrain_page_token"
 _CLOSING = 1  # how long open connections may take to end [s]
-_POLICY_VIOLATION = 1008  # code of a websocket that is refused
+_POLICY_VIOLATION = 1008  # close code of a refused websocket
 
 
 class Gate:
-    """The gate, an ASGI application before another one."""
+    """The gate, an ASGI application in front of another one."""
 
     def __init__(self, app: Any, access: Access, port: int) -> None:
         self._app, self._access, self._port = app, access, port
@@ -61,7 +61,7 @@ class Gate:
         async def send_more(message: Any) -> None:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
-                headers["x-frame-options"] = "DENY"  # a click within another site's page acts
+                headers["x-frame-options"] = "DENY"  # a click in another site's frame would act
                 if cookie_to_set:
                     headers.append("set-cookie", cookie_to_set)
             await send(message)
@@ -69,33 +69,33 @@ class Gate:
         await self._app(scope, receive, send_more)
 
     def _refusal(self, request: HTTPConnection, role: str, token: str) -> Any:
-        """Return the answer to a request that is refused; None if it is not."""
+        """Return the answer to a request that is refused; None if it is allowed."""
         headers, status = request.headers, 403
         host = headers.get("host", "")
         navigates = headers.get("sec-fetch-mode") == "navigate" and request.get("method") == "GET"
         from_elsewhere = headers.get("sec-fetch-site") in ("cross-site", "same-site")
         if not self._access.knows(host):
-            told = "this host has another name: open the address that entrain page has printed"
+            message = "this host has another name: open the address that entrain page has printed"
         elif headers.get("origin", f"http://{host}").partition("://")[2] != host or (
             from_elsewhere and not navigates
         ):
-            told = "another site must not use this page"
+            message = "another site must not use this page"
         elif not role:
             status, wrong = 401, "the token is wrong" if token else "this page asks for a token"
-            told = f"{wrong}: open the address that entrain page has printed"
+            message = f"{wrong}: open the address that entrain page has printed"
         else:
             return None
         if request["type"] == "websocket":
             return WebSocketClose(_POLICY_VIOLATION)
-        return PlainTextResponse(told, status, {"cache-control": "no-store"})
+        return PlainTextResponse(message, status, {"cache-control": "no-store"})
 
     def _cookie(self, name: str, value: str) -> str:
-        # Lax: a link elsewhere that leads here finds the same browser, with its seat and token.
+        # Lax: a browser that follows a link from elsewhere keeps its seat and token.
         return f"{name}_{self._port}={value}; Path=/; HttpOnly; SameSite=Lax"
 
 
 class Server:
-    """Serves the page of an application until it is closed; ``port`` is where."""
+    """Serves the page of an application on ``port`` until it is closed."""
 
     def __init__(self, app: FastAPI, listener: socket.socket, access: Access) -> None:
         self.port = int(listener.getsockname()[1])
@@ -115,12 +115,12 @@ class Server:
         self._server.run(sockets=self._sockets)
 
     def close(self) -> None:
-        """Serve no more."""
+        """Stop serving."""
         self._server.should_exit = True
         self._thread.join(2 * _CLOSING)
 
 
 def state_of(request: Request) -> tuple[str, str]:
-    """Return the role and the browser of a request, as the gate has found them."""
+    """Return the role and the browser of a request, as found by the gate."""
     state: dict[str, Any] = request.scope["state"]
     return str(state["role"]), str(state["browser"])

@@ -4,8 +4,8 @@
 """
 What the page shows of a run, without ROS and without a browser.
 
-Messages go in, whoever decoded them; out come figures, sentences and the points of the charts.
-Every history is bounded, so that the ten-thousandth stride costs what the first one did.
+Decoded messages go in; figures, sentences and the points of the charts come out. Every history is
+bounded, so the ten-thousandth stride costs as much as the first one.
 """
 
 import contextlib
@@ -25,16 +25,16 @@ from gait_entrainment_bags import topic_names as names
 from gait_entrainment_bags.messages import MessageError, event_of, state_of
 from gait_entrainment_commands.outcome import MEANINGS
 
-# Strides and pulses in the charts: more would not be told apart on a screen.
+# Strides and pulses in the charts: more could not be told apart on a screen.
 STRIDES_SHOWN = 200
-# Readings of the robot that are kept, and how many of a stride are drawn.
+# Robot readings that are kept, and how many are drawn per stride.
 READINGS_KEPT, READINGS_DRAWN = 4000, 400
-# Events by which the rate of the detector is told.
+# Events from which the step rate is computed.
 _EVENTS_COUNTED = 10
 _LINES_KEPT = 8
-# States of a node come once a second; without one for so long it is called silent [s], as in rqt.
+# Node states arrive once a second; without one for this long a node is stale [s], as in rqt.
 STALE_AFTER = 5.0
-# A torque that was measured longer ago is told with its age [s].
+# A torque that was measured longer ago is shown with its age [s].
 _OLD = 1.0
 PARTS = ("waiting", "baseline", "pulses", "washout", "finished", "failed", "rest")
 _OVER = ("finished", "failed")
@@ -42,16 +42,16 @@ STATUSES = ("inactive", "active", "stopped", "fault")
 _ACTIVE = STATUSES.index("active")
 _LEVELS = ("ok", "warning", "error", "stale")
 JOINTS = ("l_hip", "r_hip", "l_ankle", "r_ankle")
-# Limits that are told; one of them follows from the pulses of the block.
+# Limits that are shown; one of them follows from the pulses of the block.
 _LIMITS = ("torque", "duration", "rate", "rising")
-_TELLING = "rate"
-SESSION = "session"  # the node that tells how a session stands
+_REVEALING = "rate"
+SESSION = "session"  # the node that reports the state of a session
 _NAN = math.nan
 
 
 @dataclass(frozen=True)
 class NodeState:
-    """What a node last said of itself, and when, on the clock of the view [s]."""
+    """The latest state reported by a node, and when, on the view's clock [s]."""
 
     level: str  # ok, warning, error or stale
     message: str
@@ -61,12 +61,12 @@ class NodeState:
 
 class View:
     """
-    The run as it stands. ``lock`` is held by whoever reads or writes it.
+    The current state of a run. Hold ``lock`` while reading or writing it.
 
-    Stamps are nanoseconds, as recorded; ``version`` grows with what the charts are made of. A
-    ``blinded`` one says nothing of the robot and the protocol by which a block would be known; its
-    charts, lag and verdict are not to be shown. The ``clock`` [s] tells how long ago something was
-    heard; without one it is the time of the record.
+    Stamps are nanoseconds, as recorded; ``version`` grows with the data of the charts. A
+    ``blinded`` view hides everything about robot and protocol that would reveal a block; its
+    charts, lag and verdict must not be shown. The ``clock`` [s] measures how long ago something
+    was heard; by default it is the time of the record.
     """
 
     def __init__(self, *, blinded: bool = False, clock: Callable[[], float] | None = None) -> None:
@@ -75,29 +75,29 @@ class View:
         self.version = 0
         self.nodes: dict[str, NodeState] = {}
         self.notes: deque[tuple[int, str, str]] = deque(maxlen=_LINES_KEPT)
-        # A run that follows may be told of after the robot that it uses.
+        # The robot of the next run may be announced before that run.
         self.setup: Any = None  # latest AnkleRobotSetup
         self.simulated = False  # the robot: what it measures is computed
         self._reset()
 
     def _reset(self) -> None:
-        """Forget the run: another one begins."""
+        """Forget the run, as another one begins."""
         self.now = 0
         self.state: Any = None  # latest ExperimentState
         self.side: Side | None = None  # the perturbed leg
         self.strides: deque[tuple[int, float]] = deque(maxlen=STRIDES_SHOWN)  # number, period [s]
         # Of each pulse: stride, phase lag [s].
         self.lags: deque[tuple[int, float]] = deque(maxlen=STRIDES_SHOWN)
-        self.lag_refers_to = "toe-off"  # or the heel strike, where no toe-offs are detected
+        self.lag_refers_to = "toe-off"  # or the heel strike, if no toe-offs are detected
         # The latest double stances before a toe-off of the perturbed leg [s].
         self.stances: deque[float] = deque(maxlen=_EVENTS_COUNTED)
         self.verdict: Any = None  # latest Entrainment
         self.robots: dict[Side, Any] = {}  # latest AnkleRobotState of each ankle that has one
-        self._heard_at: dict[Side, float] = {}  # when it came
+        self._heard_at: dict[Side, float] = {}  # when it arrived
         self.legs: tuple[float, ...] = ()  # hips and ankles, left and right [rad]
         self.event: Any = None  # latest GaitEvent
         self.events = 0
-        # Of the last whole stride: seconds from its start, commanded, measured [N m].
+        # Of the last complete stride: seconds from its start, commanded, measured [N m].
         self.torque: list[tuple[float, float, float]] = []
         self.toe_off = self.double_stance = _NAN  # of that stride, from its start [s]
         self.troubles: deque[str] = deque(maxlen=_LINES_KEPT)
@@ -105,12 +105,12 @@ class View:
         self._strikes: deque[int] = deque(maxlen=_EVENTS_COUNTED)
         self._toe_off_at = self._other_strike_at = 0
 
-    # What comes in
+    # Input
 
     def take(self, topic: str, message: Any) -> None:
-        """Take a message of a topic, by its relative name; one without a meaning is left out."""
+        """Process a message of a topic, by its relative name; an invalid one is ignored."""
         if (run := getattr(message, "run", 0)) and self.state is not None:
-            # Runs of another command are counted anew, and its state comes from one node.
+            # Another command counts its runs from the start; one node alone publishes its state.
             if run > self.state.run or (topic == names.EXPERIMENT_STATE and self._begins(message)):
                 self._reset()
             elif run < self.state.run:
@@ -121,14 +121,14 @@ class View:
             _TAKES[topic](self, message)
 
     def _begins(self, state: Any) -> bool:
-        """Whether an ExperimentState is of another run than the latest one."""
+        """Whether an ExperimentState belongs to another run than the latest one."""
         over = not self.going_on and PARTS[min(state.phase, len(PARTS) - 1)] not in _OVER
         return state.run < self.state.run or state.stride < self.state.stride or over
 
     def take_diagnostics(self, message: Any) -> None:
-        """Take what nodes say of themselves."""
+        """Process the states that nodes report."""
         for status in message.status:
-            # Of our nodes; what others say of their parts stands side by side.
+            # The suffixes of our nodes; the parts of other nodes keep theirs.
             name = status.name.removesuffix(": state").removesuffix(": run")
             level = _LEVELS[min(int.from_bytes(status.level, "little"), 3)]
             values = {pair.key: pair.value for pair in status.values}
@@ -148,7 +148,7 @@ class View:
         self.version += 1
 
     def _torque_between(self, start: int, end: int) -> list[tuple[float, float, float]]:
-        """Return the readings of a stride, thinned; the one before it says how it began."""
+        """Return the thinned readings of a stride; it starts with the value before it."""
         within, before = [], (0, 0.0, _NAN)
         for reading in self._readings:
             if reading[0] < start:
@@ -171,7 +171,7 @@ class View:
         self.version += 1
 
     def _on_verdict(self, message: Any) -> None:
-        Verdict(message.verdict), Reason(message.reason)  # raises for one that is unknown here
+        Verdict(message.verdict), Reason(message.reason)  # raises if unknown here
         self.verdict = message
         self.version += 1
 
@@ -222,7 +222,7 @@ class View:
 
     @property
     def going_on(self) -> bool:
-        """Whether a run has begun and not ended."""
+        """Whether a run has started and not ended."""
         return self.state is not None and self.part not in _OVER
 
     @property
@@ -242,13 +242,13 @@ class View:
         return f"{self.part}, {name or self.state.block} of {blocks} blocks"
 
     def time_left(self) -> float:
-        """Return how long the rest takes [s], by the last strides; NaN if unknown."""
+        """Return the time left [s], estimated from the last strides; NaN if unknown."""
         if self.part == "finished":
             return 0.0
         if not self.going_on:
             return _NAN
         left = float(max(self.state.strides - self.state.stride, 0) * self.period)
-        if self.blinded and math.isfinite(left):  # more would tell the period
+        if self.blinded and math.isfinite(left):  # more digits would reveal the period
             left = 30.0 * math.ceil(left / 30)
         return left
 
@@ -288,20 +288,20 @@ class View:
     @property
     def pushes(self) -> bool:
         """Whether torque is commanded now."""
-        asked = [state.commanded_torque for state in self.robots.values()]
-        return not self.blinded and any(torque != 0 for torque in asked)
+        torques = [state.commanded_torque for state in self.robots.values()]
+        return not self.blinded and any(torque != 0 for torque in torques)
 
     def measured(self) -> str:
-        """Return the torque as measured; never zero where none was measured."""
-        return self._of_each(self._measured) or "nothing heard of the robot"
+        """Return the measured torque; never zero if none was measured."""
+        return self._of_each(self._measured) or "nothing heard from the robot"
 
     def _measured(self, robot: Any) -> str:
         if self.blinded and robot.status == _ACTIVE and not self.faults():
-            return "hidden"  # until one must see whether it falls
+            return "hidden"  # until it matters whether it falls
         torque = robot.measured_torque
         if math.isnan(torque):
             return "not measured"
-        if self.simulated:  # it tells what changes
+        if self.simulated:  # it reports only changes
             return f"{_torque(torque)} (simulated)"
         age = self._clock() - self._heard_at[Side(robot.side)]
         return _torque(torque) + (f", {age:.0f} s ago" if age > _OLD else "")
@@ -311,37 +311,37 @@ class View:
         return self._of_each(lambda robot: ", ".join(robot.faults))
 
     def _of_each(self, tell: Callable[[Any], str]) -> str:
-        """Return what is told of the robot, with the ankles named if they differ."""
-        told = {side: tell(robot) for side, robot in sorted(self.robots.items())}
-        if len(set(told.values())) <= 1:
-            return next(iter(told.values()), "")
-        return ", ".join(f"{side.name.lower()} {words or 'none'}" for side, words in told.items())
+        """Return a text about the robot, with the ankles named if they differ."""
+        texts = {side: tell(robot) for side, robot in sorted(self.robots.items())}
+        if len(set(texts.values())) <= 1:
+            return next(iter(texts.values()), "")
+        return ", ".join(f"{side.name.lower()} {words or 'none'}" for side, words in texts.items())
 
     def robot_words(self) -> list[tuple[str, str]]:
-        """Return what there is to say of the robot: names and values."""
-        rows = [("state", "not heard")]
+        """Return names and values about the robot."""
+        rows = [("state", "not heard from")]
         if self.robots:
             rows = [("state", self._of_each(lambda robot: STATUSES[min(robot.status, 3)]))]
             if not self.blinded:
-                asked = self._of_each(lambda robot: _torque(robot.commanded_torque))
-                rows.append(("commanded", asked))
+                commanded = self._of_each(lambda robot: _torque(robot.commanded_torque))
+                rows.append(("commanded", commanded))
             rows.append(("measured", self.measured()))
             rows.append(("faults", self.faults() or "none"))
         if (setup := self.setup) is not None:
             limits = dict(zip(setup.limit_names, setup.limits, strict=False))
             if self.blinded:
-                limits.pop(_TELLING, None)
+                limits.pop(_REVEALING, None)
             rows.append(("driver", setup.driver.partition(":")[0]))
             if not self.simulated:
                 rows.append(("armed by", setup.armed_by or "nobody"))
                 rows.append(("watchdog", setup.watchdog or "not proved"))
-            units = {n: told.unit.strip("1") for n, told in settings_of(DeviceLimits).items()}
-            told = [f"{n} {limits[n]:.4g} {units[n]}".rstrip() for n in _LIMITS if limits.get(n)]
-            rows.append(("limits", ", ".join(told)))
+            units = {n: s.unit.strip("1") for n, s in settings_of(DeviceLimits).items()}
+            shown = [f"{n} {limits[n]:.4g} {units[n]}".rstrip() for n in _LIMITS if limits.get(n)]
+            rows.append(("limits", ", ".join(shown)))
         return rows
 
     def sensor_words(self) -> list[tuple[str, str]]:
-        """Return what there is to say of the detection of gait events."""
+        """Return names and values about the detection of gait events."""
         if (event := self.event) is None:
             return [("gait events", "none yet")]
         kind = EventKind(event.kind).name.lower().replace("_", " ")
@@ -364,14 +364,14 @@ class View:
         return rows
 
     def session(self) -> tuple[str, bool]:
-        """Return how a session stands that somebody conducts, and whether it was paused."""
+        """Return the state of a session in progress, and whether it was paused."""
         for name, level, message in self.node_words():
             if name.endswith(SESSION) and level != "stale":
                 return message, level == "warning"
         return "", False
 
     def node_words(self) -> list[tuple[str, str, str]]:
-        """Return name, level and message of all nodes but those that ended with their run."""
+        """Return name, level and message of all nodes except those that ended with their run."""
         rows = []
         for name, state in sorted(self.nodes.items()):
             silent = self._clock() - state.heard_at
@@ -395,7 +395,7 @@ _TAKES: dict[str, Callable[[View, Any], None]] = {
     names.JOINT_STATES: View._on_joints,
     names.OPERATOR_NOTES: View._on_note,
 }
-# What is sampled; of the others there is a message a stride or an event, or fewer.
+# Sampled topics; the others have at most one message per stride or event.
 SAMPLED = (names.ROBOT_STATE, names.JOINT_STATES)
 KEPT = [name for name in _TAKES if name not in SAMPLED]
 
@@ -405,5 +405,5 @@ def _torque(value: float) -> str:
 
 
 def _signed(value: float, digits: int) -> str:
-    """Return a number with its sign, and so many digits; no negative zero."""
+    """Return a number with its sign and a number of digits; no negative zero."""
     return f"{round(value, digits) + 0.0:+.{digits}f}"

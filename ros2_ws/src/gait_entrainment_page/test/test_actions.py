@@ -15,7 +15,7 @@ import pytest
 from gait_entrainment_drivers.stop_channel import NO_ANSWER, StopAnswer
 from gait_entrainment_page.actions import ActionError, Command, stop, stop_at_once
 
-CUT = "not everybody confirmed the stop: cut the power"
+CUT = "not every robot confirmed the stop: cut the power"
 
 
 @pytest.fixture
@@ -73,7 +73,7 @@ def test_one_goes_on_at_a_time(tmp_path, monkeypatch):
     command = Command(["run"])
     command.start()
     try:
-        with pytest.raises(ActionError, match="entrain run goes on: wait for its end"):
+        with pytest.raises(ActionError, match="entrain run is running: wait for its end"):
             command.start(preflight=True)
     finally:
         command._process.kill()

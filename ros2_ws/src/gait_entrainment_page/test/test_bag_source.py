@@ -73,8 +73,8 @@ def without(path, out, *topics):
 def test_a_bag_without_states_says_what_is_missing(tmp_path):
     bag = without(BAG, tmp_path / "bag", "experiment/state", "perturbator/state", "joint_states")
     source = BagSource(bag)
-    assert source.lacking == ["phases of the protocol", "states of the robot", "joint angles"]
-    assert source.view.measured() == "nothing heard of the robot"
+    assert source.lacking == ["parts of the protocol", "states of the robot", "joint angles"]
+    assert source.view.measured() == "nothing heard from the robot"
     assert source.view.part == "waiting"
     assert len(source.view.strides) == 80
     source.close()

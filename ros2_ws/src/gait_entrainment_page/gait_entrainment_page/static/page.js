@@ -1,14 +1,14 @@
 // SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 // SPDX-License-Identifier: Apache-2.0
 
-// What must work however busy the rest of the page is: the stop, the sign of life, the banner
-// that says so when the server is gone; and the legs, which are drawn many times a second.
+// What must work however busy the rest of the page is: the stop, the sign of life, and the banner
+// for a server that is gone. Also the legs, which are drawn many times a second.
 "use strict";
 const entrain = { heartbeat: false, acting: false };
 
 (() => {
-  const OFF = 2000, OLD = 4000; // by which a clock may differ, and how old what is shown may be [ms]
-  let lost = 0; // signs of life in a row that nobody answered
+  const OFF = 2000, OLD = 4000; // tolerated clock difference, and age of what is shown [ms]
+  let lost = 0; // unanswered signs of life in a row
   let toldAt = performance.now();
   const isOld = () => performance.now() - toldAt > OLD;
   entrain.told = (what) => { Object.assign(entrain, what); toldAt = performance.now(); };
@@ -17,7 +17,7 @@ const entrain = { heartbeat: false, acting: false };
 
   let asked = -1e9;
   async function stop() {
-    if (performance.now() - asked < 400) return; // the click behind a press
+    if (performance.now() - asked < 400) return; // the click after a press
     asked = performance.now();
     tell("told", "Stopping …");
     const late = setTimeout(() => tell("told", "STOP: no answer yet. Use the switch in your hand, or cut the power."), 1000);
@@ -29,10 +29,10 @@ const entrain = { heartbeat: false, acting: false };
       tell("told", "STOP DID NOT ARRIVE: cut the power. " + error.message);
     } finally { clearTimeout(late); }
   }
-  // At the press: a finger may rest on the button.
+  // On the press: a finger may rest on the button.
   for (const kind of ["pointerdown", "click"])
     document.addEventListener(kind, (event) => { if (event.target.closest?.("#stop")) stop(); });
-  // Who goes on to something else has read what came of it.
+  // Whoever clicks on something else has read the answer.
   document.addEventListener("click", (event) => { if (event.target.closest?.(".acts .q-btn")) tell("told", ""); });
 
   async function alive() {
@@ -44,7 +44,7 @@ const entrain = { heartbeat: false, acting: false };
       const response = await fetch("/alive", { method: "POST", body, signal });
       if (!response.ok) throw new Error(await response.text());
       const now = (await response.json()).now;
-      if (lost > 2) location.reload(); // another server may have come
+      if (lost > 2) location.reload(); // it may be another server
       lost = 0;
       tell("lost", isOld() ? "What you see is old: nothing comes from the page's server. STOP works." : "");
       const off = ((sent + Date.now()) / 2 - now) / 1000;
@@ -59,7 +59,7 @@ const entrain = { heartbeat: false, acting: false };
   const gone = () => navigator.sendBeacon("/alive", "gone");
   addEventListener("pagehide", () => { if (!document.hidden) gone(); });
   document.addEventListener("visibilitychange", () => { if (document.hidden) gone(); });
-  // No question stands before STOP when a page that was lost is loaded anew.
+  // No prompt may cover STOP when a page that was lost is reloaded.
   addEventListener("beforeunload", (event) => { if (entrain.heartbeat && entrain.acting && !isOld()) event.preventDefault(); });
   addEventListener("DOMContentLoaded", alive);
 
