@@ -71,7 +71,7 @@ class BlockRun:
     start: int | None = None  # heel strike that starts its first stride [ns]
     strides_before: int = 0  # of its leg in the run
     doubted_before: int = 0  # events of its leg that were not believed
-    baseline: int = 0  # strides of the baseline; 0 until it is over
+    baseline: int = 0  # strides of the baseline; 0 until its last one starts
     planned: Counter[Side] = field(default_factory=Counter)  # pulses so far, by ankle
     first_onset: int | None = None  # of the planned pulses [ns]
     pulses_end: int = 0  # end of the last planned pulse [ns]
@@ -178,7 +178,7 @@ class Conductor:
         """
         Take one gait event, and plan the pulses that can be planned from it.
 
-        One stamped after ``now`` [ns] is not believed. Raises ProtocolError if pulses would
+        An event stamped after ``now`` [ns] is not believed. Raises ProtocolError if pulses would
         overlap at the resulting period, GaitError if the baseline is unfit to measure a period.
         """
         for leg in self._legs.values():
@@ -229,7 +229,7 @@ class Conductor:
 
         Pulses that are due by then must have been requested.
 
-        The first onset lies (1 + P) measured periods after a strike that was not yet known when
+        The first onset lies (1 + initial phase) measured periods after a strike not yet known when
         the previous promise was made, and no lookahead is longer than the shortest stride that
         entered the measured period, so no promise covers an onset that is not yet planned. If the
         latest stride was that short and changes the mean, the onset is postponed to the end of
@@ -441,7 +441,7 @@ def _shortest_stride(protocol: Protocol) -> float:
     Return a period [s] that no stride is shorter than, for promises before one is measured.
 
     A foot stays on the ground only while the leg turns slower than sqrt(g / L), and a stride
-    turns it by 4 alpha. An absolute pulse period is a bound too: then nothing may be measured.
+    turns it by 4 alpha. An absolute pulse period also limits it: no stride may be measured then.
     """
     walker = protocol.walker
     stride = 4 * walker.leg_angle * math.sqrt(walker.leg_length / walker.gravity)

@@ -87,7 +87,7 @@ class Protocol(Block):
         return dose
 
     def check_limits(self, *blocks: Block) -> None:
-        """Raise LimitError if a pulse (of ``blocks`` or any) or all together exceed the limits."""
+        """Raise LimitError if a pulse (of ``blocks``, or any) or the dose exceeds the limits."""
         for block in blocks or self.sequence:
             self.limits.check_pulse(block.pulses.pulse(0, block.torque(self.walker)))
         self.limits.check_dose(self.dose, ())

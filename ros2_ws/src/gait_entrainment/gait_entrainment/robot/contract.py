@@ -18,7 +18,7 @@ from gait_entrainment.robot.pulse_train import PulseTrain
 
 @dataclass(frozen=True)
 class Capabilities:
-    """What a device can do with its options."""
+    """What a device can do, given its options."""
 
     peak_torque: float  # [N m]; inf if it has no limit
     torque_rate: float  # steepest change of torque [N m/s]; inf for a jump

@@ -9,7 +9,7 @@ from gait_entrainment.errors import EntrainmentError
 
 
 class DeviceError(EntrainmentError, RuntimeError):
-    """The device cannot do what was requested; the message says in one line what to do."""
+    """The device cannot do what was requested; one line says what failed and what to do."""
 
 
 class LimitError(EntrainmentError, ValueError):

@@ -116,7 +116,7 @@ class GuardedRobot:
             threading.Thread(target=self._watch, name="experiment watchdog", daemon=True).start()
 
     def arm(self) -> None:
-        """Allow torque for a limited time: for a person who has checked that all is well."""
+        """Allow torque for a limited time, once a person has checked that all is well."""
         self._refuse_latched()
         self._refuse_inactive()
         if not self.capabilities.simulated:
