@@ -365,7 +365,7 @@ FAULTS = {
         "def publish(self, topic, message):\n"
         "        if topic not in (topics.PULSES, topics.ROBOT_STATE):\n"
         "            super().publish(topic, message)",
-        (r"pulses: .*\n.*Pulses at \[\] were announced", "states: .*\n.*No state shows"),
+        (r"pulses: .*\n.*Pulses were announced at \[\]", "states: .*\n.*No state shows"),
     ),
 }  # fmt: skip
 

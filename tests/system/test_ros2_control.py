@@ -133,11 +133,11 @@ def test_a_robot_in_the_domain_of_the_run_needs_names_of_its_own(monkeypatch):
         (
             [],
             {"joint": "hip"},
-            "joint hip .*: no joint_states tell of it: start its joint state b",
+            "joint hip .*: it is not in joint_states: start its joint state b",
         ),
         (["--no-effort"], {}, "joint ankle reports no effort: its hardware must export one"),
-        (["--deaf"], {}, "nobody listens to /effort_controller/commands: load and configure"),
-        (["--behind=2"], {}, r"joint_states are 2\S* s old when they come: synchronize"),
+        (["--deaf"], {}, "no node hears /effort_controller/commands: load and configure"),
+        (["--behind=2"], {}, r"joint_states are 2\S* s old on arrival: synchronize"),
     ],
 )
 def test_what_is_missing_is_told_in_one_line(options, driver, words, monkeypatch):
@@ -170,7 +170,7 @@ def test_controller_manager_activates_the_controller_and_deactivates_it(state, t
     [
         (
             ["--manager=effort_controller=unconfigured"],
-            "does not make effort_controller active, it is unconfigured: Controller with name",
+            "did not make effort_controller active; it is unconfigured: Controller with name",
         ),
         (
             ["--manager=other_controller=active"],
@@ -178,7 +178,7 @@ def test_controller_manager_activates_the_controller_and_deactivates_it(state, t
         ),
         (
             ["--manager=effort_controller=inactive", "--silent"],
-            "controller_manager does not answer: see whether it runs",
+            "controller_manager does not answer: check that it is running",
         ),
     ],
 )

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The conformance kit asks a running node, in whatever language, over the perturbator's topics.
+The conformance kit for a running node, in any language, over the perturbator's topics.
 
-Whoever wants the node checked starts it, in the same ROS domain; its lifecycle is managed here.
-The stamps of the horizons that it is sent are simulated or, for a node that holds a real robot,
-those of the wall clock: its torque is then promised piece by piece, once it has been measured.
+The user starts the node in the same ROS domain; its lifecycle is managed here. Horizons are sent
+with simulated stamps or, to a node with a real robot, those of the wall clock: the torque is then
+promised piece by piece, once it has been measured.
 """
 
 import math
@@ -43,16 +43,16 @@ TIMEOUT = 5.0
 SILENCE = 0.3
 # How far horizons lead in real time [ns].
 LEAD = 200_000_000
-# What shows that the pulses of a run are asked for by who sends its horizons.
+# Shows that a run's pulses are requested by the sender of its horizons.
 KEY = "the kit's"
 SEAL = seal_of(KEY)
 
 
 class _NodeRobot:
-    """A node, used as a GuardedRobot is; what it sends is checked against the contract."""
+    """A node, used like a GuardedRobot; what it sends is checked against the contract."""
 
     def __init__(self, name: str, *, simulated: bool, arm: bool) -> None:
-        # What topics do not show is not promised.
+        # What the topics do not show.
         unknown = {"measures_torque": False, "state_rate": 0.0}
         self.capabilities = SimpleNamespace(simulated=simulated, **unknown)
         self.faults: tuple[Fault, ...] = ()
@@ -62,7 +62,7 @@ class _NodeRobot:
         self.announced: list[int] = []  # onsets [ns]
         self.client = Client("entrain_driver_check")
         self._name, self._arm = name, arm
-        self._configured = self._active = True  # for all that is known
+        self._configured = self._active = True  # as far as is known
         self._states: list[Any] = []
         self._profiles: list[Any] = []
         self._revisions: list[int] = []
@@ -81,7 +81,7 @@ class _NodeRobot:
             self.client.close()
             raise DeviceError(
                 f"no node {name} with {', '.join(kinds)}, deliver_pulse_train and a subscription "
-                f"of {HORIZON.name} was found: start it in this ROS domain, unconfigured"
+                f"to {HORIZON.name} was found: start it in this ROS domain, unconfigured"
             )
 
     def configure(self) -> None:
@@ -111,7 +111,7 @@ class _NodeRobot:
         self.goal = handle
 
     def promise(self, until: int) -> TorqueProfile:
-        """Send a horizon; return what is promised once that reaches an instant [ns]."""
+        """Send a horizon; return the profile once it is promised up to an instant [ns]."""
         simulated = self.capabilities.simulated
         horizon = until if simulated else until + LEAD
         run, timeout = (self.run, TIMEOUT) if self._active else (self.run + 1, SILENCE)
@@ -149,9 +149,9 @@ class _NodeRobot:
     def stop(self) -> None:
         _require(self._end(lambda: self._call(Trigger, "stop")), "stopped")
         if not self._configured:
-            # Refused once, or a run that is about to begin would release the stop by itself.
+            # It must be refused once, or a run about to begin would release the stop by itself.
             held = not self._change(Transition.TRANSITION_CONFIGURE).success
-            require(held, "Stopped before it was configured, the node could be configured.")
+            require(held, "A node stopped before it was configured could be configured.")
 
     def deactivate(self) -> None:
         self._active = False
@@ -168,7 +168,7 @@ class _NodeRobot:
             _require(self._change(Transition.TRANSITION_CLEANUP), "cleaned up")
 
     def _end(self, call: Callable[[], Any]) -> Any:
-        """Call what ends the torque; if there may be any, the walker must get a stop."""
+        """Make a call that ends the torque; if there may be any, the walker must get a stop."""
         stops, answer = self._stops, call()
         stopped = not self.goal or self.client.wait(lambda: self._stops > stops, TIMEOUT)
         require(stopped, "No profile with the stop flag was published.")
@@ -221,7 +221,7 @@ class NodeBench(Bench):
         self.robot = self._node = robot
 
     def make(self, *, guarded: bool) -> _NodeRobot:  # noqa: ARG002
-        """Return the node, unconfigured: it makes its robot anew when it is configured."""
+        """Return the node, unconfigured: it makes a new robot when it is configured."""
         with suppress(DeviceError):
             self._node.close()
         return self._node
@@ -231,7 +231,7 @@ class NodeBench(Bench):
         self.robot.stop()
 
     def wait_for(self, condition: Callable[[], object]) -> bool:
-        """Whether something is so; waits for messages that may show it."""
+        """Wait for messages until a condition holds; return whether it does."""
 
         def shown() -> object:
             self.states.extend(self.robot.read())
@@ -240,11 +240,11 @@ class NodeBench(Bench):
         return bool(self.robot.client.wait(shown, TIMEOUT))
 
     def require_delivered(self, train: PulseTrain) -> None:
-        """See that every pulse is reported and announced once, and the goal ends as delivered."""
+        """Require that every pulse is reported and announced once, and the goal is delivered."""
         super().require_delivered(train)
         announced, onsets = self.robot.announced, self.onsets
         self.wait_for(lambda: len(announced) >= len(onsets))
-        require(announced == onsets, f"Pulses at {announced} were announced for {onsets} ns.")
+        require(announced == onsets, f"Pulses were announced at {announced}, not at {onsets} ns.")
         ended = self.robot.client.result(self.robot.goal, TIMEOUT)
         require(ended, "A delivered train did not end.")
         outcome, delivered = ended.result.outcome, ended.result.delivered
@@ -255,13 +255,13 @@ class NodeBench(Bench):
 
 
 def other_run(bench: NodeBench) -> None:
-    """A train for another run than the one under way is refused, and a train of somebody else."""
+    """A train for a run other than the current one is refused, and a train with another key."""
     bench.start()
     bench.robot.run += 7
     bench.require_refused(bench.train(), "for another run")
     bench.robot.run -= 7
-    bench.robot.key = "of somebody else"
-    bench.require_refused(bench.train(), "of somebody else")
+    bench.robot.key = "another client's"
+    bench.require_refused(bench.train(), "with another key")
     bench.robot.key = KEY
     bench.run(bench.lead + 0.2)
     bench.require_no_torque("although both trains were refused")
@@ -271,11 +271,11 @@ def check_node(
     name: str, side: Side, tolerances: Tolerances, *, real_time: bool, arm: bool
 ) -> Iterator[Result]:
     """
-    Run every check on a node whose robot sits on a side; yields each result as it is there.
+    Run every check on a node whose robot is on ``side``; yield each result once it is there.
 
-    In ``real_time`` stamps are of the wall clock, as the node of a real robot needs them; to
-    ``arm`` is to call its service ``~/arm``: it may deliver torque. Raises DeviceError if there is
-    no such node.
+    With ``real_time`` the stamps are of the wall clock, as the node of a real robot needs them;
+    with ``arm`` its service ``~/arm`` is called, and it may deliver torque. Raises DeviceError if
+    there is no such node.
     """
     robot = _NodeRobot(name, simulated=not real_time, arm=arm)
     with robot.client:

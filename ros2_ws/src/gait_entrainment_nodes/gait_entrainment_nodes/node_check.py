@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Where `entrain driver check --node` enters: the check loads ROS, which must be able to start."""
+"""Entry of `entrain driver check --node`: sees that ROS can start before the check loads it."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -10,7 +10,7 @@ from gait_entrainment_nodes.messaging.environment import require_usable_environm
 
 
 def check_node(*arguments: Any, **options: Any) -> Iterator[Any]:
-    """Do as `node_bench.check_node`; raises UnusableEnvironmentError before ROS is loaded."""
+    """Run `node_bench.check_node`; raises UnusableEnvironmentError before ROS is loaded."""
     require_usable_environment()
     from gait_entrainment_nodes import node_bench
 

@@ -2,16 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Driver of any robot that speaks ros2_control: an effort controller and a joint state broadcaster.
+Driver for any ros2_control robot with an effort controller and a joint state broadcaster.
 
 Torque is published to a controller that takes std_msgs/Float64MultiArray, such as
 effort_controllers/JointGroupEffortController; position, velocity and effort of the joint come back
-as sensor_msgs/JointState. All of it runs in the torque loop's process, in a ROS context and domain
-of its own: the robot's names never meet those of the experiment.
+as sensor_msgs/JointState. All of it runs in the torque loop's process, in its own ROS context and
+domain, so the robot's names never clash with those of the experiment.
 
-What this cannot do: make a controller let go. ros2_control's effort controllers hold their last
-command if messages stop, unless the hardware or the controller has a timeout of its own
-(ros2_controllers #95). The conformance kit proves which it is.
+This driver cannot make a controller let go. ros2_control's effort controllers hold their last
+command if messages stop, unless the hardware or the controller has its own timeout
+(ros2_controllers #95). The conformance kit shows which is the case.
 """
 
 import math
@@ -40,14 +40,14 @@ except ImportError:  # of a full installation
 
 # How long the robot may take to show its joint and its controller [s].
 _DISCOVERY_TIMEOUT = 5.0
-# The robot's process waits 2 s for the device to be enabled: two questions.
+# How long a request may take [s]: enabling takes two, and the robot's process waits 2 s for it.
 _SERVICE_TIMEOUT = 0.8
-# After the loop was held up, for so long a state is waited for before the next command [s].
+# How long to wait for a new state before the next command, after the loop was held up [s].
 _FRESH_STATE_TIMEOUT = 0.02
-_CONTROLLER_GONE = Fault("controller_gone", "Nobody takes commands: the controller has ended.")
+_CONTROLLER_GONE = Fault("controller_gone", "No process takes commands: the controller has ended.")
 # Only the latest state counts.
 _STATES = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-# What ros2_control's controllers subscribe with is reliable. One command is kept: never a queue.
+# ros2_control's controllers subscribe as reliable. Only one command is kept, never a queue.
 _COMMANDS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 
 
@@ -58,11 +58,11 @@ class Ros2ControlOptions(LoopOptions):
     joint: str = setting("ankle", "name of the joint in joint_states")
     controller: str = setting("effort_controller", "name of the effort controller")
     joint_states: str = setting("joint_states", "topic of the joint's states")
-    namespace: str = setting("", "of the robot, such as /exo")
-    domain: int = setting(0, "ROS domain of the robot; not that of the run", "1", (0, 232))
-    joint_index: int = setting(0, "place of the joint in the controller's command", "1", (0, 63))
+    namespace: str = setting("", "namespace of the robot, such as /exo")
+    domain: int = setting(0, "ROS domain of the robot, not that of the run", "1", (0, 232))
+    joint_index: int = setting(0, "index of the joint in the controller's command", "1", (0, 63))
     joint_count: int = setting(1, "joints in the controller's command", "1", (1, 64))
-    manage: bool = setting(True, "activate the controller by controller_manager, if it is there")
+    manage: bool = setting(True, "activate the controller by controller_manager, if available")
     peak_torque: float = setting(20.0, "largest torque at the ankle", "N m", (0.1, 500.0))
     ratio: float = setting(
         1.0,
@@ -72,7 +72,7 @@ class Ros2ControlOptions(LoopOptions):
     )
 
     def __post_init__(self) -> None:
-        """Check every field, and what has no range of its own."""
+        """Check every field, and what no range of a single field covers."""
         super().__post_init__()
         if self.ratio == 0:
             raise LimitError("driver: ratio: 0; allowed: any other number")
@@ -88,7 +88,7 @@ class EffortJoint(TorqueDevice):
 
     def __init__(self, options: Ros2ControlOptions) -> None:
         self.name = f"joint {options.joint}"
-        # A command is for all joints of a controller: it has one master.
+        # A command is for all joints of a controller, so the controller has one master.
         under = f" under {options.namespace.strip('/')}" if options.namespace else ""
         self.address = f"{options.controller}{under} in ROS domain {options.domain}"
         self._options = options
@@ -96,18 +96,18 @@ class EffortJoint(TorqueDevice):
         self._client: Client | None = None  # while the device is open
         self._manager: list[Any] = []  # clients of controller_manager: to list, to switch
         self._state: JointState | None = None  # not read yet
-        self._age = math.inf  # of the joint's last state when it came [s]
-        self._place = 0  # of the joint in it
+        self._age = math.inf  # of the joint's last state on arrival [s]
+        self._place = 0  # of the joint in that state
 
     def open(self) -> None:
-        """Join the robot's domain, and see its joint and its controller."""
+        """Join the robot's domain, and find its joint and its controller."""
         options = self._options
         named_alike = not options.namespace and options.joint_states == "joint_states"
         if os.environ.get("ROS_DOMAIN_ID", "0") == str(options.domain) and named_alike:
             raise DeviceError(
                 f"driver: domain: {options.domain} is that of the run (ROS_DOMAIN_ID), whose "
-                "joint_states would meet the robot's; allowed: another domain, a namespace of the "
-                "robot, or another name for its joint_states"
+                "joint_states would mix with the robot's; allowed: another domain, a namespace "
+                "for the robot, or another name for its joint_states"
             )
         name, namespace = "gait_entrainment_driver", options.namespace
         self._client = Client(name, namespace=namespace, domain=options.domain)
@@ -123,13 +123,13 @@ class EffortJoint(TorqueDevice):
             ]
         self._wait(
             lambda: self._age < math.inf,
-            lambda: f"no {options.joint_states} tell of it: start its joint state broadcaster",
+            lambda: f"it is not in {options.joint_states}: start its joint state broadcaster",
         )
         self._wait(
             lambda: self._state is not None,
             lambda: (
-                f"its {options.joint_states} are {self._age:.3g} s old when they come: "
-                "synchronize the clocks, and see that they carry stamps"
+                f"its {options.joint_states} are {self._age:.3g} s old on arrival: "
+                "synchronize the clocks, and check that the messages are stamped"
             ),
         )
         if self._state is None or not math.isfinite(self._reading(self._state).torque):
@@ -137,7 +137,7 @@ class EffortJoint(TorqueDevice):
         self._wait(
             lambda: self._commands.get_subscription_count() > 0,
             lambda: (
-                f"nobody listens to {self._commands.topic_name}: load and configure the controller"
+                f"no node hears {self._commands.topic_name}: load and configure the controller"
             ),
         )
 
@@ -145,22 +145,22 @@ class EffortJoint(TorqueDevice):
         """Send zero and activate the controller."""
         if SECOND_MASTER in self._watched():
             raise DeviceError(
-                f"{self.name}: somebody else publishes {self._commands.topic_name}: find and stop"
-                " that"
+                f"{self.name}: another node publishes {self._commands.topic_name}: find and stop"
+                " it"
             )
         self._publish(0.0)
         self._switch("active")
         self._publish(0.0)
 
     def exchange(self, torque: float, timeout: float) -> Reading | None:
-        """Publish a torque; return the joint's state if a new one has come or comes meanwhile."""
+        """Publish a torque; return the joint's state if a new one arrives within the timeout."""
         self._publish(torque / self._options.ratio)
         self._spin(lambda: self._state is not None, timeout)
         state, self._state = self._state, None
         return None if state is None else self._reading(state)
 
     def forget(self) -> None:
-        """Drop the states that have come, and take one that is measured now."""
+        """Drop the states received so far, and take one that is measured from now on."""
         now = time.time_ns()
         self._state = None
         self._spin(
@@ -180,7 +180,7 @@ class EffortJoint(TorqueDevice):
             client.close()
 
     def _on_state(self, message: JointState) -> None:
-        """Take a fresh state that has the joint in it, once; others are nobody's business."""
+        """Take a fresh state that has the joint in it exactly once; ignore others."""
         if list(message.name).count(self._options.joint) != 1:
             return
         self._age = (
@@ -199,7 +199,7 @@ class EffortJoint(TorqueDevice):
         return Reading(effort * ratio, position / ratio, velocity / ratio, faults=self._watched())
 
     def _watched(self) -> tuple[Fault, ...]:
-        """The fault of a second master, or of no controller, if there is one."""
+        """Return the fault of a second master or of a missing controller, if any."""
         if self._node.count_publishers(self._commands.topic_name) > 1:
             return (SECOND_MASTER,)
         return () if self._commands.get_subscription_count() else (_CONTROLLER_GONE,)
@@ -210,7 +210,7 @@ class EffortJoint(TorqueDevice):
         self._commands.publish(Float64MultiArray(data=command))
 
     def _spin(self, until: Callable[[], bool], timeout: float) -> bool:
-        """Take what comes until something is so; return whether it is."""
+        """Process messages until a condition holds; return whether it does."""
         assert self._client is not None
         return bool(self._client.wait(until, timeout))
 
@@ -219,7 +219,7 @@ class EffortJoint(TorqueDevice):
             raise DeviceError(f"{self.name} of {self.address}: {lacking()}")
 
     def _switch(self, wanted: str) -> None:
-        """Make the controller active or inactive, if controller_manager can be asked."""
+        """Make the controller active or inactive, if controller_manager is available."""
         if not self._manager or not self._spin(self._manager[0].service_is_ready, 0.2):
             return
         listing, switching = self._manager
@@ -231,9 +231,9 @@ class EffortJoint(TorqueDevice):
             raise DeviceError(f"controller_manager has no {name}: load it; has: {others}")
         if states[name] == wanted:
             return
-        # One that cannot be switched is no error but in a strict switch.
+        # Only a strict switch reports a controller that cannot be switched as an error.
         request = SwitchController.Request(strictness=SwitchController.Request.STRICT)
-        request.timeout.nanosec = NANOSECONDS_PER_SECOND // 2  # it is to answer that it gave up
+        request.timeout.nanosec = NANOSECONDS_PER_SECOND // 2  # so that it answers even then
         if wanted == "active":
             request.activate_controllers = [name]
         else:
@@ -241,14 +241,14 @@ class EffortJoint(TorqueDevice):
         answer = self._answer(switching, request)
         if not answer.ok:
             raise DeviceError(
-                f"controller_manager does not make {name} {wanted}, it is {states[name]}: "
+                f"controller_manager did not make {name} {wanted}; it is {states[name]}: "
                 f"{' '.join(answer.message.split()) or 'is it configured, and its joint free?'}"
             )
 
     def _answer(self, client: Any, request: Any) -> Any:
         future = client.call_async(request)
         if not self._spin(future.done, _SERVICE_TIMEOUT):
-            raise DeviceError("controller_manager does not answer: see whether it runs")
+            raise DeviceError("controller_manager does not answer: check that it is running")
         return future.result()
 
 

@@ -57,8 +57,8 @@ def test_logs_go_to_a_temporary_folder_without_a_home(home, variables):
         ("RMW_IMPLEMENTATION", "rmw_nonsense", "'rmw_nonsense' is not installed; allowed: rmw_"),
         ("RMW_IMPLEMENTATION", "rmw_implementation", "is not installed"),
         ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF", "allowed: LOCALHOST, SUBNET, SYSTEM_DEFAULT"),
-        ("ROS_LOG_DIR", "/proc/nowhere", "allowed: a folder of yours, or unset"),
-        ("ROS_STATIC_PEERS", "127.0.0.1;no host", "'no host' is no host that can be found"),
+        ("ROS_LOG_DIR", "/proc/nowhere", "allowed: a writable folder, or unset"),
+        ("ROS_STATIC_PEERS", "127.0.0.1;no host", "'no host' is not a known host"),
     ],
 )
 def test_what_ros_cannot_start_with_is_named(variable, value, words, variables):

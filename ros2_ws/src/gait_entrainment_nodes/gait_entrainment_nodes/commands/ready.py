@@ -13,8 +13,8 @@ from gait_entrainment_nodes.messaging.environment import set_environment
 
 _TIMEOUT = Setting("how long to wait", unit="s", least=0.0, most=3600.0)
 DESCRIPTION = (
-    "Ask ~/ready of nodes in ROS_DOMAIN_ID. Exit code 0 once each has answered that it is "
-    "ready, 1 if one has not: the reason is on standard error."
+    "Call the service ~/ready of nodes in ROS_DOMAIN_ID. Exit code 0 once each has answered that "
+    "it is ready, 1 if one has not: the reason is on standard error."
 )
 
 
@@ -25,20 +25,20 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Ask every node until all are ready; 1 if they are not in time."""
+    """Ask every node until all are ready; return 1 if they are not ready in time."""
     timeout = _TIMEOUT.parse("--timeout", options.timeout)
     set_environment(wanted_domain() or 0)
-    # Not at the top: they load ROS, which is to find an environment that it can start in.
+    # Not at the top: they load ROS, for which the environment must be set first.
     from gait_entrainment_msgs.srv import Ready
     from gait_entrainment_nodes.messaging.client import Client, all_answered
 
     with Client("entrain_ready") as client:
-        asked = [client.ask(Ready, f"{n}/ready", accept=lambda a: a.ready) for n in options.nodes]
-        with suppress(KeyboardInterrupt):  # what is known by then is told
-            client.wait(lambda: all_answered(asked), timeout)
-    for node, question in zip(options.nodes, asked, strict=True):
+        calls = [client.ask(Ready, f"{n}/ready", accept=lambda a: a.ready) for n in options.nodes]
+        with suppress(KeyboardInterrupt):  # what is known by then is printed
+            client.wait(lambda: all_answered(calls), timeout)
+    for node, question in zip(options.nodes, calls, strict=True):
         if not question.accepted:
             latest = question.latest
             reason = f"waits for {latest.waiting_for}" if latest else "does not answer"
             print(f"entrain ready: {node} {reason}", file=sys.stderr)
-    return 0 if all(question.accepted for question in asked) else 1
+    return 0 if all(question.accepted for question in calls) else 1

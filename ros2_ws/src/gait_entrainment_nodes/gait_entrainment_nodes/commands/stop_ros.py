@@ -12,8 +12,8 @@ from concurrent.futures import ThreadPoolExecutor
 from gait_entrainment_nodes.messaging.domain import DomainError, domains_in_use, wanted_domain
 from gait_entrainment_nodes.messaging.environment import require_usable_environment
 
-# How long to look for perturbators [s]; in a domain that a run has claimed, until one is found and
-# all have answered, but no longer than this.
+# How long to look for perturbators [s], and in a domain that a run has claimed: until one is found
+# and all have answered, but no longer than TIMEOUT.
 DISCOVERY = 2.0
 TIMEOUT = 6.0
 # The domain of nodes that were started one by one, without a run that claims a domain.
@@ -23,7 +23,7 @@ STOP, TRAIN = "/stop", "/deliver_pulse_train/_action/send_goal"
 
 DESCRIPTION = (
     "Call the stop service of every perturbator: in ROS_DOMAIN_ID if it is set, else in "
-    "every domain in which a run of this machine goes on. Latched until the perturbator is "
+    "every domain with a run on this machine. The stop is latched until the perturbator is "
     "cleaned up and configured again. For robots that another host drives; discovery takes one to "
     "two seconds, so on this machine use entrain stop."
 )
@@ -35,7 +35,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Stop everything; 1 if nothing was found, or a stop was not confirmed."""
+    """Stop everything; return 1 if nothing was found, or a stop was not confirmed."""
     require_usable_environment()
     domains = {DEFAULT_DOMAIN: DISCOVERY, **dict.fromkeys(domains_in_use(), TIMEOUT)}
     try:
@@ -44,11 +44,11 @@ def run(options: argparse.Namespace) -> int:
     except DomainError as error:
         print(f"entrain stop-ros: {error}; stopping every run", file=sys.stderr)
     answers: dict[str, str | None] = {}
-    # Side by side: no run waits for another one to be stopped.
+    # In parallel: no run waits for another one to be stopped.
     with ThreadPoolExecutor(len(domains)) as threads:
         for found in threads.map(stop_all, domains, domains.values()):
             answers |= found
-    silent = [name for name, answer in answers.items() if answer is None]
+    silent = ", ".join(name for name, answer in answers.items() if answer is None)
     if options.json:
         print(json.dumps({"stopped": answers}))
     else:
@@ -57,13 +57,13 @@ def run(options: argparse.Namespace) -> int:
     if not answers:
         print("entrain stop-ros: no perturbator was found: is a run going on?", file=sys.stderr)
     elif silent:
-        print(f"entrain stop-ros: no stop of {', '.join(silent)}: cut the power", file=sys.stderr)
+        print(f"entrain stop-ros: {silent} did not confirm: cut the power", file=sys.stderr)
     return 0 if answers and not silent else 1
 
 
 def stop_all(domain: int, timeout: float) -> dict[str, str | None]:
     """Call every stop service in a domain; return the answers, None if no stop is confirmed."""
-    # Not at the top: they load ROS, which is to find an environment that it can start in.
+    # Not at the top: they load ROS, for which the environment must be set first.
     from std_srvs.srv import Trigger
 
     from gait_entrainment_nodes.messaging.client import Client, Question, all_answered
@@ -73,7 +73,7 @@ def stop_all(domain: int, timeout: float) -> dict[str, str | None]:
     with Client(f"entrain_stop_{domain}", domain=domain) as client:
 
         def all_stopped() -> bool:
-            """Call each service as soon as it is seen; what comes later may take its time."""
+            """Call each service as soon as it is seen; return whether there are no more."""
             services = {name for name, _ in client.node.get_service_names_and_types()}
             stops = {s.removesuffix(TRAIN) + STOP for s in services if s.endswith(TRAIN)}
             for name in (stops & services) - calls.keys():

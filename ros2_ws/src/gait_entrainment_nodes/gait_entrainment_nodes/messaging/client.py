@@ -4,10 +4,10 @@
 """
 A place in the ROS graph for processes that are not nodes: commands, launch files, tests.
 
-A node can answer only those it has discovered; what it sends to anyone else is lost. So questions
-are asked again and again (``Client.call``, ``Client.ask``), and what must not be asked twice waits
-until the node is known to answer (``Client.wait_to_be_known``). Discovery announces the endpoints
-of a process in the order in which they were made: whoever answers the latest one knows them all.
+A node can answer only clients that it has discovered; an answer to any other is lost. So requests
+are repeated (``Client.call``, ``Client.ask``), and a request that must not be repeated waits until
+the node is known to answer (``Client.wait_to_be_known``). Discovery announces the endpoints of a
+process in the order in which they were made: a node that answers the latest one knows them all.
 """
 
 import math
@@ -34,7 +34,7 @@ if TYPE_CHECKING:  # it loads every type of message, which a client need not wai
 TIMEOUT = 60.0
 # When to ask again [s].
 ASKING_PERIOD = 0.1
-# How long to listen before a condition is looked at again, even if nothing arrives [s].
+# How long to listen before a condition is checked again, even if nothing arrives [s].
 ROUND = 0.02
 
 
@@ -45,14 +45,14 @@ class Question:
         self, service: Any, request: Any, accept: Callable[[Any], object], period: float
     ) -> None:
         self.latest: Any = None  # answer, acceptable or not
-        self.answered_at = -math.inf  # when that came, on the steady clock [s]
+        self.answered_at = -math.inf  # when it arrived, on the steady clock [s]
         self.accepted: Any = None  # the first acceptable answer
         self._service, self._request, self._accept, self._period = service, request, accept, period
         self._asked_at = -math.inf
         self._pending: list[Any] = []
 
     def answer(self) -> Any:
-        """Return the first acceptable answer, None before it; ask if it is time to."""
+        """Return the first acceptable answer, None before it arrives; ask if it is time to."""
         now = time.monotonic()
         for call in [call for call in self._pending if call.done()]:
             self._pending.remove(call)
@@ -74,11 +74,11 @@ def all_answered(questions: Iterable[Question]) -> bool:
 
 class Client:
     """
-    A node with a context and an executor of its own, in a ROS domain or that of the environment.
+    A node with its own context and executor, in a ROS domain or that of the environment.
 
-    ``each_round`` is called over and over while anything is waited for. An exception in it ends
-    the waiting, for instance when a process that should answer has ended. Raises
-    UnusableEnvironmentError if ROS cannot start.
+    ``each_round`` is called repeatedly during every wait. An exception in it ends the wait, for
+    example when a process that should answer has ended. Raises UnusableEnvironmentError if ROS
+    cannot start.
     """
 
     def __init__(
@@ -123,7 +123,7 @@ class Client:
     def subscribe(
         self, topic: "Topic", callback: Callable[[Any], None], *, raw: bool = False
     ) -> None:
-        """Hear a topic; ``raw`` gives the callback serialized messages."""
+        """Subscribe to a topic; with ``raw`` the callback gets serialized messages."""
         self.node.create_subscription(topic.type, topic.name, callback, topic.qos, raw=raw)
 
     def wait(self, condition: Callable[[], Any], timeout: float = math.inf) -> Any:
@@ -135,7 +135,7 @@ class Client:
         return value
 
     def service(self, service_type: Any, name: str) -> Any:
-        """Return the client of a service, made once; UsageError if it cannot have that name."""
+        """Return the client of a service, made once; UsageError if the name is invalid."""
         if name not in self._services:
             try:
                 self._services[name] = self.node.create_client(service_type, name)
@@ -182,7 +182,7 @@ class Client:
         SilenceError if it does not answer within ``timeout`` [s].
         """
         name = f"{node}/ready"
-        self._services.pop(name, None)  # to be made anew, behind everything else
+        self._services.pop(name, None)  # to be made again, after everything else
         self._expect(self.ask(Ready, name).answer, name, timeout)
 
     def send_goal(
@@ -202,7 +202,7 @@ class Client:
         return answer.result()
 
     def result(self, handle: Any, timeout: float = math.inf) -> Any:
-        """Wait for status and result of an accepted goal; None if they do not come in time."""
+        """Wait for status and result of an accepted goal; None if they do not arrive in time."""
         answer = handle.get_result_async()
         return answer.result() if self.wait(answer.done, timeout) else None
 

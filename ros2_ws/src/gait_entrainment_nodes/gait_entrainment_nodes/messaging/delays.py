@@ -4,14 +4,14 @@
 """
 Late matching and late delivery between any two nodes: a switch for tests of races.
 
-Discovery and delivery take their time, most of the time too little to show who does not wait for
+Discovery and delivery take time, but usually too little to reveal a node that does not wait for
 them. The environment variable GAIT_ENTRAINMENT_DELAYS makes them take longer: a JSON object of
-delays by pairs ``sender>receiver``, in which ``*`` stands for any name and the first that fits
-counts. For instance, with the instant of matching in seconds since 1970::
+delays by pairs ``sender>receiver``, where ``*`` matches any name and the first match counts. For
+example, with the time of matching in seconds since 1970::
 
     {"bag_recorder>walker_sim": {"matched": 1795708000.5}, "*>*": {"delivery": 0.02}}
 
-Unset, as it is outside tests, nothing here is used.
+If it is unset, as it is outside tests, nothing here is used.
 """
 
 import json
@@ -28,8 +28,8 @@ class Delay(NamedTuple):
     How late a receiver hears a sender.
 
     Before ``matched``, wall time [s since 1970], it hears nothing, and the sender knows that.
-    After that each topic is late by its own share of ``delivery`` [s], so that topics overtake
-    each other.
+    Afterwards each topic is late by its own share of ``delivery`` [s], so topics overtake each
+    other.
     """
 
     matched: float = 0.0
@@ -53,7 +53,7 @@ def delay_between(sender: str, receiver: str) -> Delay:
 
 
 def unmatched_by_delay(node: Any, topic: str, now: float) -> int:
-    """Return how many subscriptions of a topic a node must not have matched yet, at [s]."""
+    """Return how many subscriptions of a topic a node must not have matched yet, ``now`` [s]."""
     if not delays_wanted():
         return 0
     readers = node.get_subscriptions_info_by_topic(topic)

@@ -10,16 +10,16 @@ from contextlib import contextmanager
 
 from gait_entrainment.errors import EntrainmentError
 
-# Domains whose ports lie below those that Linux gives to other connections.
+# Domains whose ports lie below those that Linux assigns to other connections.
 DOMAINS = range(1, 102)
-# The largest domain that DDS can give ports to.
+# The largest domain for which DDS has ports.
 LARGEST_DOMAIN = 232
-# The beginning of the names of all claims.
+# Prefix of the names of all claims.
 CLAIMS = "gait_entrainment/domain"
 
 
 class DomainError(EntrainmentError):
-    """There is no domain to be had; the message says what to do."""
+    """No domain is available; the message says what to do."""
 
 
 def wanted_domain() -> int | None:
@@ -35,13 +35,13 @@ def wanted_domain() -> int | None:
 @contextmanager
 def claimed_domain() -> Iterator[int]:
     """
-    Claim a ROS domain for the time of a run: ROS_DOMAIN_ID if it is set, else a free one.
+    Claim a ROS domain for the duration of a run: ROS_DOMAIN_ID if it is set, else a free one.
 
     A claim is the name of an abstract Unix socket. Such names belong to the network namespace,
-    and so do the ports by which runs would hear each other: a claim holds between users and
-    between containers that share a network, and ends with the process, however that ends.
+    and so do the ports through which runs would hear each other: a claim holds across users and
+    across containers that share a network, and ends with the process, however that ends.
 
-    Raises DomainError if ROS_DOMAIN_ID is not a domain, or another run has claimed it or all.
+    Raises DomainError if ROS_DOMAIN_ID is not a domain, or if it or all domains are claimed.
     """
     wanted = wanted_domain()
     for domain in DOMAINS if wanted is None else [wanted]:

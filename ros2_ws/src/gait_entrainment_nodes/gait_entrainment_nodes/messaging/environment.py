@@ -17,11 +17,11 @@ from ament_index_python.resources import get_resources
 from gait_entrainment.errors import EntrainmentError
 
 PACKAGE = "gait_entrainment_nodes"
-# Of the processes of a run in real time, below the loop that times the torque; the one whose
-# messages are judged by their punctuality does not wait until another has done its turn.
+# Priorities of processes in a real-time run, below the loop that times the torque. The process
+# whose messages are judged by their punctuality does not wait for another's turn.
 PRIORITY, PUNCTUAL = 10, 11
 SHARED_MEMORY = Path("/dev/shm")
-# Fast DDS without a page for its locks there dies of SIGBUS; with some it does without the rest.
+# Without a page for its locks there, Fast DDS dies of SIGBUS; it can do without the rest [bytes].
 _LOCKS = 1_000_000
 
 
@@ -31,9 +31,9 @@ class UnusableEnvironmentError(EntrainmentError):
 
 def require_usable_environment() -> None:
     """
-    See that ROS can start, before it is loaded: it would end the process with words of its own.
+    Check that ROS can start, before it is loaded: it would end the process with its own messages.
 
-    Logs go to a temporary folder if there is no home folder that can be written. Raises
+    Logs go to a temporary folder if there is no writable home folder. Raises
     UnusableEnvironmentError.
     """
     chosen = os.environ.get("RMW_IMPLEMENTATION")
@@ -52,8 +52,8 @@ def require_usable_environment() -> None:
         try:
             socket.getaddrinfo(peer, None)
         except (OSError, UnicodeError):
-            allowed = "allowed: names or addresses with ; between them"
-            message = f"ROS_STATIC_PEERS: {peer!r} is no host that can be found; {allowed}"
+            allowed = "allowed: names or addresses separated by ;"
+            message = f"ROS_STATIC_PEERS: {peer!r} is not a known host; {allowed}"
             raise UnusableEnvironmentError(message) from None
     if SHARED_MEMORY.exists() and shutil.disk_usage(SHARED_MEMORY).free < _LOCKS:
         raise UnusableEnvironmentError(
@@ -64,7 +64,7 @@ def require_usable_environment() -> None:
 
 
 def _choose_log_folder() -> None:
-    """See that ROS can write its logs where the user says, or have them in a temporary folder."""
+    """Check that ROS can write its logs where the user wants; otherwise use a temporary folder."""
     given = os.environ.get("ROS_LOG_DIR", "")
     folder = given or f"{os.environ.get('ROS_HOME') or '~/.ros'}/log"
     try:
@@ -76,8 +76,8 @@ def _choose_log_folder() -> None:
     except OSError as error:
         if given:
             raise UnusableEnvironmentError(
-                f"ROS_LOG_DIR: {given}: cannot be written to: {error.strerror}; allowed: a folder "
-                "of yours, or unset"
+                f"ROS_LOG_DIR: {given}: cannot be written to: {error.strerror}; allowed: a "
+                "writable folder, or unset"
             ) from None
         os.environ["ROS_LOG_DIR"] = f"{tempfile.gettempdir()}/ros-{os.getuid()}"
 
@@ -91,8 +91,8 @@ def dds_variables(*, real_time: bool) -> dict[str, str]:
     """
     Return the environment variables that choose discovery and the Fast DDS profiles.
 
-    They stay as the user has set them. The files say what the profiles are for; those of real
-    time are for one host, so whoever looks for peers on others keeps the common ones.
+    They stay as the user has set them. The files say what the profiles are for; those for real
+    time are for one host, so a process that looks for peers on others keeps the common ones.
     """
     reach, file = "ROS_AUTOMATIC_DISCOVERY_RANGE", "FASTRTPS_DEFAULT_PROFILES_FILE"
     common, paced = (
@@ -101,7 +101,7 @@ def dds_variables(*, real_time: bool) -> dict[str, str]:
     )
     chosen = {reach: os.environ.get(reach) or "LOCALHOST", file: os.environ.get(file) or common}
     given = Path(chosen[file])
-    # Not by the user, but by what has started this process, or the set-up of another workspace.
+    # Not set by the user, but by the parent process or the set-up of another workspace.
     if given.parts[-3:-1] == (PACKAGE, "config"):
         chosen[file] = common
         if given.name == Path(paced).name:
@@ -114,9 +114,9 @@ def dds_variables(*, real_time: bool) -> dict[str, str]:
 
 def set_environment(domain: int, *, real_time: bool = False) -> dict[str, str]:
     """
-    Put this process into a ROS domain; return the environment for those it starts.
+    Put this process into a ROS domain; return the environment for the processes it starts.
 
-    To be called before ROS is loaded. Raises UnusableEnvironmentError if ROS could not start.
+    Must be called before ROS is loaded. Raises UnusableEnvironmentError if ROS could not start.
     """
     require_usable_environment()
     os.environ.update(dds_variables(real_time=real_time))
@@ -130,19 +130,19 @@ def come_before_others(priority: int = PRIORITY) -> None:
     """
     Have all threads of this process scheduled before those of others, if the system permits.
 
-    For a process that waits most of the time: one that computes without end would use up what the
-    system leaves to such processes, and hold up the loop that times the torque with it. Niceness
-    would not do: it counts within a session only.
+    For a process that waits most of the time: one that computes continuously would use up what
+    the system leaves to such processes, and hold up the loop that times the torque. Niceness is
+    not enough: it counts only within a session.
     """
     for thread in Path("/proc/self/task").iterdir():
-        with suppress(OSError):  # not permitted: it takes its turn like others; or ended meanwhile
+        with suppress(OSError):  # not permitted, so it takes its turn like others; or it has ended
             os.sched_setscheduler(int(thread.name), os.SCHED_RR, os.sched_param(priority))
 
 
 def user_and_host() -> str:
-    """Return who runs this process, and where."""
+    """Return the user and the host of this process."""
     try:
         user = getpass.getuser()
-    except (KeyError, OSError):  # a container's user that has no name
+    except (KeyError, OSError):  # a container's user without a name
         user = f"user {os.getuid()}"
     return f"{user}@{socket.gethostname()}"

@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What can go wrong between processes, without ROS, for those that have not loaded it yet."""
+"""Errors between processes, without ROS, for processes that have not loaded it yet."""
 
 from gait_entrainment.errors import EntrainmentError
 
 
 class NodeError(EntrainmentError):
-    """A run has failed; the log of ``node`` may say more, if one is named."""
+    """A run has failed; the log of ``node``, if one is named, may say more."""
 
     def __init__(self, message: str, node: str = "") -> None:
         super().__init__(message)
@@ -15,7 +15,7 @@ class NodeError(EntrainmentError):
 
 
 class SilenceError(NodeError):
-    """A node did not answer a service or an action, ``name``, in time [s]."""
+    """A node did not answer a request to its service or action ``name`` in time [s]."""
 
     def __init__(self, name: str, timeout: float) -> None:
         super().__init__(f"no answer from {name} within {timeout:g} s", name.rpartition("/")[0])

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Messages of this project as earlier versions recorded them: what was added is left empty."""
+"""Messages of this project recorded by earlier versions: fields added since then stay empty."""
 
 from collections.abc import Callable
 from typing import Any
@@ -18,18 +18,18 @@ _OWN = "gait_entrainment_msgs/"
 
 def converter_of(topic: TopicInfo) -> Callable[[bytes], bytes] | None:
     """
-    Return what turns a recorded message into one of the installed type, which differs.
+    Return a function that turns a recorded message into one of the installed type, which differs.
 
-    None unless it is one of this project that has every field that was recorded, by its own
-    definition: rosbag2's writer puts the installed one into a copy, beside the recorded hash.
+    None unless it is a type of this project that has every recorded field. The definition decides,
+    not the hash: rosbag2's writer puts the installed one into a copy, with the recorded hash.
     """
     if not topic.type.startswith(_OWN):
         return None
     texts = topic.schema_text, find_definition(topic.type).schema_text
-    told, known = ({part.strip() for part in text.split(SEPARATOR)} for text in texts)
+    old, new = ({part.strip() for part in text.split(SEPARATOR)} for text in texts)
     installed, decode = message_class(topic.type), decoder_for(topic)
     recorded = {field.name for field in fields_of(topic.schema_text.partition(SEPARATOR)[0], _OWN)}
-    if told == known or recorded - {*installed.get_fields_and_field_types()}:
+    if old == new or recorded - {*installed.get_fields_and_field_types()}:
         return None
     return lambda data: serialize(_filled(installed(), decode(data)))
 

@@ -4,7 +4,7 @@
 """
 The types of the player's services: those of rosbag2, so that its tools control this player too.
 
-Where rosbag2_interfaces is not installed, types of our own with the same fields stand in.
+If rosbag2_interfaces is not installed, types of this project with the same fields replace them.
 """
 
 try:

@@ -19,11 +19,11 @@ from gait_entrainment_nodes.messaging.topics import (
     Topic,
 )
 
-# While the slowest reader catches up, a full writer is tried again this often [s].
+# How often a full writer tries again while the slowest reader catches up [s].
 RETRY_PERIOD = 0.002
-# How long to wait at a time [s] before looking whether the node is to stop.
+# How long to wait at a time before checking whether the node must stop [s].
 TIMEOUT = 0.1
-# A writer that waits for a reader says so in the log this often [s].
+# How often a writer that waits for a reader logs a warning [s].
 LAG_REPORT_PERIOD = 1.0
 
 
@@ -35,8 +35,8 @@ class CountedPublisher:
     """
     A publisher that counts, and that waits for a slow reader rather than lose a message.
 
-    Its node, a Participant, has an attribute ``stopping``, which ends the waiting, and one
-    ``real_time``, in which it waits for nobody.
+    Its node, a Participant, has an attribute ``stopping``, which ends the wait, and an attribute
+    ``real_time``; if that is set, it does not wait.
     """
 
     def __init__(self, node: Any, topic: Topic, *, counted: bool = True) -> None:
@@ -70,7 +70,7 @@ class CountedPublisher:
         """
         Publish a message, or its serialized bytes; wait while the history is full.
 
-        Raises StopRequestedError if the node is to stop meanwhile.
+        Raises StopRequestedError if the node must stop in the meantime.
         """
         data = message if isinstance(message, bytes) else serialize(message)
         self._repeat(lambda: self._published(data))
@@ -97,7 +97,7 @@ class CountedPublisher:
         """
         Wait as ``wait_until_received`` does, and report a reader that does not keep up.
 
-        Raises StopRequestedError if the node is to stop meanwhile.
+        Raises StopRequestedError if the node must stop in the meantime.
         """
         return self._repeat(lambda: self.wait_until_received(TIMEOUT), timeout)
 

@@ -4,8 +4,8 @@
 """
 Messages as bytes: the same bytes for the same message, and many of them at once.
 
-CDR aligns numbers, and Fast DDS leaves in the gaps what the memory held before. `serialize`
-writes zeros there, so that equal messages are equal bytes, in two runs too.
+CDR aligns numbers, and Fast DDS leaves old memory contents in the gaps. `serialize` writes zeros
+there, so that equal messages have equal bytes, in different runs too.
 
 Building a message in Python and serializing it costs five times as much as writing its bytes.
 All messages of a sampled topic have the same layout; only their numbers differ. So one message
@@ -34,7 +34,7 @@ from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 _MARK = 0x4D61726B00000000
 
 
-# Numbers are aligned from behind the four bytes that name the encoding.
+# Alignment counts from the end of the four bytes that name the encoding.
 _ENCODING = 4
 _SIZES = {
     **dict.fromkeys(("boolean", "octet", "char", "int8", "uint8"), 1),
@@ -42,7 +42,7 @@ _SIZES = {
     **dict.fromkeys(("int32", "uint32", "float"), 4),
     **dict.fromkeys(("int64", "uint64", "double"), 8),
 }
-# Clears the gaps of one value in the bytes, from a place on; returns the place behind the value.
+# Clears the gaps of one value in the bytes, from a place on; returns the place after the value.
 _Clear = Callable[[bytearray, int, Any], int]
 
 
@@ -53,9 +53,9 @@ def message_class(name: str) -> Any:
 
 
 def serialize(message: Any) -> bytes:
-    """Serialize a ROS message into CDR with zeros in the gaps of alignment."""
+    """Serialize a ROS message into CDR with zeros in the alignment gaps."""
     data = bytearray(serialize_message(message))
-    # What lies behind the last field was only reserved: ROS counts a gap for an empty sequence.
+    # Bytes after the last field were only reserved: ROS counts a gap for an empty sequence.
     return bytes(data[: _clear_message(data, _ENCODING, message)])
 
 
@@ -64,7 +64,7 @@ def _clear_message(data: bytearray, place: int, message: Any) -> int:
     fields = _clear_fields(kind)
     for name, clear in fields:
         place = clear(data, place, getattr(message, name))
-    return place if fields else place + 1  # IDL knows no empty structure: ROS puts an octet there
+    return place if fields else place + 1  # IDL has no empty structure: ROS puts an octet there
 
 
 @cache
@@ -118,8 +118,8 @@ class MessageTemplate:
     """
     The bytes of one message with a header, ready to be filled with other numbers.
 
-    ``fields`` are the names of the doubles that change, with dots for nested ones, and how many
-    there are: the length of an array, or how many doubles adjoin from that field on.
+    ``fields`` has the names of the doubles that change, with dots for nested ones, and how many
+    there are: the length of an array, or the number of adjacent doubles from that field on.
     """
 
     def __init__(self, message: Any, fields: Mapping[str, int]) -> None:
@@ -127,8 +127,8 @@ class MessageTemplate:
             mark = float(np.array(_MARK + number, np.uint64).view(np.float64))
             *parents, last = name.split(".")
             owner = reduce(getattr, parents, message)
-            one = isinstance(getattr(owner, last), float)
-            setattr(owner, last, mark if one else [mark, *[0.0] * (length - 1)])
+            scalar = isinstance(getattr(owner, last), float)
+            setattr(owner, last, mark if scalar else [mark, *[0.0] * (length - 1)])
         message.header.stamp.sec, message.header.stamp.nanosec = 0, 0
         content = serialize(message)
         self._bytes = np.frombuffer(content, np.uint8)
@@ -147,7 +147,7 @@ class MessageTemplate:
         """
         Return one serialized message per sample.
 
-        ``stamps`` are instants [ns since 1970], shape (n,), int64; each of ``columns`` has the
+        ``stamps`` are times [ns since 1970], shape (n,), int64; each of ``columns`` has the
         values of a field, shape (n, number of its doubles).
         """
         table = np.tile(self._bytes, (len(stamps), 1))

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Who holds up a publisher: readers on this host whose process is suspended.
+What holds up a publisher: readers on this host whose process is suspended.
 
-Fast DDS (2.x) puts the lower half of the process's number into bytes 4 and 5 of the identity of
-each of its endpoints. With another middleware nobody is found.
+Fast DDS (2.x) puts the lower half of the process ID into bytes 4 and 5 of each endpoint's GID.
+With another middleware no process is found.
 """
 
 from pathlib import Path
@@ -25,12 +25,12 @@ def who_hangs(node: Any) -> str:
 
 
 def _suspended_processes() -> dict[int, str]:
-    """Return the processes of this host that are suspended, by the lower half of their number."""
+    """Return the processes of this host that are suspended, by the lower half of their ID."""
     found = {}
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
             name, state = stat.read_text().rpartition(")")[::2]
-        except OSError:  # it has ended meanwhile
+        except OSError:  # it has just ended
             continue
         if state.split()[0] == "T":
             number, _, command = name.partition(" (")

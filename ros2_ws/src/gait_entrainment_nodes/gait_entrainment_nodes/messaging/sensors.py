@@ -14,7 +14,7 @@ from gait_entrainment_sensors.sources import ENCODER, FOOT, SHANK, SWITCH, Sourc
 
 
 class SensorWriter:
-    """Makes the messages of an emulated sensor, as bytes: many at once."""
+    """Makes the messages of an emulated sensor, as bytes and many at a time."""
 
     def __init__(self, source: Source, side: Side, signals: Sequence[str]) -> None:
         frame = {"left": "l", "right": "r"}[side.name.lower()] + (

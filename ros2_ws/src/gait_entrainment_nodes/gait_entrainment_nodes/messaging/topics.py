@@ -4,10 +4,10 @@
 """
 Every topic of the testbed: its name, type and quality of service, in one table.
 
-Names are relative, so that a namespace or a remapping moves a whole experiment; but for those that
-others expect at the root, which the launch files move into the namespace of an experiment. Quality
-of service: what a run depends on or is judged by is reliable and keeps all, on both ends, so that
-nothing is lost without an error; what tells a late-comer how things stand is transient local.
+Names are relative, so a namespace or a remapping moves a whole experiment; only names that other
+tools expect at the root are absolute, and the launch files move them into the experiment's
+namespace. Topics that a run depends on or is judged by are reliable and keep all messages, on both
+ends, so nothing is lost without an error; topics that show the current state are transient local.
 """
 
 from typing import Any, NamedTuple
@@ -33,8 +33,8 @@ def quality(
     """
     Return a quality of service.
 
-    Of the messages so many are kept, or all; ``reliable`` ones are repeated until they arrive, and
-    ``lasting`` ones reach who joins late.
+    It keeps ``depth`` messages, or all; ``reliable`` ones are repeated until they arrive, and
+    ``lasting`` ones also reach late joiners.
     """
     return QoSProfile(
         history=HistoryPolicy.KEEP_ALL if depth is None else HistoryPolicy.KEEP_LAST,
@@ -46,22 +46,22 @@ def quality(
 
 # Nothing may be lost: a writer waits for its slowest reader instead of overwriting.
 EVERY_MESSAGE = quality()
-# In real time nobody is waited for: what a reader has not taken for so many messages, 2 s of
-# samples at 1 kHz, is lost to it, and the recorder tells a loss by the counts.
+# In real time no writer waits: a reader that is further behind than this, 2 s of samples at 1 kHz,
+# loses messages, and the recorder detects the loss by the counts.
 EVERY_MESSAGE_IN_REAL_TIME = quality(2048)
-# The latest state matters, also to who joins late. The writer keeps more than that, so that a
-# recorder which is briefly behind misses nothing.
+# The latest state matters, also to late joiners. The writer keeps more than that, so that a
+# recorder that is briefly behind misses nothing.
 LATEST_STATE = quality(1000, lasting=True)
-# What people see, and tools expect: rqt of /diagnostics, tf2 and RViz of what is drawn. Nobody
-# waits for a viewer.
+# What people look at, with the quality that tools expect: rqt for /diagnostics, tf2 and RViz for
+# the display. No writer waits for a viewer.
 VIEWED = quality(100)
-# What was said before somebody joined counts too: a description, a button that was pressed.
+# What was sent before a reader joined counts too: a description, a button that was pressed.
 SAID_ONCE = quality(1, lasting=True)
-# For who only looks on: the writer never waits for it. It holds a stretch of a lock-step run.
+# For onlookers, for which the writer never waits. It holds a stretch of a lock-step run.
 LOOKING_ON = quality(1000, reliable=False)
 # What a sensor's driver sends, whatever quality it offers: 2 s of a force plate.
 FROM_A_DRIVER = quality(2048, reliable=False)
-# Only the latest sign of life counts, and nobody waits for anybody.
+# Only the latest sign of life counts, and nothing waits.
 HEARTBEAT = quality(1, reliable=False)
 
 
@@ -97,7 +97,7 @@ TROUBLE = Topic(topic_names.TROUBLE, msg.Trouble)
 EMERGENCY_STOP = Topic(topic_names.EMERGENCY_STOP, Bool, SAID_ONCE)
 
 OPERATOR_HEARTBEAT = Topic(topic_names.OPERATOR_HEARTBEAT, String, HEARTBEAT)
-# Not lasting: a page outlives runs, and the next recorder is to have no notes of the last one.
+# Not lasting: a page outlives runs, and the next recorder must not get the notes of the last one.
 OPERATOR_NOTES = Topic(topic_names.OPERATOR_NOTES, msg.Note, VIEWED)
 
 HORIZON = Topic(topic_names.HORIZON, msg.Horizon)
