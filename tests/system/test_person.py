@@ -182,5 +182,5 @@ def test_what_sensors_do_wrong_is_told_by_name(tmp_path):
         feet.until(lambda: len(events) > count + 8, "events after all that")
         assert all(b.step >= a.step for a, b in pairwise(events))
         feet.ahead = -SECOND // 4
-        jumped = "left: the clock of the sensor jumped back.*right: the clock"
+        jumped = "left: the sensor's clock jumped back.*right: the sensor's clock"
         feet.until(lambda: said(jumped), "what is told of a clock that jumps")

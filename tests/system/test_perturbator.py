@@ -131,7 +131,7 @@ def test_a_stranger_gets_no_pulses_that_are_not_of_the_protocol(tmp_path):
         # Nor may a stranger move the horizon on.
         conductor.horizons.publish(Horizon(run=7, until=to_time(50 * SECOND), seal="a stranger's"))
         nodes.probe.until(lambda: len(conductor.troubles) == count + 4, "four reasons")
-        assert "not of who conducts the run" in conductor.troubles[-1].message
+        assert "not from the experiment that conducts" in conductor.troubles[-1].message
         assert conductor.request(10, duration=0.2, count=5).accepted
         assert not conductor.request(16, "", duration=0.2, count=1).accepted  # after the last part
         onsets = [nanoseconds_of(onset) / SECOND for onset in conductor.promise(2, 20).onsets]

@@ -164,7 +164,7 @@ def test_nodes_of_an_experiment_are_as_ros_users_expect(tmp_path):
             "gait_analyzer": {"verdict__window": 12},
         }.items():
             (reason,) = of[node].put(**values)
-            assert "run 1 goes on" in reason
+            assert "run 1 is in progress" in reason
         (reason,) = of["perturbator"].put(limits__torque=5.0)
         assert "configured" in reason
         assert of["experiment"].put(silence_timeout=2.5) == [""]

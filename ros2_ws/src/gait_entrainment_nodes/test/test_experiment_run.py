@@ -219,7 +219,7 @@ def test_in_real_time_what_is_stamped_ahead_has_not_happened(monkeypatch, ahead,
     bench.report(round((11 + ahead) * SECOND))
     if not believed:
         expected = (
-            f"walker_sim reports what is {ahead - 0.1:.3g} s ahead of what can be over by now"
+            f"walker_sim reports progress {ahead - 0.1:.3g} s beyond what is possible by now"
         )
         assert blamed(bench.run.failure) == (expected, "walker_sim")
 
@@ -233,7 +233,7 @@ def test_in_lock_step_nobody_walks_further_than_was_promised(bench):
     assert (bench.run.known_until, bench.run.promised_until) == (10 * SECOND + HALF, promised)
     bench.report(3600 * SECOND)
     words, node = blamed(bench.run.failure)
-    assert words.startswith("walker_sim reports what is 3.59e+03 s ahead of what can be over")
+    assert words.startswith("walker_sim reports progress 3.59e+03 s beyond what is possible")
     assert node == "walker_sim"
 
 

@@ -54,7 +54,7 @@ def test_who_else_publishes_what_a_run_takes_from_one_is_named():
         assert made.rivals(events) == ""
         other = rclpy.create_node("other_walker")
         other.create_publisher(events.type, events.name, events.qos)
-        told = "gait_events comes from other_walker and walker_sim, and a run takes one"
+        told = "gait_events is published by other_walker and walker_sim; a run needs one publisher"
         assert made.rivals(events) == told
         other.destroy_node()
 
@@ -154,7 +154,7 @@ def test_both_feet_on_one_topic_are_refused(arguments):
     [
         ("mass", 70, ""),  # a whole number does for a real one, as where the node starts
         ("seed", 1.5, "Wrong parameter type"),
-        ("mas", 70.0, "mas: there is no such parameter"),
+        ("mas", 70.0, "mas: unknown parameter"),
     ],
 )
 def test_a_parameter_is_set_as_a_person_writes_it(name, value, reason):

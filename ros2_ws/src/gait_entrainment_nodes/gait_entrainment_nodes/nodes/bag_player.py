@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-bag_player: publishes what a bag holds, each message at its time, or as fast as it is taken.
+bag_player: publishes the messages of a bag, each at its time or as fast as readers take them.
 
-Messages are published as bytes, never decoded. Before the first one it waits until the expected
-subscriptions are matched, so that nothing of the start is lost. It is the sole owner of /clock:
-ticks lie at fixed instants of the bag, the same at every rate.
+Messages are published as bytes and never decoded. Before the first one the node waits until the
+expected subscriptions are matched, so that no early message is lost. It is the only publisher of
+/clock. Ticks are at fixed times of the bag, independent of the rate.
 """
 
 import math
@@ -44,13 +44,13 @@ from gait_entrainment_nodes.nodes.lateness import Lateness
 from gait_entrainment_nodes.nodes.parameters import texts
 from gait_entrainment_nodes.nodes.participant import Participant
 
-# How often matching is looked after before the first message [s].
+# How often to check the matching before the first message [s].
 MATCHING_PERIOD = 0.02
-# At most this many messages are published before services and signals are looked after again.
+# Most messages to publish before services and signals are handled again.
 BURST_LENGTH = 200
-# At the end slow readers have this long to receive the last messages [s].
+# How long slow readers have at the end to receive the last messages [s].
 FAREWELL = 30.0
-# What a writer keeps for late-comers if the bag does not say it.
+# How many messages a transient-local or best-effort writer keeps.
 KEPT = 1000
 _CDR_LITTLE_ENDIAN = b"\0\1\0\0"
 _ANY_LENGTH = (0.0, 1e9)
@@ -62,40 +62,40 @@ class Settings:
 
     bag: str = setting("", "bag to play: a folder or an .mcap file")
     rate: float = setting(
-        1.0, "seconds of the bag per second; 0 for as fast as it goes", "1", (0.0, 1e6)
+        1.0, "seconds of the bag per second; 0: as fast as possible", "1", (0.0, 1e6)
     )
-    loop: bool = setting(False, "begin again at the end")
+    loop: bool = setting(False, "start again at the end")
     start_paused: bool = setting(False, "start paused")
     start_offset: float = setting(0.0, "where in the bag to start", "s", _ANY_LENGTH)
-    duration: float = setting(0.0, "how much of it to play; 0: all", "s", _ANY_LENGTH)
+    duration: float = setting(0.0, "how much of the bag to play; 0: all", "s", _ANY_LENGTH)
     clock: float = setting(
         40.0,
-        "ticks of /clock per second of the bag; 0: none, a recorded /clock is played",
+        "ticks of /clock per second of the bag; 0: none, and a recorded /clock is played",
         "Hz",
         (0.0, 1000.0),
     )
     expect_timeout: float = setting(
-        30.0, "how long to wait for the expected subscriptions; 0: for ever", "s", _ANY_LENGTH
+        30.0, "how long to wait for the expected subscriptions; 0: forever", "s", _ANY_LENGTH
     )
-    stay: bool = setting(False, "stay at the end, for ~/seek")
-    topics: tuple[str, ...] = texts("topics to play, * for any text; empty plays all")
-    exclude: tuple[str, ...] = texts("topics to leave out, * for any text")
-    remap: tuple[str, ...] = texts("other names for topics: /from:=/to")
+    stay: bool = setting(False, "keep running at the end, for ~/seek")
+    topics: tuple[str, ...] = texts("topics to play; * matches any text; empty: all")
+    exclude: tuple[str, ...] = texts("topics not to play; * matches any text")
+    remap: tuple[str, ...] = texts("new names for topics: /from:=/to")
     expect: tuple[str, ...] = texts(
-        "topics that must have a subscription before the first message; one that must have two is "
-        "named twice"
+        "topics that must have a subscription before the first message; name a topic twice to "
+        "require two"
     )
 
 
 class BagPlayer(Participant):
-    """ROS side of a playback. See the module's docstring."""
+    """ROS side of a playback. See the module docstring."""
 
     settings: Settings
-    _begun = False  # all subscriptions that are waited for have been matched
+    _begun = False  # all expected subscriptions have been matched
 
     @property
     def real_time(self) -> bool:
-        """It waits for its readers, at whatever rate it plays."""
+        """Return False: the player waits for its readers at every rate."""
         return False
 
     def __init__(self) -> None:
@@ -125,8 +125,8 @@ class BagPlayer(Participant):
         except BagError as error:
             raise ValueError(str(error)) from None
         self._offer_topics()
-        self.note_state(DiagnosticStatus.OK, "plays")
-        self._look_at = time.monotonic()  # when matching is looked after next
+        self.note_state(DiagnosticStatus.OK, "playing")
+        self._check_at = time.monotonic()  # when to check the matching next
         self._give_up_at = time.monotonic() + (settings.expect_timeout or math.inf)
         self._lateness = Lateness()  # of messages, from due to published
         playback = self._playback
@@ -140,12 +140,12 @@ class BagPlayer(Participant):
         self._serve("play_next", srv.PlayNext, self._play_next)
 
     def why_fixed(self, name: str) -> str:
-        """Return an empty text: the rate may change at any time."""
+        """Return an empty string: the rate may change at any time."""
         del name
         return ""
 
     def take_parameters(self, changes: dict[str, Any]) -> None:
-        """Take a change of the rate, which counts from now on."""
+        """Apply a change of the rate, effective from now on."""
         super().take_parameters(changes)
         if self._begun:
             self._playback.set_rate(self._rate, time.monotonic_ns())
@@ -157,7 +157,7 @@ class BagPlayer(Participant):
     # The start
 
     def _playable(self, names: list[str]) -> dict[str, Any]:
-        """Return the types of those topics whose messages the installed types can carry."""
+        """Return the types of the topics that the installed message types can represent."""
         types = {}
         for name in names:
             topic = self._bag.topics[name]
@@ -174,13 +174,13 @@ class BagPlayer(Participant):
                     self._converters[name] = converter
                     continue
                 self.get_logger().error(
-                    f"{name} is not played: the installed {topic.type} is not the recorded one"
+                    f"{name} is not played: the installed {topic.type} differs from the recorded"
                 )
                 del types[name]
         return types
 
     def _offer_topics(self) -> None:
-        """Make the publishers; raises ValueError if a topic that is named is not played."""
+        """Create the publishers; raises ValueError if a topic named by the user is not played."""
         names = dict(_split_remap(remap) for remap in self.settings.remap)
         if unknown := sorted(names.keys() - self._bag.topics.keys()):
             raise ValueError(f"remap: no topic {unknown[0]} in the bag")
@@ -188,11 +188,11 @@ class BagPlayer(Participant):
         self._players = {
             name: self.offer(
                 topics.Topic(names.get(name, name), self._types[name], offer),
-                counted=offer.reliability != ReliabilityPolicy.BEST_EFFORT,  # which may get lost
+                counted=offer.reliability != ReliabilityPolicy.BEST_EFFORT,  # may lose messages
             )
             for name, offer in offers.items()
         }
-        # Who keeps all waits by itself; who keeps the last ones for late-comers would overwrite.
+        # A writer that keeps all waits by itself; one that keeps the last would overwrite.
         self._forgetful = {n for n, o in offers.items() if o.history == HistoryPolicy.KEEP_LAST}
         if self.settings.clock:
             self.offer(topics.CLOCK)
@@ -201,7 +201,7 @@ class BagPlayer(Participant):
             raise ValueError(f"expect: {missing[0]} is not played")
 
     def not_ready(self) -> str:
-        """Return what is waited for before the first message."""
+        """Return what the node waits for before the first message."""
         missing = [
             name
             for name in sorted(set(self.settings.expect))
@@ -210,8 +210,8 @@ class BagPlayer(Participant):
         return f"subscriptions of {', '.join(missing)}" if missing else super().not_ready()
 
     def _begin_if_matched(self) -> None:
-        """Begin once all subscriptions are matched; give up after a while."""
-        self._look_at = time.monotonic() + MATCHING_PERIOD
+        """Start once all expected subscriptions are matched; give up after a timeout."""
+        self._check_at = time.monotonic() + MATCHING_PERIOD
         waiting = self.not_ready()
         if not waiting:
             self._begun, now = True, time.monotonic_ns()
@@ -226,7 +226,7 @@ class BagPlayer(Participant):
     def next_deadline(self) -> float | None:
         """Return when the next message is due, on steady time [s]."""
         if not self._begun:
-            return self._look_at
+            return self._check_at
         due = self._playback.due()
         return None if due is None else due / NANOSECONDS_PER_SECOND
 
@@ -262,7 +262,7 @@ class BagPlayer(Participant):
             player.wait_for_readers()
 
     def _end_if_played(self) -> None:
-        """End the node once everything was played and received, unless it is to stay."""
+        """End the node once everything has been played and received, unless ``stay`` is set."""
         if not self._playback.ended or self.settings.stay or self.finished:
             return
         self.publish_counts(0, self._bag.end)
@@ -270,13 +270,13 @@ class BagPlayer(Participant):
         for player in self._players.values():
             if not player.wait_for_readers(give_up - time.monotonic()):
                 self.failure = (
-                    f"a reader of {player.topic_name} has not received its last messages within "
+                    f"a reader of {player.topic_name} did not receive its last messages within "
                     f"{FAREWELL:g} s"
                 )
         self.finished = True
 
     def on_stop(self) -> None:
-        """Say how much was played, and how late."""
+        """Log how much was played, and how late."""
         self._playback.stop()
         self._bag.close()
         count = sum(player.count for player in self._players.values())
@@ -290,17 +290,17 @@ class BagPlayer(Participant):
 
     def _serve(self, name: str, kind: Any, act: Callable[[Any, int], Any]) -> None:
         """
-        Offer a service of a type.
+        Offer a service.
 
-        ``act`` takes a request and the steady time [ns], returns fields of the response or None,
-        and raises BagError to refuse.
+        ``act`` takes a request and the steady time [ns], returns response fields or None, and
+        raises BagError to refuse the request.
         """
 
         def serve(request: Any, response: Any) -> Any:
             try:
                 values = act(request, time.monotonic_ns()) or {}
             except BagError as error:
-                # The reason has no place in the response.
+                # The response has no field for the reason.
                 self.get_logger().error(f"{name}: {error}")
                 return response
             if hasattr(response, "success"):
@@ -316,7 +316,7 @@ class BagPlayer(Participant):
         toggle(now)
 
     def _set_rate(self, request: Any, _: int) -> None:
-        """Change the parameter, which plays at that rate from now on."""
+        """Change the parameter ``rate``, which takes effect immediately."""
         if not request.rate > 0:
             raise BagError(f"{request.rate:g}; allowed: above 0")
         rate = 0.0 if math.isinf(request.rate) else request.rate
@@ -325,7 +325,7 @@ class BagPlayer(Participant):
             raise BagError(result.reason)
 
     def _play_next(self, *_: Any) -> None:
-        """Publish the next message, with the ticks before it."""
+        """Publish the next message and the ticks before it."""
         try:
             while self._begun and (moment := self._playback.take_next()):
                 self._send(moment)
@@ -335,7 +335,7 @@ class BagPlayer(Participant):
         except UnreadableBagError as error:
             self.failure = str(error)
             raise
-        raise BagError("is not paused, or nothing is left to play")
+        raise BagError("playback is not paused, or nothing is left to play")
 
 
 def clock_message(instant: int) -> bytes:
@@ -353,10 +353,10 @@ def _split_remap(remap: str) -> tuple[str, str]:
 
 def _offer(topic: TopicInfo) -> QoSProfile:
     """
-    Return the quality to publish with: what the publishers offered that asked most of a reader.
+    Return the quality of service to publish with: the strongest that a publisher offered.
 
-    A reliable offer serves every reader, a lasting one too. Discovery does not tell how much a
-    publisher keeps, so a player keeps all: it waits for a reader rather than overwrite.
+    Reliable and transient-local offers match every reader. Discovery does not report how much a
+    publisher keeps, so the player keeps all: it waits for a reader rather than overwrite.
     """
     lasting = any(qos.durability == "transient_local" for qos in topic.qos_profiles)
     best_effort = topic.qos_profiles and all(

@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-bag_recorder: records topics into an MCAP bag that rosbag2 opens, and says what it missed.
+bag_recorder: records topics into an MCAP bag that rosbag2 can open, and reports what it missed.
 
-Messages are taken and written as bytes, many at a time, never decoded. In lock-step it sends the
-walker's progress back once everything that it covers is written. At the end of a run it compares
-its counts with those of the publishers. If the disk is full the recording ends, closed and
-readable; the run goes on unless the record is required.
+Messages are taken and written as bytes, many at a time, and never decoded. In lock-step the node
+sends the walker's progress back once everything that it covers is written. At the end of a run it
+compares its counts with those of the publishers. If the disk is full, recording stops and the bag
+is closed and readable. The run continues unless the record is required.
 """
 
 import json
@@ -44,23 +44,23 @@ from gait_entrainment_nodes.nodes.parameters import texts
 from gait_entrainment_nodes.nodes.participant import Participant
 from gait_entrainment_nodes.nodes.rclpy_internals import RawReader
 
-# How often new topics are looked for and data is brought to the file [s].
-CARE_PERIOD = 0.2
-# How often messages are taken [s]; and while one that a progress covers is still on its way.
+# How often to look for new topics and flush data to the file [s].
+UPKEEP_PERIOD = 0.2
+# How often to take messages [s]: normally, and while one that a progress covers is missing.
 TAKE_PERIOD, COVERED_TAKE_PERIOD = 0.01, 0.001
-# How many of a topic are taken at once, so that no topic waits long for another.
+# Most messages of a topic to take at a time, so that no topic waits long for another.
 MOST_AT_ONCE = 1000
-# How long to wait, after the end of a run, for messages and counts still on their way [s].
+# How long to wait after the end of a run for messages and counts still in transit [s].
 CLOSING_TIMEOUT = 5.0
-# A message that comes behind one with a later stamp is logged with it, so that a player keeps the
-# order; one that is earlier by more [ns] has a clock of its own, and is believed. One ahead of ROS
-# time by more is not: a bag would span the years up to it.
+# A message that arrives after one with a later stamp is logged with that stamp, so that a player
+# keeps the order. A stamp earlier by more than this [ns] is from another clock and is used. One
+# ahead of ROS time by more than this is not used: the bag would span years.
 LONGEST_OVERTAKING = 60 * NANOSECONDS_PER_SECOND
-# A message whose first field is a header or a stamp has it behind four bytes of CDR header.
+# If the first field of a message is a header or a stamp, it follows the four-byte CDR header.
 _STAMP = struct.Struct("<iI")
 _STAMPED = ("std_msgs/Header", "builtin_interfaces/Time")
-# Stamped by the wall clock also where time is simulated: log entries always, parameter events
-# while a node is being made. With one of them among simulated stamps a bag would span decades.
+# Stamped by the wall clock even if time is simulated: log entries always, parameter events while
+# a node is created. One of them among simulated stamps would make a bag span decades.
 _BY_WALL_CLOCK = ("rcl_interfaces/msg/Log", "rcl_interfaces/msg/ParameterEvent")
 
 
@@ -69,24 +69,24 @@ class Settings:
     """Parameters of the node."""
 
     topics: tuple[str, ...] = texts(
-        "topics to record, fully qualified; empty records all below the node's namespace"
+        "topics to record, fully qualified; empty: all in the node's namespace"
     )
     publishers: tuple[str, ...] = texts(
-        "nodes whose final counts end the recording; empty records until stopped"
+        "nodes whose final counts end the recording; empty: record until stopped"
     )
     output: str = setting("", "folder of the bag, which must not exist yet")
-    custom_data: str = setting("{}", "what else belongs to the record: a JSON object of texts")
+    custom_data: str = setting("{}", "more metadata of the bag: a JSON object of strings")
     max_bytes: int = setting(
-        0, "begin a new file once one is so large; 0: never", "byte", (0, 2**62)
+        0, "start a new file once one is this large; 0: never", "byte", (0, 2**62)
     )
     max_duration: float = setting(
-        0.0, "begin a new file once one spans so much ROS time; 0: never", "s", (0.0, 1e9)
+        0.0, "start a new file once one spans this much ROS time; 0: never", "s", (0.0, 1e9)
     )
-    required: bool = setting(False, "end, and with it the run, if nothing more can be written")
+    required: bool = setting(False, "end the node and the run if nothing more can be written")
 
 
 class BagRecorder(Participant):
-    """ROS side of the bag writer. See the module's docstring."""
+    """ROS side of the bag writer. See the module docstring."""
 
     settings: Settings
 
@@ -94,7 +94,7 @@ class BagRecorder(Participant):
         super().__init__("bag_recorder", settings=Settings, fixed=settings_of(Settings))
         self._chosen, self._expected = set(self.settings.topics), set(self.settings.publishers)
         self._bag = self._make_bag()
-        # Ready means, for this topic too, that everyone will hear: the walker waits for it.
+        # Readiness includes this topic, although it is not counted: the walker waits for it.
         self.offer(topics.RECORDER_PROGRESS, counted=False)
         name = self.resolve_topic_name
         self._progress_topic = name(topics.WALKER_PROGRESS.name)
@@ -102,32 +102,32 @@ class BagRecorder(Participant):
         self._own_topic = name(topics.RECORDER_PROGRESS.name)
         self._clock_topic = name(topics.CLOCK.name)
         self._simulated = bool(self.get_parameter("use_sim_time").value)
-        # The latest time on that topic that is believed, and the latest there was [ns].
+        # The latest time on that topic that was accepted, and the latest received [ns].
         self._heard_clock = self._latest_tick = 0
         self._believed_until = 0  # no stamp up to here is too far ahead [ns]
         sampled = (topics.JOINT_STATES, topics.ANKLE_TORQUE, *topics.GROUND_REACTION)
-        # What a progress message covers, and its field that says how much.
+        # The topics that a progress message covers, and its field that counts their messages.
         self._covered = {name(topics.GAIT_EVENTS.name): "events"}
         self._covered |= {name(topic.name): "samples" for topic in sampled}
         if self._chosen and self._expected:
-            # What tells of the end is heard in any case.
+            # The topics that announce the end are always needed.
             self._chosen |= {self._progress_topic, self._counts_topic}
-        self.note_state(DiagnosticStatus.OK, "records", output=self.settings.output)
-        self._broken_off = ""  # why the recording has ended before its time
-        # Messages that came before ROS time began: topic, bytes, time of reception [ns].
+        self.note_state(DiagnosticStatus.OK, "recording", output=self.settings.output)
+        self._broken_off = ""  # why the recording ended early
+        # Messages received before ROS time started: topic, bytes, time of reception [ns].
         self._early: list[tuple[str, bytes, int]] = []
         self._latest: dict[str, int] = {}  # log time of the latest message, by topic
         self._offers: dict[str, tuple[OfferedQos, ...]] = {}
         self._beneath = self.get_namespace().rstrip("/") + "/"  # how names in the namespace begin
-        self._seen: set[str] = set()  # topics that are recorded, or cannot be
+        self._seen: set[str] = set()  # topics that are recorded or cannot be recorded
         self._progress: Progress | None = None  # not acknowledged yet
-        self._published: dict[str, dict[str, int]] = {}  # by node: final count by topic
-        self._final_at: float | None = None  # when the end of the run was heard of, steady time
-        self._care_at = self._take_at = time.monotonic()
+        self._published: dict[str, dict[str, int]] = {}  # final counts by node and topic
+        self._final_at: float | None = None  # when the run was reported to end, steady time [s]
+        self._upkeep_at = self._take_at = time.monotonic()
         self._readers: list[tuple[RawReader, Callable[[bytes, int], None]]] = []
 
     def _make_bag(self) -> BagWriter:
-        """Return the bag to write; raises ValueError if there cannot be one."""
+        """Create the bag; raises ValueError if that is not possible."""
         settings = self.settings
         if not settings.output:
             raise ValueError("output: is empty; give the folder of the bag to make")
@@ -164,7 +164,7 @@ class BagRecorder(Participant):
             self._record(name, message_type, definition)
 
     def _record(self, name: str, message_type: Any, definition: Definition) -> None:
-        """Subscribe to one topic, in the quality that its publishers offer."""
+        """Subscribe to one topic with the quality of service that its publishers offer."""
         offers = [info.qos_profile for info in self.get_publishers_info_by_topic(name)]
         self._offers[name] = tuple(_offered(offer) for offer in offers)
         self._bag.add_topic(
@@ -193,7 +193,7 @@ class BagRecorder(Participant):
         self.subscribe(topics.Topic(name, message_type, qos), record_progress, raw=True)
 
     def _take_messages(self) -> None:
-        """Record what has come, in the order in which it came."""
+        """Record what has arrived, in order of arrival."""
         taken, full = [], False
         for reader, record in self._readers:
             found = reader.take(MOST_AT_ONCE)
@@ -209,13 +209,13 @@ class BagRecorder(Participant):
 
     def _note_offers(self, name: str) -> None:
         """
-        Say so if a publisher that came later is not recorded.
+        Report a publisher that joined later and is not recorded.
 
-        The bag keeps what was offered at first: a channel cannot be changed, and readers that
-        find another quality in metadata.yaml than in the channel drop the topic.
+        The bag keeps the first offers: a channel cannot be changed, and readers drop a topic whose
+        quality in metadata.yaml differs from that in the channel.
         """
         known = self._offers.get(name)
-        # Asked for by their number first: asking for their quality costs ten times as much.
+        # Check their number first: querying their quality costs ten times as much.
         if known is None or self.count_publishers(name) <= len(known):
             return
         infos = self.get_publishers_info_by_topic(name)
@@ -223,12 +223,12 @@ class BagRecorder(Participant):
         lossy = {o.reliability for o in self._offers[name]} - {o.reliability for o in known}
         if "best_effort" in lossy and all(o.reliability == "reliable" for o in known):
             self.get_logger().error(
-                f"{name}: a publisher that came later is best effort; it is not recorded, since "
-                "the recording of this topic began as reliable"
+                f"{name}: a publisher that joined later is best effort and is not recorded, "
+                "because this topic is recorded as reliable"
             )
 
     def _writer_for(self, name: str, definition: Definition) -> Callable[[bytes, int], None]:
-        """Return what writes a message of one topic, and when it was received [ns]."""
+        """Return a function that records a message of one topic, given its reception time [ns]."""
         first = next(fields_of(definition.schema_text, ""), None)
         stamped = definition.type not in _BY_WALL_CLOCK and (
             first is not None and first.type in _STAMPED and first.length is None
@@ -268,7 +268,7 @@ class BagRecorder(Participant):
         return record
 
     def _believed_tick(self, tick: int) -> int:
-        """Return ROS time [ns] at a tick: one far off counts once the next is nearer to it."""
+        """Return ROS time [ns] at a tick; a distant tick counts once the next is nearer to it."""
         far = self._heard_clock and abs(tick - self._heard_clock) > LONGEST_OVERTAKING
         if not far or abs(tick - self._latest_tick) < abs(tick - self._heard_clock):
             self._heard_clock = tick
@@ -276,34 +276,34 @@ class BagRecorder(Participant):
         return self._heard_clock
 
     def _ros_time(self, received: int) -> int:
-        """Return the ROS time [ns] at which a message was received; it is taken later."""
+        """Return the ROS time [ns] at which a message was received; it may be taken later."""
         if not self._simulated:
             return received
         recorded = self._clock_topic in self._bag.counts
         return self._heard_clock if recorded else self.get_clock().now().nanoseconds
 
     def _record_early(self, logged: int, name: str, data: bytes, received: int) -> None:
-        """Keep a message from before ROS time began, or record those once it has begun."""
+        """Keep a message from before ROS time started, or record those kept once it has."""
         if logged <= 0:
             self._early.append((name, data, received))
             return
         early, self._early = self._early, []
         try:
-            for topic, content, came in early:
-                self._bag.write(topic, content, logged, came)
+            for topic, content, arrived in early:
+                self._bag.write(topic, content, logged, arrived)
                 self._latest[topic] = logged
         except BagError as error:
             self._break_off(error)
 
     def _break_off(self, error: BagError) -> None:
-        """End the recording, as nothing more can be written, and the run if that is wanted."""
+        """End the recording if nothing more can be written, and the run if it requires one."""
         if self._broken_off:
             return
         self._broken_off = str(error)
         if self.settings.required:
             self.failure = str(error)
             return
-        self.get_logger().error(f"{error}; the run goes on without a record")
+        self.get_logger().error(f"{error}; the run continues without a record")
         stamp = self.get_clock().now().nanoseconds
         self.diagnose(stamp, DiagnosticStatus.ERROR, f"the recording has ended: {error}")
 
@@ -337,7 +337,7 @@ class BagRecorder(Participant):
             self._final_at = time.monotonic()
 
     def _lost(self) -> dict[str, int]:
-        """Return how many messages each topic lacks against its publisher's count."""
+        """Return how many published messages are missing, by topic."""
         published: Counter[str] = Counter()
         for counts in self._published.values():
             published.update(counts)
@@ -349,17 +349,17 @@ class BagRecorder(Participant):
         }
 
     def next_deadline(self) -> float:
-        """Return when to take messages, or to look after topics and the file."""
-        return min(self._take_at, self._care_at)
+        """Return when to take messages, or to check for new topics and flush the file."""
+        return min(self._take_at, self._upkeep_at)
 
     def on_deadline(self) -> None:
-        """Record what has come; now and then look after topics, the file and the end."""
+        """Record what has arrived; less often check topics, the file and the end of the run."""
         self._take_messages()
-        if time.monotonic() < self._care_at:
+        if time.monotonic() < self._upkeep_at:
             return
         closing = self._final_at is not None and bool(self._expected)
-        self._care_at = time.monotonic() + (0.01 if closing else CARE_PERIOD)
-        self._care()
+        self._upkeep_at = time.monotonic() + (0.01 if closing else UPKEEP_PERIOD)
+        self._do_upkeep()
         if self._final_at is None or not self._expected:
             return
         if self._expected <= self._published.keys() and self._broken_off:
@@ -373,29 +373,29 @@ class BagRecorder(Participant):
             self.failure = "the record is incomplete: " + "; ".join(missing)
 
     def not_ready(self) -> str:
-        """Return what is waited for, having looked for new topics."""
-        self._care()
+        """Look for new topics and return what the node waits for."""
+        self._do_upkeep()
         return super().not_ready()
 
-    def _care(self) -> None:
-        """Look for new topics and bring data to the file."""
+    def _do_upkeep(self) -> None:
+        """Look for new topics and flush data to the file."""
         if self._broken_off:
             return
         try:
             self._subscribe_to_new_topics()
             self._bag.flush()
-            told = {"output": self.settings.output, "messages": sum(self._bag.counts.values())}
-            self.note_state(DiagnosticStatus.OK, "records", **told)
+            sums = {"output": self.settings.output, "messages": sum(self._bag.counts.values())}
+            self.note_state(DiagnosticStatus.OK, "recording", **sums)
         except BagError as error:
             self._break_off(error)
 
     def on_stop(self) -> None:
-        """Close the bag, with what was lost written into it, and say how much was written."""
+        """Close the bag, noting in it what was lost, and log how much was recorded."""
         self._take_messages()
         for reader, _ in self._readers:
             reader.destroy()
         if self._early and not self._broken_off:
-            # ROS time never began: the wall clock is the only one there is.
+            # ROS time never started, so the wall clock is used.
             self._record_early(max(self._latest.values(), default=self._early[0][2]), "", b"", 0)
         for topic, count in sorted(self._bag.counts.items()):
             self.get_logger().info(f"{count} messages of {topic}")
@@ -409,18 +409,18 @@ class BagRecorder(Participant):
 
 
 def _texts(custom_data: str) -> dict[str, str]:
-    """Return a JSON object of texts; raises ValueError if it is something else."""
+    """Parse a JSON object of strings; raises ValueError if it is anything else."""
     try:
         texts = json.loads(custom_data)
     except ValueError:
         texts = None
     if not isinstance(texts, dict) or not all(isinstance(text, str) for text in texts.values()):
-        raise ValueError(f"custom_data: {custom_data!r}; allowed: a JSON object of texts")
+        raise ValueError(f"custom_data: {custom_data!r}; allowed: a JSON object of strings")
     return texts
 
 
 def _offered(profile: QoSProfile) -> OfferedQos:
-    """Return the quality that a publisher offers in the terms of a bag."""
+    """Return the quality of service that a publisher offers, as a bag describes it."""
     return OfferedQos(
         history=profile.history.name.lower(),
         depth=profile.depth,

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-experiment: conducts a protocol over the running nodes.
+experiment: conducts a protocol with the running nodes.
 
-A protocol comes as a goal of ``~/run_protocol``, or as the parameter ``protocol``: then the node
-ends with it. It brings the participants together and starts the walker; from then on the run in
-experiment_run.py decides what to promise and who is silent.
+The protocol is a goal of ``~/run_protocol``, or the parameter ``protocol``, in which case the node
+ends with it. The node waits for the participants and starts the walker. From then on the run in
+experiment_run.py decides what to promise and which participant is silent.
 """
 
 import contextlib
@@ -45,10 +45,10 @@ from gait_entrainment_nodes.nodes.participant import Participant
 from gait_entrainment_nodes.nodes.participants import ClockError, Participants
 from gait_entrainment_nodes.nodes.waiting import Waiting
 
-# How long each step of ending a failed run may take [s]: who fails may not answer any more.
+# Longest time for each step of ending a failed run [s]: a failed node may not answer.
 FAREWELL = 0.5
-# How long a node may take to do what it is asked for before and after a run, such as to enable a
-# device [s]. In a run silence_timeout counts.
+# How long a node may take to answer a request before and after a run, such as to enable a device
+# [s]. During a run silence_timeout applies.
 ANSWER_TIMEOUT = 5.0
 
 _TRANSITIONS = {
@@ -60,7 +60,7 @@ _TRANSITIONS = {
 
 @dataclass(frozen=True)
 class Settings:
-    """Parameters of the node; those of a run count for the next one, timeouts at once."""
+    """Parameters of the node; timeouts take effect immediately, others with the next run."""
 
     participants: tuple[str, ...] = texts(
         "names of the nodes that must be ready before a run starts",
@@ -68,43 +68,42 @@ class Settings:
         PERTURBATOR,
         "gait_analyzer",
     )
-    walker: str = setting(WALKER, "name of the node in the walker's role, for messages to people")
+    walker: str = setting(WALKER, "name of the node in the walker's role, for error messages")
     longest_lookahead: float = setting(
         10.0,
-        "upper bound of the horizon's lead, which never exceeds a stride; short in real time, so "
-        "that more can be decided late",
+        "upper bound of the lookahead, which never exceeds a stride; short in real time, so that "
+        "decisions can be made late",
         "s",
         (0.05, 10.0),
     )
     silence_timeout: float = setting(
-        3.0, "a participant that owes an answer for this long ends the run", "s", (0.1, 60.0)
+        3.0, "how long a participant may owe an answer before the run fails", "s", (0.1, 60.0)
     )
     ready_timeout: float = setting(
         30.0, "how long to wait for the participants before a run", "s", (1.0, 600.0)
     )
     longest_clock_offset: float = setting(
         0.0,
-        "by which the clock of a participant may differ; 0 compares none, as simulated time needs "
-        "none",
+        "largest offset of a participant's clock; 0: not checked, which suits simulated time",
         "s",
         (0.0, 10.0),
     )
     protocol: str = setting(
         "",
-        "protocol to conduct at once, a file or its text: the node ends with it, with exit code 1 "
-        "if it failed; empty waits for goals of ~/run_protocol",
+        "protocol to conduct immediately, a file or its text; the node then ends, with exit code "
+        "1 if the run failed; empty: wait for goals of ~/run_protocol",
     )
 
 
 class Experiment(Participant):
-    """ROS side of the conductor: brings participants together, carries what a run says."""
+    """ROS side of the conductor: waits for participants, relays messages to and from a run."""
 
     settings: Settings
     run: Run | None
 
     def __init__(self) -> None:
         super().__init__("experiment", settings=Settings, fixed=("protocol",))
-        self._runs = 0  # how many have begun
+        self._runs = 0  # how many have started
         self._waiting = Waiting()
 
         self.offer(topics.HORIZON)
@@ -124,7 +123,7 @@ class Experiment(Participant):
             RunProtocol,
             "~/run_protocol",
             accept=lambda _: not self._waiting.busy,
-            # A text, if only of one line: no goal names a file of this host.
+            # The newline marks it as text: a goal cannot name a file on this host.
             begin=lambda goal: self._waiting.begin(self._conduct_goal(f"{goal.protocol}\n")),
         )
         if self.settings.protocol:
@@ -140,7 +139,7 @@ class Experiment(Participant):
         self._server.end(await self._conduct(protocol))
 
     async def _conduct_own(self) -> None:
-        """Conduct the protocol of the parameter, and end the node with it."""
+        """Conduct the protocol given as a parameter, then end the node."""
         result = await self._conduct(self.settings.protocol)
         if result.outcome == result.FINISHED:
             self.finished = True
@@ -160,7 +159,7 @@ class Experiment(Participant):
             real_time=self.real_time,
             held_up=lambda: who_hangs(self),
         )
-        self.note_state(DiagnosticStatus.OK, f"run {run.number} goes on")
+        self.note_state(DiagnosticStatus.OK, f"run {run.number} is in progress")
         result = RunProtocol.Result(run=run.number, outcome=RunProtocol.Result.FAILED)
         try:
             final = await self._conduct_run(run, protocol)
@@ -181,7 +180,7 @@ class Experiment(Participant):
         return result
 
     async def _conduct_run(self, run: Run, protocol: str) -> msg.Progress:
-        """Conduct a run to its end; return the walker's last word."""
+        """Conduct a run to its end; return the walker's final progress."""
         conductor = Conductor(read_protocol(protocol), self.settings.longest_lookahead)
         await self._participants_ready()
         await self._activate_perturbator(run)
@@ -190,7 +189,7 @@ class Experiment(Participant):
         if run.failure is not None:
             raise run.failure
         await self._close(run)
-        # The answer came after any stop: to walk to the end without torque is no success.
+        # Any stop came before the answer: walking to the end without torque is not a success.
         if run.stopped_at is not None:
             await self._wait_for_reason(run)
         run.fail_if_troubled()
@@ -204,13 +203,13 @@ class Experiment(Participant):
         return final
 
     async def _close(self, run: Run, timeout: float = ANSWER_TIMEOUT) -> None:
-        """Say that the run is over, and wait until the perturbator has heard it."""
+        """Announce the end of the run, and wait until the perturbator has answered."""
         run.close()
         silence = ExperimentError(f"{PERTURBATOR} does not answer", PERTURBATOR)
         await self._waiting.until(lambda: run.closed, timeout, silence)
 
     async def _give_up(self, run: Run, reason: str) -> None:
-        """End a failed run, torque first, as far as the others still answer."""
+        """End a failed run, torque first, as far as the other nodes still answer."""
         self.publish(topics.EXPERIMENT_STATE, run.state(Part.FAILED, reason))
         self.diagnose(run.known_until, DiagnosticStatus.ERROR, reason)
         if run.activated:
@@ -223,7 +222,7 @@ class Experiment(Participant):
     # Bringing the participants together
 
     async def _participants_ready(self) -> None:
-        """Wait until every participant runs and all their subscriptions have been matched."""
+        """Wait until all participants are running and their subscriptions are matched."""
         timeout = self.settings.ready_timeout
         give_up = time.monotonic() + timeout
         while True:
@@ -233,7 +232,7 @@ class Experiment(Participant):
                 await self._participants.check(self.settings.longest_clock_offset)
                 if not (self._start.service_is_ready() and self._deliver.server_is_ready()):
                     walker = self.settings.walker
-                    raise ExperimentError(f"{walker} or {PERTURBATOR} is not there", walker)
+                    raise ExperimentError(f"{walker} or {PERTURBATOR} is not available", walker)
                 if waiting := self.not_ready():
                     raise ExperimentError(f"experiment waits for {waiting}", self.get_name())
                 return
@@ -246,7 +245,7 @@ class Experiment(Participant):
             await self._waiting.tick()
 
     async def _activate_perturbator(self, run: Run) -> None:
-        """Bring the perturbator from where a run before has left it to active."""
+        """Activate the perturbator from the state in which an earlier run left it."""
         response = await self._answer(self._get_state, GetState.Request(), PERTURBATOR)
         if response.current_state.id == State.PRIMARY_STATE_UNCONFIGURED:
             await self._transition(run, Transition.TRANSITION_CONFIGURE)
@@ -263,7 +262,7 @@ class Experiment(Participant):
             raise run.trouble_error(f" refused to {_TRANSITIONS[number]}")
 
     async def _start_walker(self, run: Run) -> int:
-        """Start the walker; return the instant of heel strike 0 [ns since 1970]."""
+        """Start the walker; return the time of heel strike 0 [ns since 1970]."""
         walker = run.walker
         response = await self._answer(self._start, StartRun.Request(run=run.number), walker)
         if not response.success:
@@ -273,20 +272,20 @@ class Experiment(Participant):
     async def _answer(
         self, client: Any, request: Any, node: str, timeout: float = ANSWER_TIMEOUT
     ) -> Any:
-        """Return a node's answer; wait for it a time [s], by default as long as it may take."""
+        """Return a node's answer, for which it has ``timeout`` [s]."""
         call = client.call_async(request)
         silence = ExperimentError(f"{node} does not answer", node)
         await self._waiting.until(call.done, timeout, silence)
         return call.result()
 
     async def _wait_for_reason(self, run: Run) -> None:
-        """Wait for why the perturbator did what it did: it may come later, on another topic."""
+        """Wait for the perturbator's reason, which may arrive later, on another topic."""
         await self._waiting.until(lambda: bool(run.trouble), REASON_TIMEOUT)
 
-    # What the run hears and says
+    # Messages to and from the run
 
     def publish(self, topic: topics.Topic, message: Any) -> None:
-        """Publish a message; the state of the run is the action's feedback too."""
+        """Publish a message; send the state of the run as action feedback as well."""
         super().publish(topic, message)
         if topic is topics.EXPERIMENT_STATE:
             self._server.publish_feedback(RunProtocol.Feedback(state=message))
@@ -297,21 +296,21 @@ class Experiment(Participant):
             self.run.take_trouble(trouble)
 
     def _request(self, train: PulseTrain) -> None:
-        """Ask the perturbator for the pulses of the run."""
+        """Request pulses of the run from the perturbator."""
         run = self.run
         assert run is not None
 
         def on_answered(future: Future) -> None:
             handle = future.result()
             if handle.accepted:
-                # Asked for at once: results expire.
+                # Requested immediately, because results expire.
                 handle.get_result_async().add_done_callback(self.guarded(on_ended))
             run.take_answer(handle.accepted)
 
         def on_ended(future: Future) -> None:
             result = future.result().result
             if result.outcome in (result.STOPPED, result.CANCELLED):
-                run.fail(ExperimentError(f"the pulses were ended: {result.message}"))
+                run.fail(ExperimentError(f"the pulses were stopped: {result.message}"))
 
         goal = goal_of(run.number, run.key, train)
         self._deliver.send_goal_async(goal).add_done_callback(self.guarded(on_answered))
@@ -323,7 +322,7 @@ class Experiment(Participant):
         return self._waiting.deadline
 
     def on_deadline(self) -> None:
-        """Look after everything that is waited for."""
+        """Check everything that the node waits for."""
         held_up = self._waiting.look_after(self.settings.silence_timeout)
         run = self.run
         if run is None:
@@ -335,7 +334,7 @@ class Experiment(Participant):
         run.check(self.settings.silence_timeout)
 
     def on_stop(self) -> None:
-        """Say so if the node is ended before its own protocol is."""
+        """Report a failure if the node ends before its own protocol."""
         if self.settings.protocol and self._waiting.busy and not self.failure:
             self.failure = "stopped before the end of the protocol"
 

@@ -4,8 +4,8 @@
 """
 gait_analyzer: stride periods, pulse phases and the entrainment verdict, online, from stamps.
 
-A listener: nothing waits for it. What it publishes is a pure function of the events and the
-onsets, promised or measured, in whatever order their messages arrive.
+It only listens, and nothing waits for it. What it publishes is a pure function of the events and
+the onsets, promised or measured, whatever the order in which their messages arrive.
 """
 
 from collections.abc import Callable
@@ -30,15 +30,15 @@ from gait_entrainment_nodes.nodes.participant import Participant
 
 @dataclass(frozen=True)
 class Settings:
-    """Parameters of the node, beside those of the verdict."""
+    """Parameters of the node, in addition to those of the verdict."""
 
     side: Side = setting(Side.RIGHT, "the perturbed leg: left or right")
     both_ankles: bool = setting(
-        False, "whether pulses come on the other ankle too: that leg is analyzed for itself"
+        False, "whether the other ankle gets pulses too; that leg is analyzed separately"
     )
     onset: str = setting(
         "commanded",
-        "where a pulse begins: commanded, or measured where the robot's torque rises",
+        "onset of a pulse: as commanded, or as measured when the robot's torque rises",
         choices=("commanded", "measured"),
     )
     toe_off_bias: float = setting(
@@ -47,7 +47,7 @@ class Settings:
 
 
 class Legs(tuple[Run, ...]):
-    """One run, as it is of each leg that is analyzed."""
+    """One run: that of each leg that is analyzed."""
 
     @property
     def number(self) -> int:
@@ -68,7 +68,7 @@ class GaitAnalyzerNode(Participant):
         for topic in RESULTS.values():
             self.offer(topic)
         self._latest_run = 0  # number of the latest run
-        self._first_event: msg.GaitEvent | None = None  # of another run than the one that goes on
+        self._first_event: msg.GaitEvent | None = None  # of a run other than the current one
         heard: list[tuple[topics.Topic, Any]] = [
             (topics.GAIT_EVENTS, Run.add_event),
             (topics.TORQUE_PROFILE, Run.add_profile),
@@ -84,8 +84,8 @@ class GaitAnalyzerNode(Participant):
         """
         Return the run of a message if it is analyzed; a newer run replaces it.
 
-        While a run goes on, only the first torque profile of another one begins that: a message
-        with a wrong number must not end the analysis.
+        During a run, only the first torque profile of another run starts that run: a message with
+        a wrong number must not end the analysis.
         """
         begins = isinstance(message, msg.TorqueProfile) and not message.revision
         if message.run != self._latest_run and (
@@ -98,19 +98,19 @@ class GaitAnalyzerNode(Participant):
                 Run(number, leg, self.verdict, bias, measured=measured)
                 for leg in (side, side.other)[: 1 + self.settings.both_ankles]
             )
-            self.note_state(DiagnosticStatus.OK, f"run {message.run} goes on")
+            self.note_state(DiagnosticStatus.OK, f"run {message.run} is in progress")
             first, self._first_event = self._first_event, None
             if first is not None and first.run == message.run:
                 self._add(Run.add_event, self.run, first)
         if message.run == self._latest_run:
             return self.run
         if isinstance(message, msg.GaitEvent) and not message.step:
-            self._first_event = message  # comes before the first torque profile
+            self._first_event = message  # it precedes the first torque profile
         self._warn(message, "messages of another run are not analyzed", run=message.run)
         return None
 
     def _add(self, add: Callable[[Run, Any], list[Result]], runs: Legs, message: Any) -> None:
-        """Hand a message to the run; publish what it allows, and the rest once all is here."""
+        """Pass a message to the run; publish what it completes, and the rest after the last."""
         of_ankle = not isinstance(message, (msg.GaitEvent, msg.Progress)) and len(runs) > 1
         for run in runs:
             if of_ankle and message.side != run.side:
@@ -118,9 +118,9 @@ class GaitAnalyzerNode(Participant):
             try:
                 self._publish_results(run, add(run, message))
             except MessageError as error:
-                self._warn(message, f"a message cannot be and is dropped: {error}")
+                self._warn(message, f"an invalid message is dropped: {error}")
             if doubts := run.new_doubts():
-                self._warn(message, "gait events are not as they should be", **doubts)
+                self._warn(message, "doubtful gait events", **doubts)
         if all(run.complete for run in runs):
             assert runs[0].end is not None
             self._finish(runs, runs[0].end)
@@ -130,16 +130,16 @@ class GaitAnalyzerNode(Participant):
         self.diagnose(stamp, DiagnosticStatus.WARN, what, **values)
 
     def _on_finish(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Finish a run whose end was not recorded, or of which events are missing."""
+        """Finish a run whose end was not recorded, or whose events are incomplete."""
         if self.run is not None:
             self._finish(self.run, min(run.promised_until for run in self.run))
         elif not self._latest_run:
-            self.publish_counts(0, 0)  # for whoever waits for them: no run was heard
+            self.publish_counts(0, 0)  # for nodes that wait for them: there was no run
         response.success = True
         return response
 
     def _finish(self, runs: Legs, end: int) -> None:
-        """Publish what was waiting: nothing more of this run will come."""
+        """Publish the remaining results: nothing more of this run will arrive."""
         self.run = None
         for run in runs:
             self._publish_results(run, run.finish(end))

@@ -33,11 +33,11 @@ RESULTS: dict[type, topics.Topic] = {
 
 class Run:
     """
-    One run; all instants are [ns since 1970].
+    One run; all times are [ns since 1970].
 
-    What is added may complete results, which are returned in the order of publishing. Onsets are
-    those that were promised, or ``measured`` where the robot's torque rises. Toe-offs are known to
-    be detected late by ``toe_off_bias`` [s].
+    Each message may complete results, which are returned in the order of publishing. Onsets are
+    those that were promised, or, if ``measured``, those at which the robot's torque rises.
+    Toe-offs are known to be detected late by ``toe_off_bias`` [s].
     """
 
     def __init__(
@@ -50,13 +50,13 @@ class Run:
         measured: bool,
     ) -> None:
         self.number, self.side = number, side
-        self.promised_until = 0  # all pulses up to this instant are known
+        self.promised_until = 0  # all pulses up to this time are known
         self.end: int | None = None  # of the walk, once it is known
         self._analyzer = GaitAnalyzer(side, settings)
         self._bias = toe_off_bias
         self._measured = MeasuredOnsets() if measured else None
         self._events = 0
-        self._closed = False  # nothing will be promised any more
+        self._closed = False  # nothing more will be promised
         self._expected = 0  # events, once the end is known
         self._doubts: dict[str, int] = {}  # counts of suspicious events, as reported last
         self._order = ProfileOrder()
@@ -64,7 +64,7 @@ class Run:
 
     @property
     def complete(self) -> bool:
-        """Whether the walk has ended and everything about it is here."""
+        """Whether the walk has ended and everything about it has arrived."""
         if self.end is None or self._events < self._expected:
             return False
         if self.promised_until < self.end:
@@ -83,7 +83,7 @@ class Run:
         return self._analyzer.add_event(mended)
 
     def add_profile(self, message: msg.TorqueProfile) -> list[Result]:
-        """Take the onsets that are promised, or a stop: the instant from which torque is zero."""
+        """Take the promised onsets, or a stop: the time from which torque is zero."""
         void, hole, profile = self._order.take(message)
         if void is not None:
             self._analyzer.stop(void)
@@ -100,7 +100,7 @@ class Run:
         return self._analyzer.add_promise(*known)
 
     def add_pulse(self, pulse: msg.TorquePulse) -> list[Result]:
-        """Take height and width of a pulse, by which its measured onset is known."""
+        """Take the height and width of a pulse, which determine its measured onset."""
         assert self._measured is not None
         return self._analyzer.add_promise(*self._measured.add_pulse(*pulse_of(pulse)))
 
@@ -110,13 +110,13 @@ class Run:
         return self._analyzer.add_promise(*self._measured.add_state(state_of(state)))
 
     def add_progress(self, progress: msg.Progress) -> list[Result]:
-        """Learn of the end of the walk."""
+        """Take progress, of which only the end of the walk matters."""
         if progress.state != msg.Progress.WALKING:
             self.end, self._expected = nanoseconds_of(progress.header.stamp), progress.events
         return []
 
     def finish(self, end: int) -> list[Result]:
-        """Return what was waiting for more: the run is over at an instant."""
+        """Return the remaining results of a run that is over at ``end``."""
         results = []
         if hole := self._order.hole_up_to(self._latest):
             self._analyzer.add_hole(*hole)
@@ -125,7 +125,7 @@ class Run:
         return results + self._analyzer.finish()
 
     def new_doubts(self) -> dict[str, int]:
-        """Return counts of doubtful events, and of holes; {} if as before."""
+        """Return the counts of doubtful events and of holes; {} if none or unchanged."""
         doubts = asdict(self._analyzer.event_counts) | {"holes": len(self._analyzer.holes)}
         del doubts["accepted"]
         if not any(doubts.values()) or doubts == self._doubts:

@@ -2,12 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-gait_detector: plays the walker for a person, from the signals of sensors on both feet.
+gait_detector: takes the walker's role for a person, from the signals of sensors on both feet.
 
-What an event is, and when it is known, is decided by the detectors of gait_entrainment_sensors,
-which number it, too. In real time the node promises that events are known once their latency is
-over, by the wall clock. In lock-step simulated sensors tell how far they are, and nothing depends
-on when a message arrives.
+gait_entrainment_sensors decides what an event is and when it is known, and numbers it. In real
+time the node promises that events are known once their latency has passed on the wall clock. In
+lock-step simulated sensors report how far they are, and nothing depends on when a message arrives.
 """
 
 import math
@@ -36,32 +35,32 @@ from gait_entrainment_nodes.nodes.participant import STATE_PERIOD, Participant
 from gait_entrainment_sensors import Detection, find_detector
 from gait_entrainment_sensors.sources import source_of
 
-# A sensor that was not heard for so long is not there [s].
+# A sensor that has been silent for this long counts as absent [s].
 _ABSENT = 1.0
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Parameters of the node; what it listens to is decided when it starts."""
+    """Parameters of the node; its subscriptions are fixed when it starts."""
 
     detector: str = setting(
         "vertical_force", "detector of both feet, NAME or NAME:OPTION=VALUE,OPTION=VALUE"
     )
-    left: str = setting("", "detector of the left foot, if it is another")
-    right: str = setting("", "detector of the right foot, if it is another")
-    left_topic: str = setting("", "topic of the left sensor; empty: as docs/person.md has it")
-    right_topic: str = setting("", "topic of the right sensor; empty: as docs/person.md has it")
+    left: str = setting("", "detector of the left foot, if different")
+    right: str = setting("", "detector of the right foot, if different")
+    left_topic: str = setting("", "topic of the left sensor; empty: as in docs/person.md")
+    right_topic: str = setting("", "topic of the right sensor; empty: as in docs/person.md")
     first_heel_strike: str = setting(
         "", "foot whose heel strikes have even numbers; empty: the first to strike",
         choices=("", "left", "right"),
     )  # fmt: skip
     delivery: float = setting(
-        0.03, "longest time from a sample to its arrival, with one sample's", "s", (0.0, 1.0)
+        0.03, "longest time from sample to arrival, plus one sample period", "s", (0.0, 1.0)
     )
     longest_age: float = setting(
-        0.5, "older samples, or ones ahead by a tenth of it, are left out", "s", (0.01, 10.0)
+        0.5, "samples older than this, or ahead by a tenth of it, are ignored", "s", (0.01, 10.0)
     )
-    simulated: bool = setting(False, "sensor_sim stands for the person")
+    simulated: bool = setting(False, "sensor_sim replaces the person")
 
 
 class GaitDetector(Participant):
@@ -81,17 +80,17 @@ class GaitDetector(Participant):
         if len({*map(self.resolve_topic_name, (topic.name for topic in self._topics))}) < 2:
             raise ValueError(f"left_topic, right_topic: both are {self._topics[0].name}")
         self._heard = [0, 0]  # samples of each foot
-        self._left_out = [0, 0]  # of them, those whose stamps cannot be
+        self._left_out = [0, 0]  # of these, those with implausible stamps
         self._age = [0.0, 0.0]  # of the latest such sample [s]
         self._heard_at = [-1e9, -1e9]  # on steady time [s]
-        self._jumped = [False, False]  # in this run, the clock of the sensor
+        self._jumped = [False, False]  # whether the sensor's clock has, in this run
         self._found: list[Detection] = []  # lock-step: not numbered yet
         self._truth: msg.Progress | None = None  # lock-step: not answered yet
         self._readings = 0  # lock-step: samples of this run
         self._walked = False
-        self._latest = ""  # event, for the diagnostics
+        self._latest = ""  # latest event, for the diagnostics
         self._progress_at = self._state_at = 0.0
-        self._counted = (0, 0)  # samples at the latest state
+        self._counted = (0, 0)  # samples up to the latest state report
         self.subscribe_to_run(topics.HORIZON, self._on_horizon)
         if not self.real_time:
             self.subscribe_to_run(topics.TRUE_PROGRESS, self._on_truth)
@@ -113,7 +112,7 @@ class GaitDetector(Participant):
         topic = topics.sensor_topics(source)[side]
         if given := getattr(self.settings, f"{side.name.lower()}_topic"):
             topic = topic._replace(name=given)
-        if not self.settings.simulated:  # of a driver, whatever it offers
+        if not self.settings.simulated:  # from a driver, whatever it offers
             topic = topic._replace(qos=topics.FROM_A_DRIVER)
         read = source.reader(detector.signals)
         self.subscribe(topic, partial(self._on_sample, side, read))
@@ -137,7 +136,7 @@ class GaitDetector(Participant):
         detector = self._detectors[side]
         jumps = detector.counts.clock_jumps
         self._found += detector.add(seconds, values)
-        # When its events happen is not known any more: as if the sensor were silent.
+        # The times of its events are no longer known: treat the sensor as silent.
         self._jumped[side] = self.run is not None and detector.counts.clock_jumps > jumps
         if self.real_time and self._found:
             self._publish_found()
@@ -145,7 +144,7 @@ class GaitDetector(Participant):
             self._answer_truth()
 
     def _timely(self, side: Side, stamp: int) -> bool:
-        """Whether a sample's stamp can be: neither old nor ahead of this host's clock."""
+        """Whether a sample's stamp is plausible: neither old nor ahead of this host's clock."""
         age = (time.time_ns() - stamp) / NANOSECONDS_PER_SECOND
         longest = self.settings.longest_age
         if -0.1 * longest <= age <= longest:
@@ -155,7 +154,7 @@ class GaitDetector(Participant):
         return False
 
     def _publish_found(self) -> None:
-        """Number what was found and publish it; between runs it only shows that sensors work."""
+        """Number and publish detections; between runs they only show that the sensors work."""
         found, self._found = self._found, []
         if found:
             latest = max(found, key=lambda detection: detection.detected_at)
@@ -182,7 +181,7 @@ class GaitDetector(Participant):
             self.run = Run(request.run, start, self.latency, self._epoch, side)
             self._readings, self._walked, self._jumped = 0, True, [False, False]
             self._progress_at = time.monotonic() + START_DELAY / NANOSECONDS_PER_SECOND
-            self.note_state(DiagnosticStatus.OK, f"run {request.run} goes on")
+            self.note_state(DiagnosticStatus.OK, f"run {request.run} is in progress")
             response.success, response.start = True, to_time(start)
         return response
 
@@ -200,7 +199,7 @@ class GaitDetector(Participant):
         self._answer_truth()
 
     def _answer_truth(self) -> None:
-        """Go on once all samples that a simulated walk has sent are here."""
+        """Continue once all samples that a simulated walk has sent have arrived."""
         truth, run = self._truth, self.run
         if truth is None or run is None or self._readings < truth.samples:
             return
@@ -215,15 +214,15 @@ class GaitDetector(Participant):
         run, self.run = self.run, None
         assert run is not None
         stamp = nanoseconds_of(progress.header.stamp)
-        level, told = self._condition(run)
-        what = progress.message or told or "finished"
+        level, troubles = self._condition(run)
+        what = progress.message or troubles or "finished"
         self.diagnose(stamp, level, what, events=run.events, late_events=run.late)
         self.publish_counts(progress.run, stamp)
 
-    # What people are told
+    # Readiness and state
 
     def not_ready(self) -> str:
-        """Return what is waited for: a sensor that is not there, or not what it should be."""
+        """Return what the node waits for: a sensor that is absent or of the wrong type."""
         for side, topic in zip(Side, self._topics, strict=True):
             wanted = f"{topic.type.__module__.split('.')[0]}/msg/{topic.type.__name__}"
             found = {i.topic_type for i in self.get_publishers_info_by_topic(topic.name)}
@@ -242,8 +241,8 @@ class GaitDetector(Participant):
         age = self._age[side]
         way = "behind" if age > 0 else "ahead of"
         return (
-            f"its stamps are {abs(age):.3g} s {way} this one's; allowed: "
-            f"{self.settings.longest_age:g} s: synchronize them (docs/hosts.md)"
+            f"its stamps are {abs(age):.3g} s {way} this host's; allowed: "
+            f"{self.settings.longest_age:g} s: synchronize the clocks (docs/hosts.md)"
         )
 
     def _condition(self, run: Run | None) -> tuple[bytes, str]:
@@ -251,26 +250,26 @@ class GaitDetector(Participant):
         now = None
         if self.real_time:
             now = (time.time_ns() - self._epoch) / NANOSECONDS_PER_SECOND
-        told = [line for detector in self._detectors for line in detector.troubles(now)]
-        told += [
-            f"{side.name.lower()}: {self._left_out[side]} samples left out: {self._clock_of(side)}"
+        troubles = [line for detector in self._detectors for line in detector.troubles(now)]
+        troubles += [
+            f"{side.name.lower()}: {self._left_out[side]} samples ignored: {self._clock_of(side)}"
             for side in Side
             if self._left_out[side]
         ]
-        told += [
-            f"{side.name.lower()}: the clock of the sensor jumped back: nothing of it is taken in "
-            "this run; synchronize it"
+        troubles += [
+            f"{side.name.lower()}: the sensor's clock jumped back: the sensor is ignored for the "
+            "rest of this run; synchronize its clock"
             for side in Side
             if self._jumped[side]
         ]
         if run is not None:
-            told += run.numbering.troubles()
+            troubles += run.numbering.troubles()
             if run.late:
-                told.append(f"{run.late} events came later than promised: raise delivery")
-        return (DiagnosticStatus.WARN if told else DiagnosticStatus.OK), "; ".join(told)
+                troubles.append(f"{run.late} events arrived later than promised: raise delivery")
+        return (DiagnosticStatus.WARN if troubles else DiagnosticStatus.OK), "; ".join(troubles)
 
     def next_deadline(self) -> float:
-        """Return when to report progress, or how the sensors are."""
+        """Return when to report progress or the state of the sensors."""
         due = [self._state_at]
         if self.run is not None and self.real_time:
             due.append(self._progress_at)
@@ -284,17 +283,17 @@ class GaitDetector(Participant):
             self._send_progress(self.run.progress_at(time.time_ns()))
         if now >= self._state_at:
             self._state_at = now + STATE_PERIOD
-            level, told = self._condition(self.run)
+            level, troubles = self._condition(self.run)
             rates = {
                 f"{side.name.lower()}_samples_per_second": self._heard[side] - self._counted[side]
                 for side in Side
             }
             self._counted = (self._heard[0], self._heard[1])
-            said = {"latest": self._latest, "samples": sum(self._heard), **rates}
-            self.note_state(level, told or "hears both feet", **said)
+            values = {"latest": self._latest, "samples": sum(self._heard), **rates}
+            self.note_state(level, troubles or "receiving both sensors", **values)
 
     def on_stop(self) -> None:
-        """End of the process: say so if a run goes on."""
+        """Report the end of the process if a run is in progress."""
         if self.run is not None:
             self._send_progress(self.run.aborted())
 

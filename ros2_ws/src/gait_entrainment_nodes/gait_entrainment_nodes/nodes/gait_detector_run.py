@@ -13,10 +13,10 @@ from gait_entrainment_sensors import Detection, Numbering
 
 class Run:
     """
-    A run; all instants are [ns since 1970].
+    One run; all times are [ns since 1970].
 
-    Detections count from ``epoch``. What was detected ``latency`` [s] after its instant at most
-    is covered by progress: from then on that instant is past for good.
+    Detections count time from ``epoch``. An event is detected at most ``latency`` [s] after it
+    happens, so progress covers everything older than that: nothing is added to it later.
     """
 
     def __init__(
@@ -24,19 +24,19 @@ class Run:
     ) -> None:
         self.number, self.start = number, start
         self.events = 0  # published
-        self.late = 0  # of them, those that an earlier progress had covered
+        self.late = 0  # of these, those that an earlier progress had covered
         self.grant = 0  # number of the next progress report
         self.covered = start  # everything up to here has been published
-        self.end: int | None = None  # of the run, once the experiment has named it
+        self.end: int | None = None  # of the run, once the experiment has announced it
         self.numbering = Numbering(first_side)
         self._latency, self._epoch = nanoseconds(latency), epoch
 
     def events_of(self, found: Sequence[Detection], detectors: Sequence[str]) -> list[GaitEvent]:
-        """Return the messages of what these, [left, right], found, in the order of decision."""
+        """Return messages of what the detectors, [left, right], found, in order of detection."""
         messages = []
         for detection in sorted(found, key=lambda d: d.detected_at):
             if self._stamp(detection.time) < self.start:
-                continue  # somebody walks before the run has begun
+                continue  # a step before the start of the run
             if (event := self.numbering.add(detection)) is None:
                 continue
             stamp = self._stamp(detection.time)
@@ -58,19 +58,19 @@ class Run:
         return messages
 
     def progress_at(self, now: int) -> Progress:
-        """Report how far all events have been published at an instant of the sensors' clock."""
+        """Report how far all events have been published at a time of the sensors' clock."""
         ended = self.end is not None and now >= self.end + self._latency
         reached = self.end if ended and self.end is not None else now - self._latency
         return self._progress(reached, Progress.FINISHED if ended else Progress.WALKING)
 
     def progress_behind(self, truth: Progress, reached: int) -> Progress:
-        """Report the same of a simulated walk, of which everything up to an instant has come."""
+        """Report the same for a simulated walk, received completely up to ``reached``."""
         walking = truth.state == Progress.WALKING
         known = reached - self._latency if walking else reached
         return self._progress(known, truth.state, truth.message, truth.reproducible)
 
     def aborted(self) -> Progress:
-        """Report that the node is stopped."""
+        """Report that the node is being stopped."""
         return self._progress(self.covered, Progress.ABORTED, "gait_detector was shut down")
 
     def _progress(

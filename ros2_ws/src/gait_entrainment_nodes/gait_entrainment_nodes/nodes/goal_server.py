@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""An action server whose goals end in their order, each executed when its result is there."""
+"""An action server whose goals end in order, each executed when its result is available."""
 
 from collections import deque
 from collections.abc import Callable
@@ -14,13 +14,13 @@ from gait_entrainment_nodes.nodes.participant import Participant
 
 class GoalServer:
     """
-    Serves an action whose results have an ``outcome``: 0 if all is well, CANCELLED or another.
+    Serves an action whose results have an ``outcome``: 0 for success, CANCELLED or another.
 
-    rclpy's executor resumes a coroutine that waits over and over, and would keep a processor busy
-    for as long as a goal takes: so a goal is executed only once it has ended.
+    rclpy's executor resumes a waiting coroutine over and over, which would keep a processor busy
+    for as long as a goal takes. A goal is therefore executed only once it has ended.
 
-    ``accept`` says whether to accept a request. ``begin`` takes the request that was accepted;
-    ``cancel`` is called if the client cancels it.
+    ``accept`` returns whether to accept a request. ``begin`` takes an accepted request. ``cancel``
+    is called if the client cancels it.
     """
 
     def __init__(
@@ -34,12 +34,12 @@ class GoalServer:
         cancel: Callable[[], None] = lambda: None,
     ) -> None:
         self._accept, self._begin, self._cancel = accept, begin, cancel
-        self._goals: deque[Any] = deque()  # under way, in their order
+        self._goals: deque[Any] = deque()  # under way, in order
         self._server = ActionServer(
             node,
             action,
             name,
-            execute_callback=lambda _: None,  # each goal brings its own, see end
+            execute_callback=lambda _: None,  # each goal has its own, see end
             goal_callback=node.guarded(self._on_goal),
             handle_accepted_callback=node.guarded(self._on_accepted),
             cancel_callback=node.guarded(self._on_cancel),
@@ -51,12 +51,12 @@ class GoalServer:
         return any(goal.is_cancel_requested for goal in self._goals)
 
     def publish_feedback(self, feedback: Any, side: int | None = None) -> None:
-        """Send feedback to the client of the first goal, on an ankle, if there is one."""
+        """Send feedback to the client of the first goal under way, on ``side`` if given."""
         if goals := self._under_way(side):
             goals[0].publish_feedback(feedback)
 
     def end(self, result: Any, side: int | None = None) -> None:
-        """End the first goal that is under way, on an ankle, with its result."""
+        """End the first goal under way, on ``side`` if given, with its result."""
         goal = self._under_way(side)[0]
         self._goals.remove(goal)
         goal.execute(lambda goal: self._execute(goal, result))

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What hears late, where tests want it (messaging/delays.py): a node's readers and clients."""
+"""Readers and clients of a node that receive late, for tests (messaging/delays.py)."""
 
 import time
 from collections import deque
@@ -15,12 +15,12 @@ from gait_entrainment.conventions import NANOSECONDS_PER_SECOND
 from gait_entrainment_nodes.messaging.delays import Delay, delay_between, delays_wanted
 from gait_entrainment_nodes.nodes.rclpy_internals import RawReader
 
-# How often what is late is looked for [s].
+# How often to check for late messages that are due [s].
 PERIOD = 0.01
 
 
 class LateReader(RawReader):
-    """A reader that loses what came before its sender was matched, and keeps the rest a while."""
+    """A reader that loses messages from before its sender was matched and delays the rest."""
 
     def __init__(self, node: Node, message_type: Any, topic: str, qos: QoSProfile) -> None:
         super().__init__(node, message_type, topic, qos)
@@ -42,7 +42,7 @@ class LateReader(RawReader):
         return taken
 
     def _delay(self) -> Delay:
-        """Return the delay of the one who publishes; of several none is known to be matched."""
+        """Return the publisher's delay; with several the matching of the sender is unknown."""
         here = self._node.get_name()
         infos = self._node.get_publishers_info_by_topic(self._topic)
         delays = [delay_between(name, here) for name in {info.node_name for info in infos}]
@@ -52,7 +52,7 @@ class LateReader(RawReader):
 
 
 def raw_reader(node: Node, message_type: Any, topic: str, qos: QoSProfile) -> RawReader:
-    """Return a reader of a topic, a late one where tests want it."""
+    """Return a reader of a topic, a late one if tests ask for it."""
     return (LateReader if delays_wanted() else RawReader)(node, message_type, topic, qos)
 
 
@@ -61,11 +61,11 @@ class LateClient:
 
     def __init__(self, client: Any, delay: Delay) -> None:
         self._client, self._delay = client, delay
-        self._answers: deque[tuple[float, Future, Any]] = deque()  # when due, for whom, what
+        self._answers: deque[tuple[float, Future, Any]] = deque()  # (due time, future, answer)
         self.service_is_ready = client.service_is_ready
 
     def call_async(self, request: Any) -> Future:
-        """Ask; the answer comes by ``deliver``."""
+        """Send a request, whose answer ``deliver`` sets."""
         late = Future()
         known = time.time() >= self._delay.matched
 
@@ -77,7 +77,7 @@ class LateClient:
         return late
 
     def deliver(self) -> None:
-        """Hand on the answers that are due."""
+        """Set the answers that are due."""
         while self._answers and self._answers[0][0] <= time.time():
             _, late, answer = self._answers.popleft()
             late.set_result(answer)

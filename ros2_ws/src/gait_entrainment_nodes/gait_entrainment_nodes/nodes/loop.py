@@ -4,8 +4,8 @@
 """
 The loop that every node runs in, and its clean stop.
 
-It is a series of ``spin_once`` of the EventsExecutor, which receives ten times as much as the
-default executor; between two calls the node meets its own deadlines on steady time.
+It repeats ``spin_once`` of the EventsExecutor, which receives ten times as many messages as the
+default executor. Between two calls the node meets its own deadlines on steady time.
 """
 
 import gc
@@ -28,16 +28,16 @@ from gait_entrainment_nodes.messaging.environment import come_before_others
 from gait_entrainment_nodes.nodes.late import PERIOD
 from gait_entrainment_nodes.nodes.parameters import HELP, HelpRequestedError
 
-# The longest time [s] that the loop sleeps in the executor, so that a signal is soon obeyed.
+# The longest time [s] that the loop sleeps in the executor, so that signals are handled soon.
 LONGEST_SLEEP = 0.1
 
 
 def run_node(make_node: Callable[[], Any]) -> int:
     """
-    Run a node until it is finished, it fails, or a signal arrives that stops.
+    Run a node until it finishes, fails or receives a signal that stops it.
 
-    Returns 0 for a clean stop, 1 for a failure, 2 for an argument or a parameter that was refused;
-    the reason is one line on standard error, after the traceback of an unforeseen failure.
+    Returns 0 for a clean stop, 1 for a failure, 2 for a refused argument or parameter. The reason
+    is one line on standard error, after a traceback if the failure was unexpected.
     """
     stop_requested = False
     node: Any = None
@@ -48,7 +48,7 @@ def run_node(make_node: Callable[[], Any]) -> int:
         if node is not None:
             node.stopping = True
 
-    # rclpy's own handlers shut the context down at once: no last message could be sent.
+    # rclpy's own handlers shut the context down immediately, so no last message could be sent.
     for number in STOPPING:
         signal.signal(number, request_stop)
     name = sys.argv[0].rpartition("/")[2]
@@ -69,7 +69,7 @@ def run_node(make_node: Callable[[], Any]) -> int:
             return 1 if isinstance(error, NothingToPlayError) else 2
         executor = EventsExecutor()
         executor.add_node(node)
-        # What is loaded stays: a search for garbage that goes through it makes samples late.
+        # What is loaded stays loaded; garbage collection that scans it would make samples late.
         gc.freeze()
         try:
             while not (stop_requested or node.finished or node.failure):
@@ -89,11 +89,11 @@ def run_node(make_node: Callable[[], Any]) -> int:
 
 
 def _join_ros() -> None:
-    """Initialize rclpy with the arguments of the process; UsageError if it cannot read them."""
+    """Initialize rclpy with the process arguments; raises UsageError if they are invalid."""
     try:
         rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # one of several errors that rclpy does not export
-        raise UsageError(f"the ROS arguments cannot be read: {error}") from None
+        raise UsageError(f"invalid ROS arguments: {error}") from None
     if (extra := remove_ros_args(sys.argv)[1:]) and extra[0] not in HELP:
         raise UsageError(
             f"unknown argument {extra[0]!r}; allowed: --help, --ros-args -p PARAMETER:=VALUE ..."
@@ -101,7 +101,7 @@ def _join_ros() -> None:
 
 
 def _serve_once(executor: Any, node: Any) -> None:
-    """Serve ROS until the node's deadline, but not for long, and do what is due then."""
+    """Serve ROS until the node's deadline or for a short time, then do what is due."""
     deadline = node.next_deadline()
     sleep = LONGEST_SLEEP
     if deadline is not None:
@@ -111,10 +111,10 @@ def _serve_once(executor: Any, node: Any) -> None:
     try:
         executor.spin_once(timeout_sec=sleep)
     except RuntimeError as error:  # rclpy's RCLError, which it does not export
-        # Whoever asked a service has gone, or is not matched yet and asks again.
+        # The client of a service is gone, or is not matched yet and will ask again.
         if "client will not receive response" not in str(error):
             raise
-    except ValueError as error:  # rclpy's own reading of /clock
+    except ValueError as error:  # rclpy's own handling of /clock
         if "value must not be negative" not in str(error):
             raise
         node.get_logger().warning(f"a message is dropped: /clock: {error}")

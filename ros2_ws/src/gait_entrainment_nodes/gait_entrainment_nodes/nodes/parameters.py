@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""ROS parameters from the settings of a dataclass, and back; and what a user says of them."""
+"""ROS parameters from the settings of a dataclass and back, with help and warnings for users."""
 
 import copy
 import json
@@ -31,24 +31,24 @@ _QUALITY = "qos_overrides."
 
 
 class HelpRequestedError(Exception):
-    """The node was asked what it is and takes: that is the message."""
+    """Help was requested; the message is the help text."""
 
 
 @dataclass(frozen=True)
 class _Texts(Setting):
-    """Texts, of which empty ones are left out."""
+    """A list of strings, of which empty ones are dropped."""
 
     kind: type = list
     choices: tuple[str, ...] = ()
 
     def check(self, name: str, value: Any) -> Any:
         if not isinstance(value, list) or not all(isinstance(text, str) for text in value):
-            raise SettingError(f"{name}: {value!r}; allowed: a list of texts")
+            raise SettingError(f"{name}: {value!r}; allowed: a list of strings")
         return tuple(text for text in value if text)
 
 
 def texts(meaning: str, *default: str) -> Any:
-    """Return a field of a settings dataclass that holds texts; its parameter cannot change."""
+    """Return a field of a settings dataclass for strings; its parameter is read-only."""
     return field(default=default, metadata={"setting": _Texts(meaning)})
 
 
@@ -60,47 +60,48 @@ def declare_settings(
 
     Raises SettingError if a value that the node was started with is not allowed.
     """
-    for name, told in settings_of(dataclass_type).items():
+    for name, setting in settings_of(dataclass_type).items():
         default, constraints = getattr(dataclass_type, name), ""
-        if isinstance(told, _Texts):
+        if isinstance(setting, _Texts):
             default = list(default) or [""]  # ROS cannot tell the type of an empty list
         elif isinstance(default, Enum | str):
             default = default if isinstance(default, str) else default.name.lower()
-            constraints = told.allowed
+            constraints = setting.allowed
         descriptor = ParameterDescriptor(
-            description=f"{told.meaning} [{told.unit}]" if told.unit else told.meaning,
+            description=setting.meaning + (f" [{setting.unit}]" if setting.unit else ""),
             additional_constraints=constraints,
-            read_only=name in fixed or isinstance(told, _Texts),
+            read_only=name in fixed or isinstance(setting, _Texts),
         )
-        if told.kind is int:
-            whole = IntegerRange(from_value=int(told.least), to_value=int(told.most))
-            descriptor.integer_range = [whole]
-        elif told.kind is float:
-            real = FloatingPointRange(from_value=float(told.least), to_value=float(told.most))
-            descriptor.floating_point_range = [real]
-        _declare(node, prefix + name, default, descriptor, told)
+        least, most = setting.least, setting.most
+        if setting.kind is int:
+            integers = IntegerRange(from_value=int(least), to_value=int(most))
+            descriptor.integer_range = [integers]
+        elif setting.kind is float:
+            floats = FloatingPointRange(from_value=float(least), to_value=float(most))
+            descriptor.floating_point_range = [floats]
+        _declare(node, prefix + name, default, descriptor, setting)
 
 
 def read_settings(value: Callable[[str], Any], dataclass_type: Any, prefix: str = "") -> Any:
     """
-    Return an instance of a dataclass from the values of its parameters, by their names.
+    Return an instance of a settings dataclass from the values of its parameters.
 
-    Raises EntrainmentError if a value is not allowed, or they do not fit each other.
+    Raises EntrainmentError if a value is not allowed, or if the values are inconsistent.
     """
     values = {}
-    for name, told in settings_of(dataclass_type).items():
+    for name, setting in settings_of(dataclass_type).items():
         given = value(prefix + name)
-        check = told.parse if isinstance(given, str) else told.check
+        check = setting.parse if isinstance(given, str) else setting.check
         values[name] = check(prefix + name, given)
     return dataclass_type(**values)
 
 
 def warn_of_unknown_parameters(node: Node) -> None:
     """
-    Warn of parameters that the node was started with and does not have: files are often shared.
+    Warn about given parameters that the node does not have: parameter files are often shared.
 
-    Raises SettingError for one in a section that is the node's own, such as ``limits``: it can be
-    meant for no other, and whoever mistypes a limit is not to go without.
+    Raises SettingError for one in a section that is the node's own, such as ``limits``: it cannot
+    be meant for another node, and a mistyped limit must not go unnoticed.
     """
     known = [name for name in node.list_parameters([], 0).names if not of_rclpy(name)]
     sections = {name.rpartition(".")[0] for name in known} - {""}
@@ -112,17 +113,17 @@ def warn_of_unknown_parameters(node: Node) -> None:
             raise SettingError(f"{name}: unknown parameter; allowed: {allowed}")
     if unknown:
         logger: Any = node.get_logger()
-        told = ", ".join(name + _alike(name, known) for name in unknown)
-        logger.warning(f"unknown parameters are ignored: {told}")
+        names = ", ".join(name + _alike(name, known) for name in unknown)
+        logger.warning(f"unknown parameters are ignored: {names}")
 
 
 def of_rclpy(name: str) -> bool:
-    """Return whether a parameter is one that rclpy makes: a chosen quality of service."""
+    """Return whether rclpy declares a parameter itself: an override of a quality of service."""
     return name.startswith(_QUALITY)
 
 
 def answer_help(node: Node, groups: Iterable[tuple[Any, str]]) -> None:
-    """Raise HelpRequestedError if asked to; a group is a settings dataclass and a prefix."""
+    """Raise HelpRequestedError if requested; a group is a settings dataclass and a prefix."""
     if not set(HELP) & set(sys.argv[1:]):
         return
     text = [
@@ -131,22 +132,21 @@ def answer_help(node: Node, groups: Iterable[tuple[Any, str]]) -> None:
         "\nparameters:",
     ]
     for dataclass_type, prefix in groups:
-        for name, told in settings_of(dataclass_type).items():
+        for name, setting in settings_of(dataclass_type).items():
             default = getattr(dataclass_type, name)
             default = default.name.lower() if isinstance(default, Enum) else default
-            allowed = "a list of texts" if isinstance(told, _Texts) else told.allowed
-            text.append(f"  {prefix}{name}: {told.meaning}")
+            allowed = "a list of strings" if isinstance(setting, _Texts) else setting.allowed
+            text.append(f"  {prefix}{name}: {setting.meaning}")
             text.append(f"      {allowed}; default {json.dumps(default)}")
     raise HelpRequestedError("\n".join(text))
 
 
 def chosen_quality(node: Node, topic: str, end: str, qos: QoSProfile) -> dict[str, Any]:
     """
-    Return the quality of one end of a topic, "publisher" or "subscription", for ROS to make it.
+    Return the arguments that give one end of a topic, "publisher" or "subscription", its quality.
 
-    A user chooses by ``qos_overrides.<topic>.<end>.<policy>``. Raises SettingError, or later while
-    the end is made, if a run does not allow it: what it depends on, or is judged by, is not to get
-    lost.
+    Users override it with ``qos_overrides.<topic>.<end>.<policy>``. Creating the end then raises
+    SettingError if a run does not allow that: what it depends on or is judged by must not be lost.
     """
     prefix = f"{_QUALITY}{node.resolve_topic_name(topic)}.{end}"
     if not any(name.startswith(f"{prefix}.") for name in given_parameters(node)):
@@ -167,35 +167,35 @@ def chosen_quality(node: Node, topic: str, end: str, qos: QoSProfile) -> dict[st
 
 
 def warn_of_unused_quality(node: Node) -> None:
-    """Warn of chosen qualities that no end of a topic has taken, once all have been made."""
+    """Warn about overridden qualities of no publisher or subscription; call when all exist."""
     given = [name for name in given_parameters(node) if of_rclpy(name)]
     if unused := [name for name in given if not node.has_parameter(name)]:
         logger: Any = node.get_logger()
         logger.warning(
-            f"qualities of service that this node does not take: {', '.join(unused)}; it takes "
-            f"{_QUALITY}<full name of a topic>.publisher or .subscription, then .history, .depth "
-            "or .reliability"
+            f"quality of service that this node does not take: {', '.join(unused)}; it takes "
+            f"{_QUALITY}<full topic name>.publisher or .subscription, then .history, .depth or "
+            ".reliability"
         )
 
 
 def _alike(name: str, known: list[str]) -> str:
-    """Return the parameter that may have been meant, as a question behind the name."""
-    import difflib  # here, since few need it
+    """Return a suggestion of the parameter that may have been meant, to append to the name."""
+    import difflib  # here, because it is rarely needed
 
     alike = difflib.get_close_matches(name, known, n=1)
     return f" ({alike[0]}?)" if alike else ""
 
 
 def _declare(
-    node: Node, name: str, default: Any, descriptor: ParameterDescriptor, told: Setting
+    node: Node, name: str, default: Any, descriptor: ParameterDescriptor, setting: Setting
 ) -> None:
     given = given_parameters(node).get(name, default)
-    # A whole number does for a real one everywhere, but not to ROS.
-    whole = told.kind is float and isinstance(given, int) and not isinstance(given, bool)
-    if whole:
-        default = told.check(name, given)
+    # An integer is accepted for a float everywhere except in ROS.
+    as_float = setting.kind is float and isinstance(given, int) and not isinstance(given, bool)
+    if as_float:
+        default = setting.check(name, given)
     try:
-        node.declare_parameter(name, default, descriptor, ignore_override=whole)
+        node.declare_parameter(name, default, descriptor, ignore_override=as_float)
     except (InvalidParameterValueException, InvalidParameterTypeException):
-        told.check(name, given)
+        setting.check(name, given)
         raise

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What every node of an experiment has: parameters, counted topics, readiness, diagnostics."""
+"""What all nodes of an experiment share: parameters, counted topics, readiness, diagnostics."""
 
 import functools
 import time
@@ -40,7 +40,7 @@ from gait_entrainment_nodes.nodes.parameters import (
 
 # How often a node publishes its state on /diagnostics [s]; rqt calls it stale after 5 s.
 STATE_PERIOD = 1.0
-# At the end of a node its last messages, a stop among them, have this long to arrive [s].
+# How long a node's last messages, such as a stop, have to arrive when it ends [s].
 LAST_WORDS = 0.5
 
 
@@ -48,18 +48,18 @@ class Participant(Node):
     """
     A node that takes part in a run.
 
-    ``settings`` are its parameters, of which some are ``fixed``: by the attribute that holds their
-    values a settings dataclass, or a pair of it and the prefix of its parameters. Raises
-    EntrainmentError if a value is not allowed, or the values do not fit each other.
+    ``settings`` maps each attribute that holds parameter values to a settings dataclass, or to a
+    pair of that and the prefix of its parameters. Parameters named in ``fixed`` are read-only.
+    Raises EntrainmentError if a value is not allowed, or if the values are inconsistent.
     """
 
-    get_logger: Callable[[], RcutilsLogger]  # which rclpy does not type
-    priority = PRIORITY  # in real time, where the system permits it
-    stopping = False  # set from outside: the node is to end
+    get_logger: Callable[[], RcutilsLogger]  # rclpy does not type it
+    priority = PRIORITY  # in real time, if the system permits it
+    stopping = False  # set from outside to end the node
     failure: str | None = None  # why the node must end with exit code 1
     finished = False  # set to end the loop with exit code 0
-    run: Any = None  # the run that goes on, with its ``number``; None between runs
-    late: tuple[Callable[[], None], ...] = ()  # what hands on what is heard late, in tests
+    run: Any = None  # the current run, with its ``number``; None between runs
+    late: tuple[Callable[[], None], ...] = ()  # functions that deliver late messages, in tests
 
     def __init__(self, node_name: str, *, fixed: Collection[str] = (), **settings: Any) -> None:
         self._own = f"{node_name}/"  # how the names of its own topics begin in the table
@@ -77,24 +77,24 @@ class Participant(Node):
         self.offer(DIAGNOSTICS)
         self._state_due = 0.0  # when to publish the state, steady time [s]
         self.note_state(DiagnosticStatus.OK, "ready")
-        # Not counted itself: its message says what the others published.
+        # Not counted itself: its message reports the counts of the others.
         self.offer(PUBLISHED_COUNTS, counted=False)
 
     @property
     def real_time(self) -> bool:
-        """Whether this node waits for nobody: neither for a reader nor for its turn."""
+        """Whether this node never waits, neither for a reader nor for its turn."""
         return not self.get_parameter("use_sim_time").value
 
     # Parameters
 
     def why_fixed(self, name: str) -> str:
-        """Return why a parameter that is not read-only cannot change now, or an empty text."""
+        """Return why a parameter that is not read-only cannot change now, or an empty string."""
         del name
-        going_on = self.run is not None
-        return f"run {self.run.number} goes on; change it between runs" if going_on else ""
+        running = self.run is not None
+        return f"run {self.run.number} is in progress; change it between runs" if running else ""
 
     def take_parameters(self, changes: dict[str, Any]) -> None:
-        """Take the values of all parameters, or none if they do not fit each other."""
+        """Apply the values of all parameters, or none if they are inconsistent."""
 
         def value(name: str) -> Any:
             return changes[name] if name in changes else self.get_parameter(name).value
@@ -103,16 +103,16 @@ class Participant(Node):
         vars(self).update(read)
 
     def set_parameters_atomically(self, parameter_list: list[Any]) -> SetParametersResult:
-        """Set what changes; to say again what is so is no change, even of what is read-only."""
+        """Set the values that change; repeating a current value is allowed, even if read-only."""
         changes = []
         for parameter in parameter_list:
             name = parameter.name
             if not self.has_parameter(name):
-                reason = f"{name}: there is no such parameter; ros2 param list names them"
+                reason = f"{name}: unknown parameter; ros2 param list names those that exist"
                 return SetParametersResult(successful=False, reason=reason)
             present = self.get_parameter(name)
             if (present.type_, parameter.type_) == (Parameter.Type.DOUBLE, Parameter.Type.INTEGER):
-                # A whole number does for a real one, as where the node starts.
+                # An integer is accepted for a float, as when the node starts.
                 parameter = Parameter(name, value=float(parameter.value))
             if present.get_parameter_value() != parameter.get_parameter_value():
                 changes.append(parameter)
@@ -121,13 +121,13 @@ class Participant(Node):
         return super().set_parameters_atomically(changes)
 
     def _on_set_parameters(self, changes: Sequence[Any]) -> SetParametersResult:
-        """Take a change or refuse it with the reason; types and ranges have been checked."""
+        """Apply a change or refuse it with a reason; types and ranges have been checked."""
         values = {change.name: change.value for change in changes}
         try:
             for name, value in values.items():
                 reason = "" if of_rclpy(name) else self.why_fixed(name)
                 if name == "use_sim_time":
-                    reason = "which clock counts is decided when the node starts"
+                    reason = "the clock is chosen when the node starts"
                 if reason:
                     raise SettingError(f"{name}: {value!r} is refused: {reason}")
             self.take_parameters(values)
@@ -138,16 +138,16 @@ class Participant(Node):
     # Topics
 
     def name_of(self, topic: Topic) -> str:
-        """Return the name of a topic for this node: what is under its name follows its name."""
+        """Return this node's name of a topic; topics under the node's name follow that name."""
         own = topic.name.startswith(self._own)
         return f"~/{topic.name.removeprefix(self._own)}" if own else topic.name
 
     def quality_of(self, name: str, end: str, qos: QoSProfile) -> dict[str, Any]:
-        """Return the quality of a topic's end as ROS takes it; see `chosen_quality`."""
+        """Return the arguments for the quality of one end of a topic; see `chosen_quality`."""
         return chosen_quality(self, name, end, qos)
 
     def offer(self, topic: Topic, *, counted: bool = True) -> CountedPublisher:
-        """Create a publisher, for ``publish``; the recorder is told what a counted one sent."""
+        """Create a publisher for ``publish``; the count of a ``counted`` one is reported."""
         publisher = CountedPublisher(self, topic, counted=counted)
         self._publisher_of.setdefault(topic.name, publisher)
         self._offered.append(publisher)
@@ -160,7 +160,7 @@ class Participant(Node):
     def subscribe(
         self, topic: Topic, callback: Callable[[Any], None], *, raw: bool = False
     ) -> None:
-        """Create a subscription with the quality of service of its topic; ``raw``: to bytes."""
+        """Create a subscription with its topic's quality of service, to bytes if ``raw``."""
         name = self.name_of(topic)
         if delays_wanted():
             reader = LateReader(self, topic.type, name, topic.qos)
@@ -175,7 +175,7 @@ class Participant(Node):
         self.create_subscription(topic.type, name, callback, raw=raw, **qos)
 
     def client(self, service_type: Any, name: str) -> Any:
-        """Create a client of a service of another node, which its name begins with."""
+        """Create a client of another node's service, whose name starts with that node's."""
         client: Any = self.create_client(service_type, name)
         if delays_wanted():
             client = LateClient(client, delay_between(name.partition("/")[0], self.get_name()))
@@ -183,7 +183,7 @@ class Participant(Node):
         return client
 
     def subscribe_to_run(self, topic: Topic, callback: Callable[[Any, Any], None]) -> None:
-        """Have each message of the run that goes on handed to a callback, behind the run."""
+        """Subscribe; call ``callback`` with the run and each message of the current run."""
 
         def take(message: Any) -> None:
             if (run := self.run_of(message)) is not None:
@@ -192,19 +192,19 @@ class Participant(Node):
         self.subscribe(topic, take)
 
     def run_of(self, message: Any) -> Any:
-        """Return the run that a message belongs to, None if that does not go on."""
+        """Return the run that a message belongs to, or None if that is not the current one."""
         return self.run if self.run is not None and message.run == self.run.number else None
 
     def rivals(self, topic: Topic) -> str:
-        """Say who publish a topic, if they are several where a run takes one; else nothing."""
+        """Return which nodes publish a topic if there are several, else an empty string."""
         name = self.name_of(topic)
         if self.count_publishers(name) < 2:
             return ""
         names = sorted(info.node_name for info in self.get_publishers_info_by_topic(name))
-        return f"{topic.name} comes from {' and '.join(names)}, and a run takes one"
+        return f"{topic.name} is published by {' and '.join(names)}; a run needs one publisher"
 
     def publish_counts(self, run: int, stamp: int) -> None:
-        """Tell the recorder, at the end of a run, how many messages were published."""
+        """Report how many messages were published, for the recorder, at the end of a run."""
         counted = [publisher for publisher in self._offered if publisher.counted]
         message = PublishedCounts(header=header(stamp), run=run)
         message.node = self.get_fully_qualified_name()
@@ -216,10 +216,10 @@ class Participant(Node):
 
     def offer_ready(self) -> None:
         """
-        Offer ``~/ready``, after everything else that the node offers and listens to.
+        Offer ``~/ready``, after all other publishers, subscriptions and services of the node.
 
-        Discovery announces the endpoints of a node in the order in which they were made: whoever
-        sees this service knows all of the node's subscriptions.
+        Discovery announces the endpoints of a node in the order of their creation, so a client
+        that sees this service knows all of the node's subscriptions.
         """
         warn_of_unused_quality(self)
         self.create_service(Ready, "~/ready", self._on_ready)
@@ -231,10 +231,10 @@ class Participant(Node):
 
     def not_ready(self) -> str:
         """
-        Return what this node waits for before a run, or an empty text.
+        Return what this node waits for before a run, or an empty string.
 
         It is ready once every known subscription of its topics is matched, so that the first
-        message that must arrive will arrive.
+        message is not lost.
         """
         waiting = [p.topic_name for p in self._offered if p.unmatched]
         return f"subscriptions of {', '.join(waiting)}" if waiting else ""
@@ -242,7 +242,7 @@ class Participant(Node):
     def _on_ready(self, _: Ready.Request, response: Ready.Response) -> Ready.Response:
         response.waiting_for = self.not_ready()
         response.ready = not response.waiting_for
-        # Of the host, whatever clock the node follows: the experiment compares it with its own.
+        # The host's time, whatever clock the node follows: the experiment compares it to its own.
         response.now = to_time(time.time_ns())
         response.topics, response.matched = list(self.matched), list(self.matched.values())
         return response
@@ -255,21 +255,21 @@ class Participant(Node):
         return "none"
 
     def diagnose(self, stamp: int, level: bytes, message: str, **values: object) -> None:
-        """Publish what happened in a run; it is this node's state until the next is noted."""
+        """Publish what happened in a run; it is this node's state until another is noted."""
         self.note_state(level, message, **values)
         self._publish_status("run", stamp)
 
     def note_state(self, level: bytes, message: str, **values: object) -> None:
-        """Note how this node is, for ``publish_state``."""
+        """Set this node's state, for ``publish_state``."""
         pairs = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
         self._status = DiagnosticStatus(level=level, message=message, values=pairs)
 
     def publish_state(self) -> None:
-        """Publish the state if it is due, so that everybody sees that this node is there."""
+        """Publish the state if it is due, which also shows that this node is alive."""
         if time.monotonic() >= self._state_due:
             self._state_due = time.monotonic() + STATE_PERIOD
             self._publish_status("state", self.get_clock().now().nanoseconds)
-            # Published from the first moment on: a recorder that starts later has lost nothing.
+            # Published from the start: a recorder that starts later must not count it as lost.
             self._publisher_of[DIAGNOSTICS.name].count -= 1
 
     def _publish_status(self, what: str, stamp: int) -> None:
@@ -282,7 +282,7 @@ class Participant(Node):
 
     @classmethod
     def main(cls) -> int:
-        """Run such a node as this process; return the exit code, see `run_node`."""
+        """Run this node as the process; return the exit code, see `run_node`."""
         return run_node(cls)
 
     def next_deadline(self) -> float | None:
@@ -290,13 +290,13 @@ class Participant(Node):
         return None
 
     def on_deadline(self) -> None:
-        """Do what was due at the deadline; a late wake-up finds everything that is due."""
+        """Do everything that is due, even if the node wakes up late."""
 
     def on_stop(self) -> None:
         """Bring things to a safe end: torque to zero, files closed."""
 
     def end(self) -> None:
-        """End the node's part, however it came to its end, and let its last messages arrive."""
+        """End the node's work, for whatever reason, and let its last messages arrive."""
         self.stopping = True
         try:
             self.on_stop()
@@ -308,10 +308,10 @@ class Participant(Node):
 
     def guarded(self, callback: Callable[..., Any]) -> Callable[..., Any]:
         """
-        Return the callback of an action server or a future, made safe to raise exceptions.
+        Wrap a callback of an action server or a future so that it may raise exceptions.
 
-        The EventsExecutor hands on what a subscription, a service or a timer raises, but an
-        exception in a task crashes the process. Here it ends the node in order instead.
+        The EventsExecutor propagates exceptions of subscriptions, services and timers, but an
+        exception in a task crashes the process. The wrapper ends the node cleanly instead.
         """
 
         @functools.wraps(callback)
@@ -325,7 +325,7 @@ class Participant(Node):
         return call
 
     def fail_with(self, error: Exception) -> None:
-        """End the node because of an unforeseen exception, or because it was told to stop."""
+        """End the node because of an unexpected exception, or because a stop was requested."""
         if isinstance(error, StopRequestedError):
             return
         traceback.print_exception(error)

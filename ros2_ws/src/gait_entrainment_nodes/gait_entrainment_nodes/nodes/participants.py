@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The nodes that take part in an experiment: whether all of them run and hear each other."""
+"""The nodes that take part in an experiment: whether all are running and hear each other."""
 
 import time
 from collections.abc import Iterable, Sequence
@@ -20,25 +20,25 @@ ASK_AGAIN = 0.5
 
 
 class ClockError(ExperimentError):
-    """The clock of a participant is off; waiting does not mend that."""
+    """A participant's clock is off, which waiting does not change."""
 
 
 @dataclass(frozen=True)
 class ClockOffset:
-    """How far a participant's clock is ahead, measured by a question and its answer."""
+    """How far a participant's clock is ahead, measured by a request and its answer."""
 
     offset: float  # [s]
-    uncertainty: float  # half the time from question to answer [s]
+    uncertainty: float  # half the time from request to answer [s]
 
     @classmethod
     def measured(cls, asked: int, told: int, answered: int) -> "ClockOffset":
-        """Return the offset of a clock that was read between two instants of this one [ns]."""
+        """Return the offset of a clock that was read between two times of this one [ns]."""
         middle = (asked + answered) / 2
         uncertainty = (answered - asked) / 2 / NANOSECONDS_PER_SECOND
         return cls((told - middle) / NANOSECONDS_PER_SECOND, uncertainty)
 
     def check(self, name: str, longest: float) -> None:
-        """Raise ClockError if the offset is beyond a limit [s], ExperimentError if unknown."""
+        """Raise ClockError if the offset exceeds a limit [s], ExperimentError if unknown."""
         if abs(self.offset) - self.uncertainty > longest:
             way = "ahead of" if self.offset > 0 else "behind"
             raise ClockError(
@@ -54,8 +54,8 @@ class Participants:
     """
     The participants of an experiment before a run: any nodes in its namespace with ``~/ready``.
 
-    The other clients of the experiment, ``node``, have been made: discovery announces clients in
-    the order in which they were made, so a participant that answers here knows all of them.
+    The other clients of the experiment, ``node``, exist already: discovery announces clients in
+    the order of their creation, so a participant that answers here knows all of them.
     """
 
     def __init__(self, node: Participant, names: Sequence[str], waiting: Waiting) -> None:
@@ -65,9 +65,9 @@ class Participants:
 
     async def check(self, longest_clock_offset: float) -> None:
         """
-        Raise ExperimentError if a participant is not ready, or who publishes has rivals: who.
+        Raise ExperimentError if a participant is not ready, or if publishers rival each other.
 
-        Raises ClockError if its clock is off by more than a limit [s]; 0 compares no clocks.
+        Raises ClockError if a clock is off by more than a limit [s]; 0 compares no clocks.
         """
         here = self._node.get_namespace()
         nodes = self._node.get_node_names_and_namespaces()
@@ -81,30 +81,30 @@ class Participants:
                     name,
                 )
         for name, client in self._clients.items():
-            # An answer may be lost, as long as the participant does not know who asked.
+            # An answer may be lost as long as the participant has not discovered this client.
             asked = time.time_ns()
             answer = client.call_async(Ready.Request())
             silence = ExperimentError(f"{name} does not answer", name)
             await self._waiting.until(answer.done, ASK_AGAIN, silence)
             state = answer.result()
             if longest_clock_offset:
-                told = nanoseconds_of(state.now)
-                offset = ClockOffset.measured(asked, told, time.time_ns())
+                stamp = nanoseconds_of(state.now)
+                offset = ClockOffset.measured(asked, stamp, time.time_ns())
                 offset.check(name, longest_clock_offset)
             if not state.ready:
                 raise ExperimentError(f"{name} waits for {state.waiting_for}", name)
             self._require_recorded(name, state.topics)
-            # Discovery may have told this node of more subscriptions than that one.
+            # This node may have discovered more subscriptions than the participant.
             for topic, matched in zip(state.topics, state.matched, strict=True):
                 if matched < self._node.count_subscribers(topic):
                     raise ExperimentError(f"{name} waits for subscriptions of {topic}", name)
         self._require_recorded(self._node.get_name(), self._node.matched)
-        for spoken in (GAIT_EVENTS, WALKER_PROGRESS, TORQUE_PROFILE):
-            if rivals := self._node.rivals(spoken):
+        for single in (GAIT_EVENTS, WALKER_PROGRESS, TORQUE_PROFILE):
+            if rivals := self._node.rivals(single):
                 raise ExperimentError(rivals)
 
     def _require_recorded(self, name: str, topics: Iterable[str]) -> None:
-        """Raise ExperimentError if there is a recorder and it does not hear a node's topics."""
+        """Raise ExperimentError if there is a recorder that has not subscribed to a topic."""
         if RECORDER not in self.names or name == RECORDER:
             return
         here = self._node.get_namespace()

@@ -4,9 +4,9 @@
 """
 perturbator: lifecycle node that holds the ankle robots and turns pulse trains into torque.
 
-It answers every horizon of the experiment with a torque profile and the promise that nothing in
-it will change (perturbator_run.py). It knows nothing of gait. Torque ends with deactivation, with
-cancelling, with the latched stop service and with the process, whatever ends that.
+It answers every horizon of the experiment with a torque profile, which it promises not to change
+(perturbator_run.py). It knows nothing about gait. Torque ends on deactivation, on cancelling, by
+the latched stop service, and with the process, however that ends.
 """
 
 import time
@@ -48,43 +48,43 @@ from gait_entrainment_nodes.nodes.rclpy_internals import TolerantLifecycleNode
 from gait_entrainment_nodes.nodes.stop_thread import StopThread
 
 Result = DeliverPulseTrain.Result
-# How often what a real robot has measured is promised [s].
+# How often to promise what a real robot has measured [s].
 MEASURED_PERIOD = 0.01
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Parameters of the node, beside the limits of the robot."""
+    """Parameters of the node, in addition to the limits of the robot."""
 
-    side: Side = setting(Side.RIGHT, "ankle on which the robot sits: left or right")
-    both_ankles: bool = setting(False, "whether another robot sits on the other ankle")
-    driver: str = setting("ideal", "name of the ankle robot driver: NAME or NAME:OPTION=VALUE,...")
-    seed: int = setting(0, "seed of a driver that draws random numbers", "1", (0, 2**32 - 1))
+    side: Side = setting(Side.RIGHT, "ankle that wears the robot: left or right")
+    both_ankles: bool = setting(False, "whether the other ankle wears a robot, too")
+    driver: str = setting("ideal", "ankle robot driver: NAME or NAME:OPTION=VALUE,...")
+    seed: int = setting(0, "seed for a driver that draws random numbers", "1", (0, 2**32 - 1))
     armed: bool = setting(
-        False, "arm a real robot on activation; else a person does it by the service ~/arm"
+        False, "arm a real robot on activation; otherwise a person calls the service ~/arm"
     )
     unproved: bool = setting(
         False,
-        "arm a real robot whose own watchdog was not proved on this computer; recorded",
+        "arm a real robot even if its own watchdog was not proved on this computer; recorded",
     )
     operator_timeout: float = setting(
         0.0,
-        "longest silence of operator/heartbeat while torque may come; 0: nobody need watch",
+        "longest silence of operator/heartbeat while torque is possible; 0: nobody needs to watch",
         "s",
         (0.0, 60.0),
     )
     operators: tuple[str, ...] = texts(
-        "names on operator/heartbeat, each of which must be heard; empty: any one"
+        "names on operator/heartbeat that must all be heard; empty: any name will do"
     )
     deadman_timeout: float = setting(
         0.0,
-        "longest silence of ~/emergency_stop while torque may come; 0: its silence stops nothing",
+        "longest silence of ~/emergency_stop while torque is possible; 0: silence is allowed",
         "s",
         (0.0, 60.0),
     )
 
     def __post_init__(self) -> None:
-        find_driver(self.driver)  # raises DeviceError if there is none
+        find_driver(self.driver)  # raises DeviceError if there is no such driver
 
 
 class Perturbator(Participant, TolerantLifecycleNode):
@@ -102,27 +102,27 @@ class Perturbator(Participant, TolerantLifecycleNode):
             limits=(DeviceLimits, "limits."),
             planned=(PlannedPulses, "planned."),
         )
-        self._robots: dict[Side, GuardedRobot] = {}  # from configuring to cleaning up
-        self._dose = Dose()  # of everybody who was on the robot since this node was started
+        self._robots: dict[Side, GuardedRobot] = {}  # from configuration to cleanup
+        self._dose = Dose()  # of all wearers since this node was started
         self._armed_by = ""
-        self._stop_latched = False  # somebody stopped while there was no robot
+        self._stop_latched = False  # stopped while there was no robot
         self._reported: tuple[Fault, ...] = ()  # faults that have been published
         for topic in (topics.TORQUE_PROFILE, topics.PULSES, topics.ROBOT_STATE):
             self.offer(topic)
         self.offer(topics.ROBOT_SETUP)
         self.offer(topics.TROUBLE)
-        self._now = 0  # latest instant that is known to be over [ns since 1970]
+        self._now = 0  # latest time that is known to be past [ns since 1970]
         self._latest_run = 0  # number of the latest run
-        self._foreign_seal = ""  # of the latest horizon that was not of who conducts the run
-        self._look_at: float | None = None  # when to look after a real robot, steady time [s]
+        self._foreign_seal = ""  # of the latest horizon that was not from the run's experiment
+        self._read_at: float | None = None  # when to read a real robot, steady time [s]
         self._signs = SignsOfLife()
-        self._pressed = False  # the emergency stop, for all that it has said
-        self._buttons = 0  # who can press it
+        self._pressed = False  # the emergency stop, by its latest message
+        self._buttons = 0  # how many nodes can press it
         self._stop_thread = StopThread(self.get_name(), self._stop_at_once)
 
         self.subscribe(topics.HORIZON, self._on_horizon)
         self.subscribe(topics.OPERATOR_HEARTBEAT, self._on_heartbeat)
-        # A button may keep what it says for who comes later, or say it once to who is there.
+        # A button may keep its message for late joiners, or send it once to present readers.
         for qos in (topics.SAID_ONCE, topics.HEARTBEAT):
             self.subscribe(topics.EMERGENCY_STOP._replace(qos=qos), self._on_emergency_stop)
         self.create_service(Trigger, "~/stop", self.on_stop_service)
@@ -148,8 +148,8 @@ class Perturbator(Participant, TolerantLifecycleNode):
         """
         Connect to the robot; no torque is possible yet. Releases what was latched before.
 
-        Refused once if somebody stopped before there was a robot: a run that is about to begin
-        would otherwise release the stop by itself.
+        Refused once after a stop before there was a robot: a run that is about to start would
+        otherwise release the stop by itself.
         """
         settings = self.settings
         try:
@@ -163,8 +163,8 @@ class Perturbator(Participant, TolerantLifecycleNode):
                     f"driver: {driver.name} runs in real time only: use_sim_time must be off"
                 )
             sides = (settings.side, settings.side.other)[: 1 + settings.both_ankles]
-            made = settings.driver, sides, self.limits, settings.seed, self._dose
-            robots = make_robots(*made)
+            arguments = settings.driver, sides, self.limits, settings.seed, self._dose
+            robots = make_robots(*arguments)
             do_with_all(robots, GuardedRobot.configure, GuardedRobot.close)
         except (LimitError, DeviceError) as error:
             return self._refuse(error)
@@ -183,7 +183,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
         except DeviceError as error:
             return self._refuse(error)
         if not self._simulated:
-            self._look_at = time.monotonic()
+            self._read_at = time.monotonic()
         self.note_state(DiagnosticStatus.OK, "active")
         return super().on_activate(state)
 
@@ -221,9 +221,9 @@ class Perturbator(Participant, TolerantLifecycleNode):
             self._stop_thread.close()
 
     def _release(self) -> None:
-        """Bring the torque to zero and let go of the robots."""
+        """Bring the torque to zero and release the robots."""
         robots, self._robots = self._robots, {}
-        self.run = self._look_at = None
+        self.run = self._read_at = None
         for robot in robots.values():
             robot.close()
 
@@ -233,7 +233,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
 
     @property
     def _faults(self) -> tuple[Fault, ...]:
-        """What has latched the torque at zero, in order."""
+        """Faults that have latched the torque at zero, in order."""
         return tuple({f: None for robot in self._robots.values() for f in robot.faults})
 
     def _refuse(self, error: Exception) -> TransitionCallbackReturn:
@@ -243,7 +243,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
     # Stopping, arming, faults
 
     def _arm(self, how: str) -> None:
-        """Allow torque, and say so in the record; raises DeviceError if it must not come."""
+        """Allow torque and record who did so; raises DeviceError if that is not permitted."""
         if not self._robots:
             raise DeviceError("the perturbator is not active")
         for side in self._robots if not self._simulated else ():
@@ -267,16 +267,16 @@ class Perturbator(Participant, TolerantLifecycleNode):
         return response
 
     def _take_stop(self) -> bool:
-        """Whether somebody stopped while there was no robot; told once."""
+        """Return once whether the torque was stopped while there was no robot."""
         stopped, self._stop_latched = self._stop_latched, False
         return stopped
 
     def _stop_at_once(self) -> StopAnswer:
-        """Bring the torque to zero and keep it there; from any thread."""
+        """Bring the torque to zero and keep it there; callable from any thread."""
         robots = self._robots.values()
         if not robots:
             self._stop_latched = True
-            return StopAnswer(True, "no robot is configured; the next configuring is refused")
+            return StopAnswer(True, "no robot is configured; the next configuration is refused")
         for robot in robots:
             robot.stop()
         if NOT_STOPPED in self._faults:
@@ -301,16 +301,16 @@ class Perturbator(Participant, TolerantLifecycleNode):
         self._signs.hear(message.data)
 
     def _require_signs_of_life(self) -> None:
-        """End the torque if an operator, or who holds the emergency stop, is not there."""
+        """End the torque if an operator or an emergency stop is missing."""
         robots = self._robots.values()
         buttons = self.count_publishers("~/emergency_stop")
         gone, self._buttons = buttons < self._buttons, buttons
         if all(robot.train is None for robot in robots):
             return
-        for fault, told in self._signs.missing(self.settings, button_gone=gone):
+        for fault, reason in self._signs.missing(self.settings, button_gone=gone):
             for robot in robots:
                 robot.stop(fault)
-            self._report_faults(told)
+            self._report_faults(reason)
 
     def _end_torque(self, reason: str, outcome: int = Result.STOPPED) -> None:
         """Bring the torque to zero now, whatever was promised."""
@@ -318,7 +318,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
             self.run.end_torque(outcome, reason)
 
     def _report_faults(self, reason: str = "") -> None:
-        """Tell of faults that are new; each has ended the torque, and ends the goal."""
+        """Report new faults; each has ended the torque, and ends the goal."""
         faults = self._faults
         new = [fault for fault in faults if fault not in self._reported]
         if not new:
@@ -334,7 +334,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
             self.run.end_torque(Result.STOPPED, reason, fault=True)
 
     def _report(self, level: bytes, message: str, fault: Fault | None = None) -> None:
-        """Tell the experiment and people what was refused, or the fault that latched."""
+        """Report a refusal or a latched fault to the experiment and to people."""
         self.get_logger().error(message)
         trouble = Trouble(
             header=header(self._now),
@@ -347,7 +347,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
         self.diagnose(self._now, level, message)
 
     def _publish_setup(self) -> None:
-        """Say for the record what is driven, within which limits, and who allowed torque."""
+        """Publish for the record what is driven, within which limits, and who allowed torque."""
         for setup in setups(self._robots, self.settings.driver, self._armed_by):
             setup.header, setup.run = header(self._now), self._latest_run
             self.publish(topics.ROBOT_SETUP, setup)
@@ -355,7 +355,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
     # The action
 
     def _on_goal(self, goal: DeliverPulseTrain.Goal) -> bool:
-        """Schedule a train, if the robot can deliver it, and say whether it can."""
+        """Schedule a train if the robot can deliver it; return whether it can."""
         try:
             self._schedule(goal)
         except (LimitError, DeviceError, MessageError) as error:
@@ -373,32 +373,34 @@ class Perturbator(Participant, TolerantLifecycleNode):
         self.run.schedule(train, goal.key)
 
     def on_cancel(self) -> None:
-        """Bring the torque to zero now: the next horizon may be long in coming."""
+        """Bring the torque to zero now, because the next horizon may be far off."""
         self._end_torque("cancelled by the client", Result.CANCELLED)
 
     # Promises
 
     def publish(self, topic: topics.Topic, message: Any) -> None:
-        """Publish a message; the client that asked for pulses hears of each."""
+        """Publish a message; the client that requested pulses gets feedback for each."""
         super().publish(topic, message)
         if topic is topics.PULSES:
-            told = DeliverPulseTrain.Feedback(number=message.number, onset=message.header.stamp)
-            self._server.publish_feedback(told, message.side)
+            number, onset = message.number, message.header.stamp
+            feedback = DeliverPulseTrain.Feedback(number=number, onset=onset)
+            self._server.publish_feedback(feedback, message.side)
 
     def _on_horizon(self, message: Horizon) -> None:
-        """Answer a horizon with the torque up to it, promised."""
+        """Answer a horizon by promising the torque up to it."""
         robots = self._robots
         new = message.run != self._latest_run
         enabled = robots and all(robot.enabled for robot in robots.values())
         if not robots or not (enabled if new else self.run is not None):
             return
         if new and self.run is not None:
-            self.run.interrupt("another run began")
+            self.run.interrupt("another run started")
             self._armed_by = ""
         elif self.run is not None and message.seal != self.run.seal:
-            if message.seal != self._foreign_seal:  # told once
+            if message.seal != self._foreign_seal:  # report it once
                 self._foreign_seal = message.seal
-                self._report(DiagnosticStatus.WARN, "horizon ignored: not of who conducts the run")
+                what = "horizon ignored: not from the experiment that conducts the run"
+                self._report(DiagnosticStatus.WARN, what)
             return
         self._now = nanoseconds_of(message.header.stamp)
         if new:
@@ -420,14 +422,14 @@ class Perturbator(Participant, TolerantLifecycleNode):
         self._report_faults()
 
     def next_deadline(self) -> float | None:
-        """Return when a real robot is to be looked after."""
-        return self._look_at
+        """Return when to read a real robot."""
+        return self._read_at
 
     def on_deadline(self) -> None:
-        """Promise what a real robot has measured, and note its faults."""
+        """Promise what a real robot has measured, and report its faults."""
         if not self._robots:
             return
-        self._look_at = time.monotonic() + MEASURED_PERIOD
+        self._read_at = time.monotonic() + MEASURED_PERIOD
         self._require_signs_of_life()
         try:
             if self.run is not None:

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-One run of the ankle robot: answers horizons with promised torque, without a node.
+One run of the ankle robot without a node: answers horizons with promised torque.
 
-A horizon that lies no further than what is known closes the run: it is answered with a profile
-without length, after which there is no torque that could be stopped.
+A horizon that is not later than what is known closes the run. It is answered with a profile of no
+length, after which there is no torque left to stop.
 """
 
 import math
@@ -37,7 +37,7 @@ from gait_entrainment_nodes.messaging.stamps import header, to_time
 
 Result = DeliverPulseTrain.Result
 _ANY = "every operator"
-# An experiment decides 10 s ahead at most; a robot in simulated time computes what it is asked.
+# Experiments decide at most 10 s ahead; a robot in simulated time computes what is requested [s].
 _FARTHEST = 60.0
 _OPERATOR_SILENT = Fault(
     "operator_silent",
@@ -49,17 +49,17 @@ _DEADMAN_SILENT = Fault(
 
 
 class SignsOfLife:
-    """When those who have to be heard while torque may come were, on steady time [s]."""
+    """When operators and the emergency stop were last heard, on steady time [s]."""
 
     def __init__(self) -> None:
-        self._at: dict[str | None, float] = {}  # of operators, and as None the emergency stop
+        self._at: dict[str | None, float] = {}  # by operator; None: the emergency stop
 
     def hear(self, operator: str | None = None) -> None:
-        """Note a heartbeat of an operator, or, without one, a word of the emergency stop."""
+        """Note a heartbeat of an operator or, without one, a message of the emergency stop."""
         self._at[operator] = self._at[operator and _ANY] = time.monotonic()
 
     def missing(self, settings: Any, *, button_gone: bool) -> Iterator[tuple[Fault, str]]:
-        """Tell of whom no sign came in time, by the perturbator's settings: a fault, in words."""
+        """Yield a fault and its reason for each sign that is overdue by these settings."""
         if button_gone:
             yield _DEADMAN_SILENT, "a node that can press the emergency stop has ended"
         now, wanted = time.monotonic(), list(filter(None, settings.operators)) or [_ANY]
@@ -78,7 +78,7 @@ def do_with_all(
     do: Callable[[GuardedRobot], None],
     undo: Callable[[GuardedRobot], None],
 ) -> None:
-    """Do something with all robots, or, if it raises DeviceError, with none."""
+    """Call ``do`` for all robots; if it raises DeviceError, call ``undo`` for all."""
     try:
         for robot in robots.values():
             do(robot)
@@ -91,7 +91,7 @@ def do_with_all(
 def setups(
     robots: Mapping[Side, GuardedRobot], driver: str, armed_by: str
 ) -> Iterator[msg.AnkleRobotSetup]:
-    """Say of each robot what is driven, within which limits, and who allowed torque."""
+    """Yield for each robot what is driven, within which limits, and who allowed torque."""
     for side, robot in robots.items():
         proof, preflight = proof_of(driver_on(driver, side)), preflight_of(driver)
         limits = asdict(robot.limits)
@@ -111,9 +111,9 @@ class Run:
     """
     One run of the robot on each ankle, from its first horizon to its closing one.
 
-    All instants are [ns since 1970]. Torque is promised from ``start`` on, and only who has the
-    key of the ``seal`` gets pulses. ``end_train`` takes the result of each train that was
-    scheduled, and its ankle. Raises DeviceError, as most methods do, if a driver fails.
+    All times are [ns since 1970]. Torque is promised from ``start`` on, and only a client with the
+    key of the ``seal`` gets pulses. ``end_train`` takes the result of each scheduled train and its
+    ankle. Raises DeviceError, as most methods do, if a driver fails.
     """
 
     def __init__(
@@ -143,21 +143,21 @@ class Run:
 
     def schedule(self, train: PulseTrain, key: str) -> None:
         """
-        Schedule pulses that somebody with a key asks for.
+        Schedule pulses that a client with a key requests.
 
-        Raises LimitError if it is not the key of the run, or as the robot does.
+        Raises LimitError if it is not the key of the run, and what `AnkleRun.schedule` raises.
         """
         if seal_of(key) != self.seal:
-            raise LimitError("key: not that of the run; only who conducts it gets pulses")
+            raise LimitError("key: not that of the run; only its experiment gets pulses")
         if train.side not in self._ankles:
-            raise LimitError(f"side: {train.side.name.lower()}; the robot sits on the other ankle")
+            raise LimitError(f"side: {train.side.name.lower()}; the robot is on the other ankle")
         self._ankles[train.side].schedule(train)
 
     def take_horizon(self, now: int, until: int, *, last: bool) -> None:
         """
-        Promise torque up to a horizon, of which everything before ``now`` is known.
+        Promise torque up to a horizon; everything before ``now`` is known.
 
-        LimitError if it lies farther ahead than any experiment decides, and nothing is promised.
+        Raises LimitError and promises nothing if it is farther ahead than any experiment decides.
         """
         ahead = (until - min(a.robot.promised_until for a in self._ankles.values())) / 1e9
         if ahead > _FARTHEST:
@@ -171,14 +171,14 @@ class Run:
             ankle.look_after()
 
     def end_torque(self, outcome: int, reason: str, *, fault: bool = False) -> None:
-        """Bring all torque to zero now; a ``fault`` is told even if no torque was due."""
+        """Bring all torque to zero now; a ``fault`` is reported even if no torque was due."""
         for ankle in self._ankles.values():
-            ankle.robot.cancel()  # all robots first, whatever becomes of the messages
+            ankle.robot.cancel()  # all robots first, even if publishing fails
         for ankle in self._ankles.values():
             ankle.tell_end(outcome, reason, fault=fault)
 
     def interrupt(self, reason: str) -> None:
-        """End the torque; real robots must be armed again: why it was not over is to be seen."""
+        """End the torque; real robots must be armed again, as the run ended unexpectedly."""
         self.end_torque(Result.STOPPED, reason)
         for ankle in self._ankles.values():
             ankle.robot.disarm()
@@ -202,15 +202,15 @@ class AnkleRun:
         self._now = self._horizon = start
         self._last = False  # the run ends at the horizon
         self._revision = 0
-        self._committed = False  # torque may still come, of a train that was scheduled
-        # Of each train whose result is still to be told: how many pulses, and its end [ns].
+        self._committed = False  # torque of a scheduled train may still come
+        # Trains whose result has not been reported: number of pulses, and end [ns].
         self._under_way: deque[tuple[int, int]] = deque()
-        self._told = 0  # pulses delivered of those whose result has been told
+        self._reported = 0  # delivered pulses of the trains whose result has been reported
 
     @property
     def requested(self) -> int:
         """Pulses of the run that were delivered or are still to come."""
-        return self._told + sum(count for count, _ in self._under_way)
+        return self._reported + sum(count for count, _ in self._under_way)
 
     def schedule(self, train: PulseTrain) -> None:
         """Schedule pulses; raises LimitError or DeviceError if the robot refuses them."""
@@ -220,10 +220,10 @@ class AnkleRun:
 
     def take_horizon(self, now: int, until: int, *, last: bool) -> None:
         """
-        Promise torque up to a horizon, of which everything before ``now`` is known.
+        Promise torque up to a horizon; everything before ``now`` is known.
 
-        A robot in simulated time answers at once and in full. A real one knows its torque only
-        afterwards: what it has measured is promised by ``look_after``, piece by piece.
+        A robot in simulated time answers immediately and in full. A real one knows its torque only
+        afterwards: ``look_after`` promises what it has measured, piece by piece.
         """
         self._now, self._horizon, self._last = now, until, last
         self.robot.heard()
@@ -241,15 +241,15 @@ class AnkleRun:
         """Promise what a real robot has measured since."""
         if self.robot.promised_until < self._horizon:
             self._deliver()
-        else:  # the next horizon is late, and every state belongs to the record
+        else:  # the next horizon is late, but the record must have every state
             for state in self.robot.read():
                 self._publish_state(state)
 
     def tell_end(self, outcome: int, reason: str, *, fault: bool = False) -> None:
         """
-        Tell whoever asked for torque, and the walker, that it is zero now, whatever was promised.
+        Report to client and walker that the torque is zero now, whatever was promised.
 
-        A ``fault`` is told the walker even if no torque was due.
+        A ``fault`` is reported to the walker even if no torque was due.
         """
         self._end_trains(outcome, reason)
         if self._committed or fault:
@@ -261,7 +261,7 @@ class AnkleRun:
     def _deliver(self) -> None:
         robot = self.robot
         first, train = robot.delivered, robot.train
-        # A horizon that goes back takes back no promise.
+        # An earlier horizon revokes no promise.
         profile = robot.promise(max(self._horizon, robot.promised_until))
         states = robot.read()
         if profile.valid_until > profile.times[0]:
@@ -276,11 +276,11 @@ class AnkleRun:
             self._end_trains(Result.DELIVERED, "every pulse was delivered", robot.promised_until)
 
     def _end_trains(self, outcome: int, message: str, until: float = math.inf) -> None:
-        """Tell the result of each train that is over at an instant [ns]; without one, of all."""
+        """Report the result of each train that is over at ``until`` [ns], by default of all."""
         while self._under_way and self._under_way[0][1] <= until:
             count, _ = self._under_way.popleft()
-            delivered = min(self.robot.delivered - self._told, count)
-            self._told += delivered
+            delivered = min(self.robot.delivered - self._reported, count)
+            self._reported += delivered
             result = Result(outcome=outcome, message=message, delivered=delivered)
             self._train_ended(result, self.robot.side)
 

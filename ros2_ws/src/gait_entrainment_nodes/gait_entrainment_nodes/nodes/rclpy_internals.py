@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What the nodes need of rclpy and rclpy does not offer: written for rclpy 7.1, that of ROS 2 Jazzy.
+What the nodes need and rclpy does not offer, written for rclpy 7.1 of ROS 2 Jazzy.
 
-Three things: which parameters a node was started with, a lifecycle node that survives a request
-for a transition that its present state does not have, and subscriptions without an executor.
+Three things: the parameters that a node was started with, a lifecycle node that survives a request
+for a transition that its current state does not have, and subscriptions without an executor.
 """
 
 from typing import Any
@@ -18,7 +18,7 @@ from rclpy.type_support import check_is_valid_msg_type
 
 _CHANGE_STATE = "_LifecycleNodeMixin__on_change_state"
 _OVERRIDES = "_parameter_overrides"
-_FITS = "this rclpy is not that of ROS 2 Jazzy (7.1): it has no {}; see nodes/rclpy_internals.py"
+_FITS = "this is not rclpy 7.1 of ROS 2 Jazzy: it has no {}; see nodes/rclpy_internals.py"
 
 
 def given_parameters(node: Node) -> dict[str, Any]:
@@ -31,7 +31,7 @@ def given_parameters(node: Node) -> dict[str, Any]:
 
 class TolerantLifecycleNode(LifecycleNode):
     """
-    A lifecycle node that refuses a transition that its present state does not have.
+    A lifecycle node that refuses a transition that its current state does not have.
 
     In rclpy 7.1 such a request raises an exception, which would end the node.
     """
@@ -51,10 +51,10 @@ class TolerantLifecycleNode(LifecycleNode):
 
 class RawReader:
     """
-    A subscription whose messages, as bytes, wait until they are taken.
+    A subscription whose messages wait, as bytes, until they are taken.
 
-    To take a message costs a third of what the executor needs to hand it on, and nobody is woken
-    for it. It is for a node that takes many and need not know of each at once.
+    Taking a message costs a third of what the executor needs to deliver it, and does not wake the
+    process. It is for a node that takes many messages and need not see each one immediately.
     """
 
     def __init__(self, node: Node, message_type: Any, topic: str, qos: QoSProfile) -> None:
@@ -66,7 +66,7 @@ class RawReader:
         self._type = message_type
 
     def take(self, most: int) -> list[tuple[int, bytes]]:
-        """Return up to so many messages, each behind the wall time [ns] at which it came."""
+        """Return at most ``most`` messages, each as (wall time of its arrival [ns], bytes)."""
         take, message_type = self._subscription.take_message, self._type
         taken: list[tuple[int, bytes]] = []
         while len(taken) < most and (message := take(message_type, True)) is not None:

@@ -4,10 +4,10 @@
 """
 sensor_sim: the simulated walker as sensors see it, for the rehearsal of an experiment on a person.
 
-The walker of walker_sim, its steps unnumbered: what emulated sensors on both feet would measure is
-published as a person's sensors would publish it, a device's buffer at a time. The exact events go
-to `truth/gait_events`. It begins to walk when the first torque profile of a run comes, as a person
-does when told to.
+The walker is that of walker_sim, without its step numbers: the node publishes what emulated
+sensors on both feet measure as a person's sensors would, one device buffer at a time. The exact
+events go to `truth/gait_events`. The walk starts when the first torque profile of a run arrives,
+as a person starts when asked to.
 """
 
 from dataclasses import dataclass
@@ -33,10 +33,10 @@ class SensorSettings:
 
     sensor: str = setting(
         "treadmill_force",
-        "emulated sensor on both feet, KIND or KIND:OPTION=VALUE,... of " + ", ".join(KINDS),
+        "emulated sensor on both feet, KIND or KIND:OPTION=VALUE,...; kinds: " + ", ".join(KINDS),
     )
     buffer: float = setting(
-        0.002, "real time: for how long the device holds samples back", "s", (5e-4, 0.1)
+        0.002, "real time: how long the device holds back samples", "s", (5e-4, 0.1)
     )
 
 
@@ -59,11 +59,11 @@ class SensedWalk(WalkerRun):
 
     @property
     def next_sample(self) -> int:
-        """When a sample of the walker is due next, or the device sends its buffer [ns]."""
+        """When the next sample of the walker is due or the device sends its buffer [ns]."""
         return min(super().next_sample, (self.reached // self._buffer + 1) * self._buffer)
 
     def advance(self, until: int, last: bool = False) -> Measured:
-        """See `WalkerRun`; the stretch holds what the sensors measured, too."""
+        """See `WalkerRun`; the stretch also holds what the sensors measured."""
         stretch = super().advance(until, last)
         events = [GaitEvent(t.stamp, t.kind, t.side, t.step) for t in stretch.transitions]
         measured = []
@@ -90,7 +90,7 @@ class SensorSim(WalkerSim):
         self._sampled += [self.offer(topic) for topic in topics.sensor_topics(source)]
 
     def offer_start(self) -> None:
-        """Offer nothing: who is sensed is not asked to start, gait_detector is."""
+        """Offer nothing: the request to start goes to gait_detector."""
 
     def new_walk(self, kind: type[WalkerRun] = SensedWalk, **more: Any) -> WalkerRun:
         """Return a walk with sensors."""
@@ -99,14 +99,14 @@ class SensorSim(WalkerSim):
         return super().new_walk(kind, sensors=sensors, buffer=self.sensors.buffer, **more)
 
     def run_of(self, message: Any) -> Run | None:
-        """Return the run of a message; the first torque profile of a run begins it."""
+        """Return the run of a message; the first torque profile of a run starts it."""
         begins = isinstance(message, msg.TorqueProfile) and not (message.revision or message.stop)
         if begins and self.run is None and (self._walked is None or self.settings.real_time):
             self.run = self.new_run(message.run, nanoseconds_of(message.header.stamp))
         return super().run_of(message)  # type: ignore[no-any-return]
 
     def serialized(self, run: Run, stretch: Stretch) -> list[list[bytes]]:
-        """Return the messages of the walker, and behind them those of the sensors."""
+        """Return the messages of the walker, followed by those of the sensors."""
         assert isinstance(stretch, Measured)
         walkers = len(self._sampled) - len(self._writers)
         messages = super().serialized(run, stretch) or [[] for _ in range(walkers)]
@@ -115,7 +115,7 @@ class SensorSim(WalkerSim):
         return messages
 
     def send_progress(self, run: Run, progress: msg.Progress) -> None:
-        """Publish progress: of the sensors' messages it says how many there were on all topics."""
+        """Publish progress; ``samples`` counts the sensors' messages on all topics together."""
         assert isinstance(run.walker, SensedWalk)
         progress.samples = run.walker.readings
         super().send_progress(run, progress)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The perturbator's end of the stop channel: a thread that no executor can hold up."""
+"""The perturbator's end of the stop channel: a thread that no executor can block."""
 
 import select
 import threading
@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 from gait_entrainment_drivers.stop_channel import StopAnswer, StopListener
 
-# How often the thread looks whether it is to end [s].
+# How often the thread checks whether to end [s].
 _PERIOD = 0.2
 
 
@@ -18,7 +18,7 @@ class StopThread:
     Calls ``stop`` at every request, and answers with what that returns.
 
     ``stop`` is called from this thread. A robot that is driven by a torque loop listens by itself
-    (torque_loop.py) and says what is measured; this one vouches for the node.
+    (torque_loop.py) and reports what it measures; this thread answers for the node.
     """
 
     def __init__(self, name: str, stop: Callable[[], StopAnswer]) -> None:
@@ -28,7 +28,7 @@ class StopThread:
         self._thread.start()
 
     def close(self) -> None:
-        """Listen no more."""
+        """Stop listening."""
         self._ending.set()
         self._thread.join()
         self._listener.close()
@@ -36,5 +36,5 @@ class StopThread:
     def _listen(self) -> None:
         while not self._ending.is_set():
             if select.select([self._listener], [], [], _PERIOD)[0]:
-                askers = self._listener.requests()
-                self._listener.answer(askers, self._stop())
+                requests = self._listener.requests()
+                self._listener.answer(requests, self._stop())

@@ -4,7 +4,7 @@
 """
 Waiting for conditions in a coroutine of a node, on steady time.
 
-The node's loop resumes the coroutine, once a condition holds or its time is over: rclpy's executor
+The node's loop resumes the coroutine once a condition holds or has timed out. rclpy's executor
 would resume it over and over for as long as it waits, and keep a processor busy.
 """
 
@@ -14,15 +14,15 @@ import types
 from collections.abc import Callable, Coroutine, Generator
 from typing import Any
 
-# How often waiting is looked after [s].
+# How often to check what is waited for [s].
 TICK = 0.02
-# A tick that is late by this share of the longest silence shows that this process was held up:
-# nobody else is to blame for it.
+# A tick that is late by this share of the longest silence shows that this process was held up, so
+# no other node is to blame.
 HELD_UP = 1 / 3
 
 
 class Waiting:
-    """What a coroutine of a node waits for; the node's loop looks after it at every deadline."""
+    """What a coroutine of a node waits for; the node's loop checks it at every deadline."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
@@ -33,16 +33,16 @@ class Waiting:
 
     @property
     def busy(self) -> bool:
-        """Whether a coroutine has begun and not ended."""
+        """Whether a coroutine has started and not ended."""
         return self._coroutine is not None
 
     @property
     def deadline(self) -> float:
-        """The steady time [s] at which to look after it: a tick, or now if a condition holds."""
+        """The steady time [s] of the next check: a tick, or now if the condition holds."""
         return min(self._tick_at, self._clock()) if self._condition() else self._tick_at
 
     def begin(self, coroutine: Coroutine[Any, Any, None]) -> None:
-        """Run a coroutine that waits here only; one at a time."""
+        """Run a coroutine that waits only here; one at a time."""
         assert not self.busy
         self._coroutine = coroutine
         self._tick_at = self._clock()
@@ -53,7 +53,7 @@ class Waiting:
         timeout: float = math.inf,
         overdue: Exception | None = None,
     ) -> None:
-        """Wait until a condition holds, at most for a time [s]; then raise what is overdue."""
+        """Wait until a condition holds; after ``timeout`` [s] raise ``overdue``, if given."""
         self._condition, self._give_up = condition, self._clock() + timeout
         try:
             while not condition():
@@ -67,15 +67,15 @@ class Waiting:
 
     @types.coroutine
     def tick(self) -> Generator[None, None, None]:
-        """Wait until the node's loop comes by again."""
+        """Wait for the next check by the node's loop."""
         yield
 
     def look_after(self, silence: float) -> bool:
         """
-        Go on with what is due, when others may be silent for a time [s].
+        Resume the coroutine, if other nodes may be silent for at most a time [s].
 
-        Returns whether this process was held up: then all waiting begins anew, since what arrived
-        meanwhile has not been heard yet.
+        Returns whether this process was held up. The timeout is then extended, because what
+        arrived in the meantime has not been read yet.
         """
         now = self._clock()
         late, self._tick_at = now - self._tick_at, now + TICK

@@ -4,13 +4,13 @@
 """
 walker_display: the walker as RViz and Foxglove show it.
 
-A node of its own that only looks on: it draws a simulated walk, a replayed one or a person's in
-the same way, and nothing waits for it. The body is the robot description moved by transforms;
-markers show the torque at each ankle, and the pulse while it lasts. Where the body is in the
-world follows from the joint angles.
+A separate node that only listens: it draws a simulated walk, a replayed one and a person's in the
+same way, and nothing waits for it. The body is the robot description, moved by transforms. Markers
+show the torque at each ankle, and the pulse while it lasts. The position of the body in the world
+follows from the joint angles.
 
-An arc at the ankle is a torque, plantarflexion clockwise seen from the right: the inner one is
-the leg's own spring, the outer one, from the tip of the inner one on, is the ankle robot. The
+An arc at the ankle is a torque; plantarflexion is clockwise seen from the right. The inner arc is
+the leg's own spring, the outer one, which starts at the tip of the inner one, the ankle robot. The
 robot's arc and the ball at the ankle are red while its torque acts and grey while it does not.
 """
 
@@ -35,14 +35,14 @@ from gait_entrainment_nodes.messaging.environment import PACKAGE, shared_file
 from gait_entrainment_nodes.nodes.footing import Footing
 from gait_entrainment_nodes.nodes.participant import Participant
 
-WORLD = "world"  # of the ground reactions too; shared by all walkers, so without a prefix
+WORLD = "world"  # also of the ground reactions; shared by all walkers, so without a prefix
 PREFIXES = ("l_", "r_")  # of joints and frames, by side
-HIP_WIDTH = 0.2  # so that both legs are seen; the model has none [m]
-# Behind four bytes that name the encoding every sampled message begins with its stamp.
+HIP_WIDTH = 0.2  # makes both legs visible; the model has no width [m]
+# Every sampled message starts with its stamp, after four bytes that name the encoding.
 _STAMP = struct.Struct("<4xiI")
-# Inner and outer arc, and how far outside of the leg they are drawn [m].
+# Radii of the inner and outer arc, and how far outside of the leg they are drawn [m].
 SPRING_RADIUS, ROBOT_RADIUS, OUTSIDE = 0.18, 0.26, 0.06
-ARC_STEP = math.pi / 30  # of the lines that make an arc
+ARC_STEP = math.pi / 30  # between the points of an arc [rad]
 SPRING = ColorRGBA(r=0.1, g=0.6, b=0.2, a=1.0)
 ACTING = ColorRGBA(r=0.9, g=0.1, b=0.1, a=1.0)
 WITHOUT_EFFECT = ColorRGBA(r=0.5, g=0.5, b=0.5, a=1.0)
@@ -56,10 +56,10 @@ class Settings:
     foot_length: float = setting(0.2, "foot length", "m", (0.01, 10.0))
     rate: float = setting(50.0, "pictures per second", "Hz", (10.0, 1000.0))
     torque_scale: float = setting(0.035, "angle of an arc per torque", "rad/(N m)", (0.0, 1.0))
-    frame_prefix: str = setting("", "of every frame but world, such as walker_1/")
+    frame_prefix: str = setting("", "prefix of every frame except world, such as walker_1/")
     robot_state: bool = setting(
         True,
-        "send robot_description and the joints' transforms; false beside a robot_state_publisher",
+        "publish robot_description and leg transforms; false with a robot_state_publisher",
     )
 
 
@@ -89,12 +89,12 @@ class WalkerDisplay(Participant):
         self._look_on(topics.ANKLE_TORQUE, self._on_ankle_torque)
 
     def _look_on(self, topic: topics.Topic, draw: Any) -> None:
-        """Draw from a sampled topic, one message for each picture that is due."""
+        """Draw one message of a sampled topic for each picture that is due."""
         latest = -1
 
         def take(data: bytes) -> None:
-            # Most messages are left out, before they are decoded. Pictures are counted by their
-            # stamps, so that body and torque are drawn at the same instants.
+            # Most messages are skipped without decoding them. Pictures are counted by stamp, so
+            # that body and torque are drawn for the same times.
             nonlocal latest
             seconds, nanoseconds = _STAMP.unpack_from(data)
             picture = (seconds * NANOSECONDS_PER_SECOND + nanoseconds) // self._period
@@ -110,9 +110,9 @@ class WalkerDisplay(Participant):
         try:
             hips, ankles = ([angles[p + joint] for p in PREFIXES] for joint in ("hip", "ankle"))
         except KeyError:
-            return  # of other joints: the topic is everybody's
+            return  # other joints: any node may publish this topic
         if not all(map(math.isfinite, (*hips, *ankles))):
-            return  # the place of the next picture would follow from it
+            return  # they would spoil the position in all later pictures
         x, z = self._footing.place(hips, ankles)
         places = [
             (WORLD, "base_footprint", (x, 0.0, 0.0), 0.0),
@@ -137,13 +137,13 @@ class WalkerDisplay(Participant):
         place: tuple[float, float, float],
         turn: float,
     ) -> TransformStamped:
-        """Return the transform of a frame that is turned about y [rad] in its parent."""
-        found = TransformStamped(child_frame_id=self._frame(child))
-        found.header.stamp, found.header.frame_id = message.header.stamp, self._frame(parent)
+        """Return the transform of a frame that is rotated about y [rad] in its parent."""
+        stamped = TransformStamped(child_frame_id=self._frame(child))
+        stamped.header.stamp, stamped.header.frame_id = message.header.stamp, self._frame(parent)
         x, y, z = place
-        found.transform.translation = Vector3(x=x, y=y, z=z)
-        found.transform.rotation = Quaternion(y=math.sin(turn / 2), w=math.cos(turn / 2))
-        return found
+        stamped.transform.translation = Vector3(x=x, y=y, z=z)
+        stamped.transform.rotation = Quaternion(y=math.sin(turn / 2), w=math.cos(turn / 2))
+        return stamped
 
     def _on_ankle_torque(self, message: AnkleTorque) -> None:
         """Draw the torque at both ankles, each in the frame of its leg."""
@@ -163,7 +163,7 @@ class WalkerDisplay(Participant):
         self.publish(topics.MARKERS, MarkerArray(markers=markers))
 
     def _marker(self, message: AnkleTorque, side: Side, name: str, color: ColorRGBA) -> Marker:
-        """Return a marker at an ankle, as its leg is turned."""
+        """Return a marker at an ankle, in the frame of its leg."""
         marker = Marker(ns=name, id=side, color=color)
         marker.header.stamp = message.header.stamp
         marker.header.frame_id = self._frame(PREFIXES[side] + "leg")
@@ -178,15 +178,15 @@ class WalkerDisplay(Participant):
 
 def draw_arc(marker: Marker, radius: float, begin: float, end: float) -> None:
     """
-    Make a marker an arc with an arrowhead, or nothing where it has no length, or none that is one.
+    Make a marker an arc with an arrowhead, or delete it if its length is zero or not finite.
 
-    Angles [rad] go about y from z, the direction of the leg, to x, forward.
+    Angles [rad] are about y, from z, the direction of the leg, to x, forward.
     """
     marker.type, marker.scale.x = Marker.LINE_STRIP, 0.02
     if begin == end or not math.isfinite(end - begin):
         marker.action = Marker.DELETE
         return
-    end = min(max(end, begin - math.tau), begin + math.tau)  # a whole turn is more than enough
+    end = min(max(end, begin - math.tau), begin + math.tau)  # a full turn is more than enough
 
     def point(angle: float, distance: float) -> Point:
         return Point(x=distance * math.sin(angle), z=distance * math.cos(angle))

@@ -4,9 +4,9 @@
 """
 walker_sim: the simulated walker, in lock-step or in real time.
 
-How far it walks is decided in walker_sim_run.py. In lock-step simulated time begins at a fixed
-instant and the node publishes /clock; in real time the instant t is sent at wall time t plus a
-fixed delay.
+walker_sim_run.py decides how far it walks. In lock-step simulated time starts at a fixed time and
+the node publishes /clock. In real time what happens at time t is sent at wall time t plus a fixed
+delay.
 """
 
 import time
@@ -40,19 +40,19 @@ JOINTS = ["l_hip", "r_hip", "l_ankle", "r_ankle"]
 
 @dataclass(frozen=True)
 class Settings:
-    """Parameters of the node, beside those of the walker."""
+    """Parameters of the node, in addition to those of the walker."""
 
     seed: int = setting(0, "seed of the variation", "1", (0, 2**32 - 1))
     first_heel_strike: Side = setting(Side.RIGHT, "leg of heel strike 0: left or right")
     sample_rate: float = setting(
-        200.0, "rate of the sampled topics; 0 samples at gait events only", "Hz", (0.0, 1000.0)
+        200.0, "rate of the sampled topics; 0: only at gait events", "Hz", (0.0, 1000.0)
     )
-    real_time: bool = setting(False, "pace by the wall clock")
+    real_time: bool = setting(False, "walk at the pace of the wall clock")
     presentation_delay: float = setting(
-        0.0, "real time: wall time minus the instant that is sent", "s", (0.0, 1.0)
+        0.0, "real time: wall time of sending minus the stamp", "s", (0.0, 1.0)
     )
-    acknowledged: bool = setting(False, "lock-step: keep to what a recorder has acknowledged")
-    both_ankles: bool = setting(False, "whether torque comes for both ankles")
+    acknowledged: bool = setting(False, "lock-step: wait for the recorder's acknowledgements")
+    both_ankles: bool = setting(False, "whether both ankles get torque")
     ground_reaction: bool = setting(True, "publish the ground reaction forces")
 
 
@@ -61,10 +61,10 @@ class WalkerSim(Participant):
 
     settings: Settings
     priority = PUNCTUAL
-    walker: WalkerParameters  # the next run begins with it
+    walker: WalkerParameters  # the next run starts with it
     variation: Variation
     run: Run | None
-    # What it says of its gait, and in which role.
+    # Where it publishes its gait, which depends on its role.
     events_topic, progress_topic = topics.GAIT_EVENTS, topics.WALKER_PROGRESS
 
     def __init__(self, name: str = "walker_sim", **more_settings: type) -> None:
@@ -92,7 +92,7 @@ class WalkerSim(Participant):
         self._torques = MessageTemplate(msg.AnkleTorque(), of_ankles)
         on_foot = WrenchStamped(header=Header(frame_id="world"))
         self._force = MessageTemplate(on_foot, {"wrench.force.x": 3})
-        # A step ahead of time loads the compiled kernels, which a run must not wait for.
+        # A step in advance loads the compiled kernels, for which a run must not wait.
         WalkerRun(self.walker, Side.RIGHT, 100.0).advance(NANOSECONDS_PER_SECOND)
         self.subscribe_to_run(topics.TORQUE_PROFILE, self._on_profile)
         if self.settings.acknowledged and not self.settings.real_time:
@@ -100,7 +100,7 @@ class WalkerSim(Participant):
         self.offer_start()
 
     def offer_start(self) -> None:
-        """Offer what the role of the walker owes."""
+        """Offer the services of the walker's role."""
         self.create_service(StartRun, "walker/start", self._on_start)
         self.create_service(Trigger, "walker/reset", self._on_reset)
 
@@ -114,12 +114,12 @@ class WalkerSim(Participant):
         else:
             start = time.time_ns() + START_DELAY if self.settings.real_time else LOCK_STEP_START
             self.run = self.new_run(request.run, start)
-            self.note_state(DiagnosticStatus.OK, f"run {request.run} goes on")
+            self.note_state(DiagnosticStatus.OK, f"run {request.run} is in progress")
             response.success, response.start = True, to_time(self.run.start)
         return response
 
     def new_run(self, number: int, start: int) -> Run:
-        """Return a run with heel strike 0 at an instant [ns since 1970]."""
+        """Return a run with heel strike 0 at ``start`` [ns since 1970]."""
         walker = self.new_walk()
         if not self.settings.real_time:
             return LockStepRun(number, walker, start, acknowledged=self.settings.acknowledged)
@@ -129,7 +129,7 @@ class WalkerSim(Participant):
         return RealTimeRun(number, walker, start, due_at=due_at)
 
     def new_walk(self, kind: type[WalkerRun] = WalkerRun, **more: Any) -> WalkerRun:
-        """Return the walk of a run, of a kind that may take ``more``."""
+        """Return the walk of a run; ``more`` are further arguments of its ``kind``."""
         settings = self.settings
         return kind(
             self.walker,
@@ -154,22 +154,22 @@ class WalkerSim(Participant):
         return response
 
     def _on_profile(self, run: Run, message: msg.TorqueProfile) -> None:
-        """Take what the robot promises to deliver, or its stop."""
+        """Take the torque that the robot promises, or its stop."""
         stop = stop_of(message, run.start)
         if stop is not None:
             run.stop(stop)
             return
         try:
             late = run.promise(profile_of(message, run.start), message.last)
-        except MessageError as error:  # of somebody else; the robot's own is missed by the next
+        except MessageError as error:  # another node's; if the robot's, the next does not adjoin
             self.diagnose(run.stamp, DiagnosticStatus.WARN, f"a message is dropped: {error}")
             return
         except ValueError as error:
-            told = f"torque profile {message.revision} cannot be walked: {error}"
-            self.failure = "; ".join(filter(None, (told, self.rivals(topics.TORQUE_PROFILE))))
+            reason = f"torque profile {message.revision} cannot be walked: {error}"
+            self.failure = "; ".join(filter(None, (reason, self.rivals(topics.TORQUE_PROFILE))))
             return
         if late:
-            what = "a torque profile came after its instant: that part of it was not walked"
+            what = "a torque profile arrived too late: the late part of it was not walked"
             self.diagnose(run.stamp, DiagnosticStatus.WARN, what, late_ms=late / 1e6)
 
     def next_deadline(self) -> float | None:
@@ -177,7 +177,7 @@ class WalkerSim(Participant):
         return None if self.run is None else self.run.due()
 
     def on_deadline(self) -> None:
-        """Walk as far as is allowed and send what comes of it."""
+        """Walk as far as is allowed and publish the outcome."""
         run = self.run
         assert run is not None
         for walked in run.walk():
@@ -188,17 +188,14 @@ class WalkerSim(Participant):
                 for publisher, messages in zip(self._sampled, samples, strict=False):
                     publisher.publish_all(messages)
             elif isinstance(walked, Starved):
-                what = (
-                    "no torque profile in time: from here to the next one it is walked without "
-                    "torque"
-                )
+                what = "no torque profile in time: walking without torque until the next one"
                 starved = walked.length / 1e6
                 self.diagnose(run.stamp, DiagnosticStatus.WARN, what, starved_ms=starved)
             else:
                 self.send_progress(run, walked)
 
     def on_stop(self) -> None:
-        """End of the process: say so if a run goes on."""
+        """Report the end of the process if a run is in progress."""
         if self.run is not None:
             self.send_progress(self.run, self.run.progress(aborted=True))
 

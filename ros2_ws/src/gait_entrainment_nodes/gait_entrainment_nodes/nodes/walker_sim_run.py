@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-One run of the simulated walker: takes promises, yields what is to be published, without a node.
+One run of the simulated walker without a node: takes promises, yields what to publish.
 
 It never computes past the last promise of the perturbator. In lock-step every promised stretch is
-walked at once; in real time as the wall clock goes on, a moment ahead of it where torque is
+walked at once; in real time as the wall clock advances, slightly ahead of it if torque is
 promised. A stretch for which no promise came in time is walked without torque and counted.
 """
 
@@ -25,23 +25,23 @@ from gait_entrainment_nodes.nodes.walker_run import Stretch, WalkerRun
 # Grants that may be sent before the recorder has acknowledged the first of them: two let it
 # write one while the next is computed.
 UNACKNOWLEDGED_GRANTS = 2
-# Real time: so long before it is due what is promised is walked and made ready to be sent [ns]. A
-# stop that comes meanwhile ends the torque at the end of what has been walked.
+# Real time: how long before it is due a promised stretch is walked and made ready to send [ns]. A
+# stop in between ends the torque at the end of what has been walked.
 HEAD_START = 1_000_000
 
 
 @dataclass(frozen=True)
 class Starved:
-    """A stretch without a promise has begun, to be walked without torque: so much so far [ns]."""
+    """The start of a stretch without a promise, walked without torque; its length so far [ns]."""
 
     length: int
 
 
 class _Account:
     """
-    What both kinds of run share: the account of one run.
+    What both kinds of run share: the figures of one run.
 
-    ``start`` is the stamp of heel strike 0 [ns since 1970], from which all other instants count.
+    ``start`` is the stamp of heel strike 0 [ns since 1970], from which all other times count.
     """
 
     def __init__(self, number: int, walker: WalkerRun, start: int) -> None:
@@ -50,30 +50,30 @@ class _Account:
         self.grant = 0  # number of the next progress report
         self.reproducible = True
         self.late_stretches = self.starved_stretches = 0
-        self._heard: set[Side] = set()  # ankles of which a promise is here, see _all_here
+        self._heard: set[Side] = set()  # ankles whose promise has arrived, see _all_arrived
 
     @property
     def stamp(self) -> int:
-        """How far everything has been walked [ns since 1970]."""
+        """Time up to which everything has been walked [ns since 1970]."""
         return self.start + self.walker.reached
 
     def _accept(self, profile: TorqueProfile) -> int:
-        """Take a promise; return how much of it came too late [ns], and count that."""
+        """Take a promise; return how much of it arrived too late [ns], and count that."""
         late = self.walker.accept(profile)
         if late:
             self.late_stretches += 1
             self.reproducible = False
         return late
 
-    def _all_here(self, profile: TorqueProfile) -> bool:
-        """Whether with a promise of one ankle those of all ankles are here; begins anew then."""
+    def _all_arrived(self, profile: TorqueProfile) -> bool:
+        """Note a promise; return whether those of all ankles have arrived, and then start over."""
         self._heard.add(profile.side)
-        if all_here := len(self._heard) >= self.walker.ankles:
+        if all_arrived := len(self._heard) >= self.walker.ankles:
             self._heard.clear()
-        return all_here
+        return all_arrived
 
     def stop(self, instant: int) -> None:
-        """End all torque at an instant, or now if that is over."""
+        """End all torque at a time, or now if that is past."""
         self.walker.stop(instant)
         self.reproducible = False
 
@@ -100,7 +100,7 @@ class _Account:
         )
 
     def timing(self) -> WalkerTiming:
-        """Say how well the run kept time."""
+        """Report how well the run kept time."""
         return WalkerTiming(
             header=header(self.stamp),
             run=self.number,
@@ -116,7 +116,7 @@ class _Account:
 
 
 class LockStepRun(_Account):
-    """Walks every promised stretch at once, ``acknowledged``: as far as a recorder keeps up."""
+    """Walks promised stretches at once; if ``acknowledged``, as far as a recorder keeps up."""
 
     def __init__(self, *of_run: Any, acknowledged: bool) -> None:
         super().__init__(*of_run)
@@ -126,17 +126,17 @@ class LockStepRun(_Account):
 
     def promise(self, profile: TorqueProfile, last: bool) -> int:
         """
-        Take a promise, the last of which ends the run; return how much of it came too late [ns].
+        Take a promise, the last of which ends the run; return how much arrived too late [ns].
 
         Raises ValueError if the promise before it is missing.
         """
         late = self._accept(profile)
-        if self._all_here(profile):
+        if self._all_arrived(profile):
             self._promised.append((profile.valid_until, last))
         return late
 
     def acknowledge(self, progress: Progress) -> None:
-        """Take the recorder's word that it holds everything up to a grant."""
+        """Note that the recorder has everything up to a grant."""
         self._acknowledged = progress.grant + 1
 
     def due(self) -> float | None:
@@ -145,10 +145,10 @@ class LockStepRun(_Account):
         return 0.0 if self._promised and not (ahead or self.walker.ended) else None
 
     def wait(self) -> None:
-        """Do not wait: what was yielded is published at once."""
+        """Do not wait: what was yielded is published immediately."""
 
     def walk(self) -> Iterator[Stretch | Progress]:
-        """Walk as far as is allowed; what is yielded is published before the next is made."""
+        """Walk as far as is allowed; publish each result before asking for the next."""
         while self.due() is not None:
             until, last = self._promised.popleft()
             yield self.walker.advance(max(until, self.walker.reached), last=last)
@@ -156,22 +156,22 @@ class LockStepRun(_Account):
 
 
 class RealTimeRun(_Account):
-    """Walks as time goes on: instant 0 is due at ``due_at`` [ns] of the steady ``clock``."""
+    """Walks as time passes: time 0 is due at ``due_at`` [ns] of the steady ``clock``."""
 
     def __init__(
         self, *of_run: Any, due_at: int, clock: Callable[[], int] = time.monotonic_ns
     ) -> None:
         super().__init__(*of_run)
         self._due_at, self._clock = due_at, clock
-        self._end: int | None = None  # of the run, once the last promise is here
+        self._end: int | None = None  # of the run, once the last promise has arrived
         self._starving = False  # the stretch walked last had no promise
         self._next_progress = 0
 
     def promise(self, profile: TorqueProfile, last: bool) -> int:
         """See `LockStepRun`."""
         late = self._accept(profile)
-        # If the last promise comes late, its end is already past.
-        ends = last and self._all_here(profile)
+        # If the last promise is late, its end is already past.
+        ends = last and self._all_arrived(profile)
         self._end = max(profile.valid_until, self.walker.reached) if ends else None
         return late
 
@@ -183,7 +183,7 @@ class RealTimeRun(_Account):
 
     @property
     def _ready(self) -> int:
-        """When the walk up to that may begin [ns since the start of the run]."""
+        """When the walk up to ``_next`` may start [ns since the start of the run]."""
         return self._next - (HEAD_START if self.walker.promised > self._next else 0)
 
     def due(self) -> float:
@@ -196,13 +196,13 @@ class RealTimeRun(_Account):
         time.sleep(max(early, 0) / NANOSECONDS_PER_SECOND)
 
     def walk(self) -> Iterator[Stretch | Starved | Progress]:
-        """Walk as far as is allowed now; what is yielded is published before the next is made."""
+        """Walk as far as is allowed now; publish each result before asking for the next."""
         now = self._clock() - self._due_at
         if now < self._ready:
             return
         last = self._end is not None and now >= self._end
         starved = self.walker.starved
-        # A sample is part of the stretch that goes on behind it.
+        # A sample is part of a stretch only if that continues past it.
         until = now if now >= self._next else self._next + 1
         stretch = self.walker.advance(
             until if self._end is None else min(until, self._end), last=last
