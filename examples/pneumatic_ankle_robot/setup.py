@@ -8,7 +8,7 @@ NAME = "pneumatic_ankle_robot"
 setup(
     name=NAME,
     version="0.1.0",
-    description="Example of an ankle robot driver in a package of its own",
+    description="Example of an ankle robot driver in its own package",
     author="The gait_entrainment authors",
     license="Apache-2.0",
     packages=[NAME],
@@ -17,9 +17,9 @@ setup(
         ("share/" + NAME, ["package.xml"]),
     ],
     install_requires=["setuptools"],
-    extras_require={"test": ["pytest"]},  # so that colcon test runs pytest
+    extras_require={"test": ["pytest"]},  # makes colcon test run pytest
     zip_safe=False,
-    # This line is all that gait_entrainment needs to find the driver.
+    # gait_entrainment finds the driver by this line alone.
     entry_points={
         "gait_entrainment.drivers": [f"pneumatic = {NAME}.pneumatic:PneumaticAnkleRobot"]
     },

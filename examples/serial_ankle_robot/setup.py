@@ -17,11 +17,11 @@ setup(
         ("share/" + NAME, ["package.xml"]),
     ],
     install_requires=["setuptools", "pyserial"],
-    extras_require={"test": ["pytest"]},  # so that colcon test runs pytest
+    extras_require={"test": ["pytest"]},  # makes colcon test run pytest
     zip_safe=False,
     entry_points={
         "console_scripts": [f"serial_ankle_emulator = {NAME}.emulator:main"],
-        # This line is all that gait_entrainment needs to find the driver.
+        # gait_entrainment finds the driver by this line alone.
         "gait_entrainment.drivers": [f"serial = {NAME}.driver:SerialAnkleRobot"],
     },
 )

@@ -1,4 +1,4 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Example of an ankle robot driver in a package of its own."""
+"""Example of an ankle robot driver in its own package."""

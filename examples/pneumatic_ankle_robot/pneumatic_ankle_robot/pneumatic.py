@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-A simulated pneumatic ankle robot: torque rises and falls evenly as its muscle fills and empties.
+A simulated pneumatic ankle robot: torque rises and falls linearly as its muscle fills and empties.
 
-Read it beside the contract in ``gait_entrainment.robot.AnkleRobot``. A real one would open its
-valves in ``schedule`` and report its pressure sensor in ``promise`` and ``read``.
+Read it alongside the contract in ``gait_entrainment.robot.AnkleRobot``. A real robot would open
+its valves in ``schedule`` and report its pressure sensor in ``promise`` and ``read``.
 """
 
 from collections.abc import Iterator, Sequence
@@ -27,9 +27,9 @@ STEP = 1_000_000  # of the simulation [ns]
 
 @dataclass(frozen=True)
 class PneumaticOptions:
-    """What a user can choose: pneumatic:filling=0.02."""
+    """Options of the robot, as in pneumatic:filling=0.02."""
 
-    filling: float = setting(0.01, "time in which the muscle fills", "s", (0.001, 0.1))
+    filling: float = setting(0.01, "time to fill the muscle", "s", (0.001, 0.1))
 
 
 class PneumaticAnkleRobot(AnkleRobot):
@@ -54,11 +54,11 @@ class PneumaticAnkleRobot(AnkleRobot):
         self._states: list[RobotState] = []
 
     def configure(self) -> None:
-        """A real one would look for its valves here."""
+        """A real robot would connect to its valves here."""
         self._stopped = False
 
     def activate(self) -> None:
-        """A real one would switch on its supply here."""
+        """A real robot would switch on its supply here."""
 
     def begin(self, start: int) -> None:
         """Start a run."""
@@ -68,7 +68,7 @@ class PneumaticAnkleRobot(AnkleRobot):
         self._states = []
 
     def schedule(self, train: PulseTrain) -> None:
-        """Take over a train, to follow those before."""
+        """Take over a train, to follow the previous ones."""
         if self._stopped:
             raise DeviceError("stopped: close and configure first")
         self._train = self._train.followed_by(train) if self._train else train
@@ -90,26 +90,26 @@ class PneumaticAnkleRobot(AnkleRobot):
         return states
 
     def stop(self) -> None:
-        """Vent, and stay so."""
+        """Vent, and stay vented."""
         self._stopped = True
         self._train = None
 
-    # There is nothing to switch off or to let go of.
+    # There is nothing to switch off or release.
     deactivate = close = cancel
 
     def _changes(self, begin: int, until: int) -> Iterator[tuple[int, float]]:
-        """Yield instant [ns] and torque [N m] of each change of torque, and note the states."""
+        """Yield time [ns] and torque [N m] of each change of torque, and record the states."""
         yield begin, self._torque
         while self._next_step < until:
             before, self._torque = self._torque, self._torque_at(self._next_step)
-            asked = self._train.torque_at(self._next_step) if self._train else 0.0
-            self._states.append(RobotState(self._next_step, asked, self._torque, float("nan")))
+            requested = self._train.torque_at(self._next_step) if self._train else 0.0
+            self._states.append(RobotState(self._next_step, requested, self._torque, float("nan")))
             if self._torque != before:
                 yield self._next_step, self._torque
             self._next_step += STEP
 
     def _torque_at(self, instant: int) -> float:
-        """Return the mean of what was asked for while the muscle filled: an even rise and fall."""
+        """Return the mean torque requested during one filling time: a linear rise and fall."""
         train = self._train
         if train is None:
             return 0.0

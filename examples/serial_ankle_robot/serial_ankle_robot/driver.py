@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Ankle robot on a serial line to which the host streams torque."""
+"""Driver for an ankle robot on a serial line to which the host streams torque."""
 
 import os
 import select
@@ -25,7 +25,7 @@ from serial_ankle_robot.frames import (
     take_frame,
 )
 
-# A robot that is there answers within milliseconds; on a busy host this is ample [s].
+# A connected robot answers within milliseconds; this is ample even on a busy host [s].
 _ANSWER_TIMEOUT = 0.5
 _ASK_PERIOD = 0.05
 _FAULTS = {
@@ -37,35 +37,35 @@ _DISABLED = Fault("robot_disabled", "The robot has switched its torque off by it
 
 @dataclass(frozen=True)
 class SerialOptions(LoopOptions):
-    """Line, transmission and loop."""
+    """Options of the line, the transmission and the loop."""
 
     port: str = setting("/dev/ttyACM0", "serial line")
-    baud: int = setting(921_600, "of the line", "bit/s", (9600, 4_000_000))
+    baud: int = setting(921_600, "bit rate of the line", "bit/s", (9600, 4_000_000))
     motor_torque: float = setting(2.0, "peak torque of the motor", "N m", (0.01, 300.0))
     ratio: float = setting(
         9.0,
-        "ankle torque per motor torque; negative if the motor turns against it",
+        "ankle torque per motor torque; negative if their signs differ",
         "1",
         (-50.0, 50.0),
     )
     neutral: float = setting(
-        0.0, "motor angle where the foot is at right angles to the shank", "rad", (-32.0, 32.0)
+        0.0, "motor angle with the foot at right angles to the shank", "rad", (-32.0, 32.0)
     )
 
     def __post_init__(self) -> None:
-        """Check every field, and what has no range of its own."""
+        """Check every field, and that the ratio is not zero."""
         super().__post_init__()
         if self.ratio == 0:
             raise LimitError("driver: ratio: 0; allowed: any other number")
 
 
 class SerialDevice(TorqueDevice):
-    """The robot, as the torque loop sees it."""
+    """The robot as the torque loop sees it."""
 
     def __init__(self, options: SerialOptions) -> None:
         self._options = options
         self.name = f"robot on {options.port}"
-        # Under /dev/serial/by-id there are other names of the same line.
+        # The same line has other names under /dev/serial/by-id.
         self.address = f"serial line {os.path.realpath(options.port)}"
         self.capabilities = options.capabilities(options.motor_torque * abs(options.ratio))
         self._line: serial.Serial | None = None
@@ -73,10 +73,10 @@ class SerialDevice(TorqueDevice):
         self._number = 0  # of the last command
 
     def open(self) -> None:
-        """Connect, and see that the robot answers without an error."""
+        """Connect, and check that the robot answers without an error."""
         options = self._options
         try:
-            # `exclusive` keeps other programs off the line, which know nothing of our lock.
+            # `exclusive` keeps other programs, which do not know our lock, off the line.
             self._line = serial.Serial(
                 options.port, options.baud, timeout=0, write_timeout=0.1, exclusive=True
             )
@@ -116,7 +116,7 @@ class SerialDevice(TorqueDevice):
         )
 
     def forget(self) -> None:
-        """Drop what has come; a reply that is under way has another number."""
+        """Drop what has arrived; a reply still under way has another number."""
         self._received.clear()
         if self._line is not None:
             self._line.reset_input_buffer()
@@ -132,21 +132,21 @@ class SerialDevice(TorqueDevice):
             self._line = None
 
     def _reach(self, mode: int) -> Reply:
-        """Ask for a mode, at zero torque, until a reply says how things are in it."""
+        """Request a mode at zero torque until a reply shows the status in this mode."""
         give_up = time.monotonic() + _ANSWER_TIMEOUT
         replies = 0
         while time.monotonic() < give_up:
             self._send(mode)
             reply = self._reply(_ASK_PERIOD)
             replies += reply is not None
-            if reply is not None and replies > 1:  # the first says how they were before
+            if reply is not None and replies > 1:  # the first one shows the status before
                 return reply
         raise DeviceError(
             f"{self.name} does not answer at {self._options.baud} bit/s: check its power and baud"
         )
 
-    def _require(self, so: object, otherwise: str) -> None:
-        if not so:
+    def _require(self, condition: object, otherwise: str) -> None:
+        if not condition:
             raise DeviceError(f"{self.name} {otherwise}")
 
     def _send(self, mode: int, torque: float = 0.0) -> None:
@@ -157,7 +157,7 @@ class SerialDevice(TorqueDevice):
         self._line.write(command.pack())
 
     def _reply(self, timeout: float) -> Reply | None:
-        """Return the reply to the last command; None if it does not come in time [s]."""
+        """Return the reply to the last command; None if it does not arrive within a time [s]."""
         assert self._line is not None
         give_up = time.monotonic() + timeout
         while (left := give_up - time.monotonic()) > 0:

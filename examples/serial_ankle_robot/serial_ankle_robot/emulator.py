@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-serial_ankle_emulator: the robot's side of the line, as a process, on a pseudo-terminal.
+serial_ankle_emulator: the robot's side of the line, as a process on a pseudo-terminal.
 
-It does to its users what a real robot does: without its own watchdog it holds the last command.
-Not modelled: motion, heat, the speed of the line, bit errors.
+It has the hazard of a real robot: without its own watchdog it holds the last command.
+Not modelled: motion, heat, line speed, bit errors.
 """
 
 import argparse
@@ -28,15 +28,15 @@ from serial_ankle_robot.frames import (
     take_frame,
 )
 
-_TICK = 0.001  # how often it looks after itself while nothing comes [s]
+_TICK = 0.001  # update period while nothing arrives [s]
 
 
 class EmulatedRobot:
     """
     The robot itself, without a line: frames in, replies out, torque as a function of time.
 
-    The torque follows by a lag of a bandwidth [Hz]. The watchdog expires when no command came for
-    longer than ``timeout`` [s]; 0 switches it off.
+    The torque follows with a first-order lag of a bandwidth [Hz]. The watchdog expires when no
+    command arrives for longer than ``timeout`` [s]; 0 switches it off.
     """
 
     def __init__(self, bandwidth: float, timeout: float) -> None:
@@ -56,11 +56,11 @@ class EmulatedRobot:
         self._now = now
 
     def obey(self, command: Command, now: float) -> Reply:
-        """Obey a command at a time [s]; return the reply, measured before it has an effect."""
+        """Carry out a command at a time [s]; return the reply, measured before it takes effect."""
         self.advance(now)
         reply = Reply(command.number, self.status, self.torque)
         self._fed, self.command = now, command.torque
-        if command.mode != TORQUE:  # this clears the watchdog too
+        if command.mode != TORQUE:  # this also clears the watchdog
             self.status &= DRIVER_FAULT
         elif not self.status & WATCHDOG_EXPIRED:
             self.status |= ENABLED
@@ -71,16 +71,16 @@ def main() -> int:
     """Run the emulator until it is terminated."""
     parser = argparse.ArgumentParser(
         "serial_ankle_emulator",
-        description="An ankle robot on a pseudo-terminal, whose name it prints.",
+        description="Emulate an ankle robot on a pseudo-terminal, and print its name.",
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
-    parser.add_argument("--bandwidth", type=float, default=30.0, help="of the torque [Hz]")
-    parser.add_argument("--timeout", type=float, default=0.0, help="of its watchdog [s]; 0: off")
+    parser.add_argument("--bandwidth", type=float, default=30.0, help="torque bandwidth [Hz]")
+    parser.add_argument("--timeout", type=float, default=0.0, help="watchdog timeout [s]; 0: off")
     parser.add_argument("--fault-after", type=float, help="from the first torque to a fault [s]")
     options = parser.parse_args()
     ours, theirs = pty.openpty()
     tty.setraw(theirs)  # kept open: a driver that closes the line leaves the robot running
-    with contextlib.suppress(PermissionError):  # it stands for hardware, which waits for nobody
+    with contextlib.suppress(PermissionError):  # it represents hardware, which never waits
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(60))
     print(os.ttyname(theirs), flush=True)
     robot = EmulatedRobot(options.bandwidth, options.timeout)

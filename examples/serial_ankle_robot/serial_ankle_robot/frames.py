@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The frames on the line, little-endian, each with a CRC-16/CCITT of all that comes before it.
+The frames on the line, little-endian, each with a CRC-16/CCITT of all bytes before it.
 
 =========  =====================================================================================
 command    0xA5, number, mode (0 off, 1 torque), torque [0.01 N m]
 reply      0x5A, number of the command, status, torque [0.01 N m], angle [mrad], velocity [mrad/s],
-           temperature [deg C]; measured before the command has an effect
+           temperature [deg C]; measured before the command takes effect
 =========  =====================================================================================
 """
 
@@ -25,7 +25,7 @@ _LARGEST = 0x7FFF
 
 @dataclass(frozen=True)
 class Command:
-    """What the host asks for."""
+    """A command from the host."""
 
     LAYOUT: ClassVar[struct.Struct] = struct.Struct("<BBBh")
     START: ClassVar[int] = 0xA5
@@ -35,7 +35,7 @@ class Command:
     torque: float  # of the motor [N m]
 
     def pack(self) -> bytes:
-        """Return the frame; torque is clamped to what it can hold. NaN raises ValueError."""
+        """Return the frame; torque is clamped to the frame's range. NaN raises ValueError."""
         steps = round(self.torque / _TORQUE_STEP)
         steps = min(max(steps, -_LARGEST), _LARGEST)
         return _checked(self.LAYOUT.pack(self.START, self.number, self.mode, steps))
@@ -49,7 +49,7 @@ class Command:
 
 @dataclass(frozen=True)
 class Reply:
-    """What the robot answers."""
+    """A reply from the robot."""
 
     LAYOUT: ClassVar[struct.Struct] = struct.Struct("<BBBhhhb")
     START: ClassVar[int] = 0x5A
@@ -77,9 +77,9 @@ class Reply:
 
 def take_frame(received: bytearray, kind: type[Command] | type[Reply]) -> bytes | None:
     """
-    Take the first whole frame of a kind off what was received; return it without its CRC.
+    Remove the first whole frame of a kind from the received bytes; return it without its CRC.
 
-    What comes before it is noise, or half a frame, and is dropped. None if there is none yet.
+    Bytes before it are noise or part of a frame, and are dropped. None if there is no frame yet.
     """
     size = kind.LAYOUT.size + 2
     while len(received) >= size:

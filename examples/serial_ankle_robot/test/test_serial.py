@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The driver against the emulated robot: every promise, frames, and what goes wrong on a line."""
+"""The driver with the emulated robot: every promise, frames, and faults of a line."""
 
 import subprocess
 import sys
@@ -16,7 +16,7 @@ from gait_entrainment.robot import DeviceError, PulseTrain, find_driver
 from gait_entrainment_drivers.conformance.bench import DriverBench, Tolerances, run_check
 from gait_entrainment_drivers.conformance.checks import CHECKS, silent_host
 
-# A machine that others share wakes processes up late; a laboratory's own is held to the defaults.
+# A shared machine wakes processes up late; the defaults are for a laboratory's own machine.
 PATIENT = Tolerances(
     onset=0.25, zero_within=1.0, watchdog=1.6, call=0.1, slowest_call=2.0, impulse=0.6
 )
@@ -24,7 +24,7 @@ PATIENT = Tolerances(
 
 @contextmanager
 def emulated(*options):
-    """Run the emulator; gives the text that names the driver for it."""
+    """Run the emulator; yield the text that names the driver for it."""
     process = subprocess.Popen(
         [sys.executable, "-m", "serial_ankle_robot.emulator", *options],
         stdout=subprocess.PIPE,
