@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The analyzer: gait events and pulse onsets in, strides, pulse phases and verdicts out."""
+"""The analyzer, which turns gait events and pulse onsets into strides, phases and verdicts."""
 
 import math
 from bisect import bisect_left
@@ -205,7 +205,7 @@ class GaitAnalyzer:
         return [*pulses, entrainment] if entrainment else list(pulses)
 
     def _start_over(self, hole: Hole | None, *, another_train: bool = False) -> None:
-        """Start lags and verdicts over: after a hole (None if already listed) or with a train."""
+        """Restart lags and verdicts: after a hole (None if already listed) or with a new train."""
         self.holes += [hole] if hole else []
         self._lags = LagFollower(from_strikes=not self._toe_offs)
         self._test.restart(hole=not another_train)

@@ -96,7 +96,7 @@ class PulseNumbers:
 
 class LagFollower:
     """
-    Follows the phase lag across wraps; ``from_strikes`` of the leg if no toe-offs are found.
+    Follows the phase lag across wraps, ``from_strikes`` of the leg if no toe-offs are found.
 
     Pulse n is compared with the toe-off n strides after the first pulse's. That may lie in the
     future, so the strides T in between are counted: unwrapped lag = lag + (m - n) T after m

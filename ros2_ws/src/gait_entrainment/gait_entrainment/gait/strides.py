@@ -90,7 +90,7 @@ class StrideTracker:
     def __init__(self, side: Side, limits: GaitLimits | None = None) -> None:
         self.side = side  # the leg whose strides are wanted
         self.watch = GaitWatch(side, limits or GaitLimits())
-        self.counts = EventCounts()  # what became of the events received so far
+        self.counts = EventCounts()  # outcome of the events received so far
         self.stride_in_progress = 0  # the one that the leg's latest heel strike started
         self.latest_strike: int | None = None  # its stamp [ns]
         self._first_step: int | None = None  # step that the leg's first heel strike closes
