@@ -4,7 +4,7 @@
 """
 Whole walks in one compiled call: the transitions that `Walker` runs, without its log.
 
-A walk gives the same bits as a `Walker`. Beyond that, each push-off may have its own stiffness.
+A walk equals that of a `Walker`, bit for bit. In addition, its push-offs may differ in stiffness.
 """
 
 from typing import NamedTuple
@@ -52,9 +52,9 @@ def walk(
     """
     Walk `steps` steps from heel strike 0 of the leg whose ankle the pulses perturb.
 
-    The walk starts as a `Walker` does, unless `initial_apex` (see `model`) says otherwise.
-    `stiffness` (steps,) is that of each push-off [N m/rad]; it is written into the model, which
-    must be made for that (`cohort.population`). Raises ValueError for overlapping pulses.
+    The walk starts as a `Walker` does, unless `initial_apex` (see `model`) is given. `stiffness`
+    (steps,) is that of each push-off [N m/rad]; it is written into the model, which must be made
+    for that (see `cohort.population`). Raises ValueError for overlapping pulses.
     """
     heel_strikes, toe_offs = np.empty(steps), np.empty(steps)
     log = np.zeros(1, SEGMENT)
@@ -74,13 +74,13 @@ def walk(
 
 
 def _torque_changes(pulses: Pulses) -> tuple[Stamps, Floats]:
-    """Changes of both sides as `trajectory` wants them, the left one first and never perturbed."""
+    """Return the changes of both sides for `trajectory`; the first, left one is not perturbed."""
     onsets = np.asarray(pulses.onsets, np.int64)
     if pulses.width <= 0 or np.any(np.diff(onsets) < pulses.width):
         raise ValueError(f"pulses of {pulses.width} ns must be wider than 0 and not overlap")
     changes = np.append(EVER, np.stack([onsets, onsets + pulses.width], axis=1))
     torques = np.append(0.0, np.tile([pulses.torque, 0.0], onsets.size))
-    # The later of two changes of one stamp counts, and one that changes nothing is no switch.
+    # Of two changes with one stamp the later counts; one that changes nothing is not a switch.
     last = np.append(np.diff(changes) != 0, True)
     changes, torques = changes[last], torques[last]
     real = np.append(True, np.diff(torques) != 0.0)
@@ -98,7 +98,7 @@ def walk_steps(
     heel_strikes: Floats,
     toe_offs: Floats,
 ) -> tuple[int, int]:
-    """Fill in the events [s] after heel strike 0, until one array is full; return how many."""
+    """Fill in the events [s] after heel strike 0 until `heel_strikes` is full; return how many."""
     segment, robot = log[0], Torques(changes, torques, 1)
     work, cursors = np.empty(WORK_SIZE), np.array([0, 1])
     strikes, offs = 0, 0
@@ -107,7 +107,7 @@ def walk_steps(
     start_walking(model, segment, 1, apex)
     while strikes < heel_strikes.size:
         if segment.stance == Stance.SINGLE and strikes + 1 < stiffness.size:
-            model.ankle_stiffness = stiffness[strikes + 1]  # of the push-off that comes next
+            model.ankle_stiffness = stiffness[strikes + 1]  # of the next push-off
         if proceed(model, work, segment, robot, cursors, FOREVER) != SWITCHED:
             break
         if segment.began == Switch.HEEL_STRIKE:

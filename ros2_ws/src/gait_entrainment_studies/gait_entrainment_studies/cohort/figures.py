@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The cohort as a picture: verdicts by pulse period, and the basins."""
+"""Figure of a cohort: verdicts by pulse period, and the basins."""
 
 from pathlib import Path
 from typing import Any

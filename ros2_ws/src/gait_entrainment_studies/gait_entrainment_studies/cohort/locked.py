@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How much of a walk was locked. Apart from what walks, so that a report starts without it."""
+"""How much of a walk was locked. Separate, so that a report need not load what walks."""
 
 from itertools import groupby
 
@@ -13,7 +13,7 @@ def locked_runs(
     lags: NDArray[np.float64], locked_lag: float, tolerance: float
 ) -> tuple[float, list[int]]:
     """
-    Return the fraction of strides locked, and the lengths of the runs of them.
+    Return the fraction of strides that are locked, and the lengths of their runs.
 
     A stride is locked while its pulse lies within `tolerance` [s] of the lock of the walker
     without noise.

@@ -2,15 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Many walkers with what the paper's model does not have. An extension: off in everything else.
+Many walkers with features that the paper's model does not have. An extension: off elsewhere.
 
 They are the exact walker, step by step, with
 
-- noise: the stiffness of each push-off is drawn anew;
+- noise: the stiffness of each push-off is drawn separately;
 - asymmetry: the perturbed leg pushes off with (1 + a) k, the other with (1 - a) k;
-- slope: the ground rises by an angle, so gravity leans by it.
+- slope: the ground rises by an angle, so gravity is tilted by it.
 
-Arrays have a column for each of the n walkers.
+Arrays have one column for each of the n walkers.
 """
 
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ from gait_entrainment.walker.model import Floats, make_model
 from gait_entrainment.walker.variation import LEAST, Seed, made_for_any_stiffness, step_noise
 from gait_entrainment_studies.walks import NO_PULSES, Pulses, walk
 
-# Strides of the pilot walk that finds the noise for a coefficient of variation, and its rounds.
+# Strides of the pilot walk that finds the noise for a coefficient of variation, and how often.
 _PILOT_STRIDES = 400
 _PILOT_ROUNDS = 2
 _PILOT_NOISE = 0.02
@@ -55,7 +55,7 @@ class PulseTrains:
 
 @dataclass(frozen=True)
 class PopulationWalk:
-    """Events [s] of n walkers since heel strike 0 of the perturbed leg; NaN after an end."""
+    """Events [s] of n walkers since heel strike 0 of the perturbed leg; NaN once one has ended."""
 
     heel_strikes: Floats
     """(steps + 1, n), both legs; even ones are the perturbed leg's."""
@@ -115,8 +115,8 @@ class Population:
         """
         Walk with `noise` (steps, n), the deviation of each push-off's stiffness over its mean.
 
-        The walk begins with `apex` (n,), or in the gait of this slope and these legs, so that no
-        transient enters period or variation.
+        The walk begins with `apex` (n,); by default with that of the gait on this slope and with
+        these legs, so that no transient affects period or variation.
         """
         steps = len(noise)
         strikes = np.full((steps + 1, self.size), np.nan)
@@ -125,10 +125,10 @@ class Population:
         apex = self.periodic_apex() if apex is None else apex
         endings: list[EndingKind | None] = []
         for index, model in enumerate(self._models):
-            one = model.copy()
+            own = model.copy()
             pulses = NO_PULSES if trains is None else trains.of(index)
             walked = walk(
-                one, steps, pulses, apex[index], one["ankle_stiffness"] * factors[:, index]
+                own, steps, pulses, apex[index], own["ankle_stiffness"] * factors[:, index]
             )
             strikes[: walked.heel_strikes.size, index] = walked.heel_strikes
             offs[: walked.toe_offs.size, index] = walked.toe_offs
@@ -142,15 +142,15 @@ def noise_for(
     """
     Return the noise (n,) with which each walker's stride period varies by this coefficient.
 
-    It is the standard deviation of the push-off stiffness over its mean. It is found by pilot
-    walks, in which the coefficient is nearly proportional to the noise. If a walker falls in them,
-    the strides before the fall count; it may fall in the experiment too.
+    The noise is the standard deviation of the push-off stiffness over its mean. It is found by
+    pilot walks, in which the coefficient is nearly proportional to it. If a walker falls in them,
+    the strides before the fall count; it may also fall in the experiment.
     """
     draws = step_noise(seed, 2 * _PILOT_STRIDES, population.size, hurst)
     noise = np.full(population.size, _PILOT_NOISE)
     for _ in range(_PILOT_ROUNDS):
         periods = np.ma.masked_invalid(population.walk(noise * draws).stride_periods)
         found = np.ma.filled(periods.std(axis=0, ddof=1) / periods.mean(axis=0), np.nan)
-        # A walker that fell before its third stride tells nothing new.
+        # A walker that fell before its third stride adds no information.
         noise = np.where(found > 0, noise * coefficient_of_variation / found, noise)
     return noise

@@ -4,9 +4,9 @@
 """
 The human study's experiment on each simulated subject.
 
-Fed in: the distributions of the subjects, their variability, and 10 N m for 0.1 s. Predicted: who
+Inputs: the distributions of the subjects, their variability, and 10 N m for 0.1 s. Predicted: who
 entrains, where in the gait cycle, and how the basin depends on the subject. The spread of the
-basin is mostly fed in, because it follows from torque over body size and peak torque.
+basin comes mostly from the inputs, because it follows from torque over body size and peak torque.
 """
 
 import math
@@ -33,8 +33,8 @@ from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
 from gait_entrainment_studies.locking.roots import Floats
 from gait_entrainment_studies.locking.walked import ENDINGS
 
-# Streams of noise beside the one that draws the subjects. That of a trial depends on its pulse
-# period alone: it is the same trial, whatever other periods are asked for.
+# Streams of noise in addition to the one that draws the subjects. A trial's stream depends on its
+# pulse period alone, so the trial is the same whatever other periods are requested.
 _PILOT, _TRIAL = 1, 2
 
 # A pulse within this fraction of the stride of the noise-free lock counts as locked.
@@ -48,7 +48,7 @@ class StudyPlan(Checked):
     torque: float = setting(10.0, "height of the pulses", "N m")
     width: float = setting(0.1, "duration of a pulse", "s")
     period_offsets: tuple[float, ...] = (-0.05,)
-    """Pulse periods off each subject's measured stride period [s]."""
+    """Pulse periods minus each subject's measured stride period [s]."""
     baseline: int = 15
     pulses: int = setting(50, "pulses in a trial", within=(1, math.inf))
     washout: int = 15
@@ -56,13 +56,13 @@ class StudyPlan(Checked):
         0.0, "first pulse, as a fraction of a stride", within=(0, 1), most_excluded=True
     )
     seed: int = setting(0, "seed of subjects and noise", within=(0, math.inf))
-    hurst: float = setting(0.75, "correlation of the noise: 0.5 white, to below 1")
+    hurst: float = setting(0.75, "correlation of the noise: from 0.5 (white) to below 1")
     slope: float = setting(0.0, "rise of the ground, uphill positive", "rad")
-    asymmetry: float = setting(0.0, "excess of the perturbed leg's stiffness, -1 to 1")
+    asymmetry: float = setting(0.0, "excess stiffness of the perturbed leg, from -1 to 1")
 
     @property
     def solvable(self) -> bool:
-        """Whether locks are solved for: on level ground, with equal legs."""
+        """Whether locks are solved for: only on level ground and with equal legs."""
         return self.slope == 0 and self.asymmetry == 0
 
 
@@ -74,7 +74,7 @@ class Trial:
     period_offset: float
     measured_period: float
     verdict: str
-    """That of docs/analysis.md, or that the walker fell or flew off."""
+    """A verdict of docs/analysis.md, or that the walker fell or flew off."""
     fraction_locked: float = math.nan
     """Of the strides under pulses; NaN if the walker has no lock at that period."""
     mean_run: float = math.nan
@@ -89,8 +89,8 @@ class Study:
     trials: tuple[Trial, ...]
     basins: Floats
     """
-    (n, 2) shortest and longest pulse period with a stable lock, solved without noise, off the
-    unperturbed stride period in percent of it; (0, 2) if the plan is not solvable.
+    (n, 2) shortest and longest pulse period with a stable lock, solved without noise, minus the
+    unperturbed stride period, in percent of it; (0, 2) if the plan is not solvable.
     """
 
     @property
@@ -102,7 +102,7 @@ class Study:
 
 def run_study(subjects: Subjects, plan: StudyPlan) -> Study:
     """
-    Run the experiment on each subject at each pulse period, with noise of its own.
+    Run the experiment on each subject at each pulse period, each time with different noise.
 
     Raises UsageError if the plan cannot be conducted.
     """
@@ -111,8 +111,8 @@ def run_study(subjects: Subjects, plan: StudyPlan) -> Study:
     noise = noise_for(alike, subjects.variation, (plan.seed, _PILOT), plan.hurst)
     gaits = [PulsedGait(walker, plan.torque, plan.width) for walker in subjects.walkers]
     pieces = [pieces_of(gait) for gait in gaits]
-    # Half the stride is room enough for any stride that noise makes; less the pulse, so that no
-    # two pulses reach into one double stance.
+    # Half the stride leaves room for any stride that noise makes; the pulse is subtracted so that
+    # no two pulses reach into one double stance.
     shortest = min(gait.unperturbed_period for gait in gaits) / 2 - plan.width
     trials: list[Trial] = []
     for offset in plan.period_offsets:
@@ -123,7 +123,7 @@ def run_study(subjects: Subjects, plan: StudyPlan) -> Study:
             lock = math.nan
             if plan.solvable:
                 locks = locked_gaits(gait, gait.unperturbed_period + offset, pieces[subject])
-                lock = next((one.lag for one in reversed(locks) if one.stable), lock)
+                lock = next((found.lag for found in reversed(locks) if found.stable), lock)
             trials.append(_trial(walk, trains, subject, offset, lock))
     basins = []
     for gait, branches in zip(gaits, pieces, strict=True) if plan.solvable else ():
@@ -136,10 +136,10 @@ def _conduct(
     population: Population, noise: Floats, plan: StudyPlan, offset: float
 ) -> tuple[PopulationWalk, PulseTrains]:
     """
-    Walk the baseline, plan the pulses from it as a protocol does, walk all of it with them.
+    Walk the baseline, plan the pulses from it as a protocol does, then walk the trial with them.
 
-    ``noise`` (n,) is that of each walker's push-offs (`noise_for`); the pulse period is ``offset``
-    [s] off each measured stride period.
+    ``noise`` (n,) is that of each walker's push-offs (`noise_for`); each pulse period is the
+    measured stride period plus ``offset`` [s].
     """
     steps = 2 * (plan.baseline + plan.pulses + plan.washout)
     seed = (plan.seed, _TRIAL, nanoseconds(offset) % 2**64)
@@ -177,7 +177,7 @@ def _trial(
 
 
 def events_of(strikes: Floats, toe_offs: Floats) -> list[GaitEvent]:
-    """Return the events of a walk to its end; heel strike 0 is the right, perturbed leg's."""
+    """Return the events of a walk up to its end; heel strike 0 is the right, perturbed leg's."""
     events = [GaitEvent(0, EventKind.HEEL_STRIKE, Side.RIGHT, 0)]
     for step, (off, strike) in enumerate(zip(toe_offs, strikes[1:], strict=True), start=1):
         if not np.isfinite(strike):  # it fell or flew off
@@ -194,7 +194,7 @@ def verdicts(study: Study, offset: float) -> dict[str, int]:
 
 
 def measured_basin_percent(study: Study) -> Floats:
-    """Each subject's furthest period off its own at which it was found entrained [%]."""
+    """Each subject's largest distance from its own period at which it was found entrained [%]."""
     widest = np.zeros(1 + max(trial.subject for trial in study.trials))
     for trial in study.trials:
         if trial.verdict == "entrained":

@@ -22,7 +22,7 @@ class SubjectDistributions:
     """
     Normal distributions (mean, standard deviation), cut off at two standard deviations.
 
-    Assumptions of ours, for adults in general: the human study's own are not known here.
+    They are our assumptions for adults in general: those of the human study are not known here.
 
     Raises UsageError for a mean or deviation out of range.
     """
@@ -44,7 +44,7 @@ class SubjectDistributions:
             if not (mean > 2 * deviation >= 0 and mean < np.inf):
                 raise UsageError(
                     f"{item.name}: {mean:g} +/- {deviation:g}; allowed: a mean above twice the"
-                    " deviation, none negative"
+                    " deviation, neither negative"
                 )
 
 
@@ -80,7 +80,7 @@ def draw_subjects(distributions: SubjectDistributions, count: int, seed: int) ->
             redrawn += 1
             if redrawn > 20 * count:
                 raise UsageError(
-                    "peak_torque: hardly a subject drawn has a gait; allowed: about 0.14 to 0.21"
+                    "peak_torque: hardly any subject drawn has a gait; allowed: about 0.14 to 0.21"
                 ) from None
             continue
         walkers.append(walker)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""entrain existence: for which stiffness and leg angle there is a gait."""
+"""entrain existence: for which stiffness and leg angle a gait exists."""
 
 import argparse
 from dataclasses import asdict
@@ -33,9 +33,9 @@ def run(options: argparse.Namespace) -> int:
     ranges = existence_map(walker, _POINTS.parse("points", options.points))
     text = (
         f"leg angle        {own.leg_angle:.6f} rad\n"
-        f"just vaults over {own.just_vault_over:.6f} N m/rad, felt at: {own.falls_at.value}\n"
-        f"just flies off   {own.just_fly_off:.6f} N m/rad, felt at: {own.flies_off_at.value}\n"
-        f"map              {len(ranges)} leg angles with a linkage,"
+        f"just vaults over {own.just_vault_over:.6f} N m/rad, decided at: {own.falls_at.value}\n"
+        f"just flies off   {own.just_fly_off:.6f} N m/rad, decided at: {own.flies_off_at.value}\n"
+        f"map              {len(ranges)} leg angles with a closed linkage,"
         f" {sum(r.exists for r in ranges)} with a gait"
     )
     outcome = {"walker": asdict(own), "map": [asdict(r) for r in ranges]}

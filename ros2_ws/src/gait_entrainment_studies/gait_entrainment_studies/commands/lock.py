@@ -19,8 +19,8 @@ from gait_entrainment_studies.locking.walked import shares_of
 
 DESCRIPTION = (
     "Solve for the 1:1 phase-locked gaits: the borders of the pulse periods with a stable lock, "
-    "named for what they are, and the locked gaits at one period with their Floquet "
-    "multipliers and the share of initial phases that each draws."
+    "with the kind of each, and the locked gaits at one period, with their Floquet multipliers "
+    "and the share of initial phases that each draws."
 )
 EXAMPLES = """examples:
   entrain lock                                  the paper's pulses at 2 tau_0 - 50 ms
@@ -28,7 +28,7 @@ EXAMPLES = """examples:
   entrain lock --torque-fraction -0.1 --period-offset 0.02 --out figures
 """
 
-_PHASES = Setting("initial phases walked from", int, least=1, most=10_000)
+_PHASES = Setting("number of initial phases", int, least=1, most=10_000)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -77,7 +77,7 @@ def _summary(outcome: dict[str, Any]) -> str:
         f"pulses           {outcome['torque']:.3f} N m for {outcome['width']:g} s",
         f"stride period    {unperturbed:.9f} s unperturbed",
         "",
-        "Branches, by pulse onset; periods off the unperturbed one [ms]:",
+        "Branches, by pulse onset; periods minus the unperturbed one [ms]:",
     ]
     for piece in outcome["branches"]:
         first, last = (

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""entrain paper: every published number and figure beside ours."""
+"""entrain paper: every published number and figure, compared with ours."""
 
 import argparse
 from collections.abc import Sequence
@@ -11,10 +11,10 @@ from gait_entrainment_commands import cli
 from gait_entrainment_studies.paper.comparison import Comparison, compare, explain
 from gait_entrainment_studies.paper.figures import draw_figures
 
-DESCRIPTION = "Hold the model against Ahn and Hogan (2012), with the parameters of Table 1."
+DESCRIPTION = "Compare the model with Ahn and Hogan (2012), with the parameters of Table 1."
 EXAMPLES = """examples:
   entrain paper                      the table
-  entrain paper --out figures        and figures 4 to 8 as PNG and SVG
+  entrain paper --out figures        also figures 4 to 8 as PNG and SVG
   entrain paper --json               a list of {name, paper, ours, unit, agrees, note}
 """
 
@@ -30,7 +30,7 @@ def run(options: argparse.Namespace) -> int:
     stated = [row.agrees for row in rows if row.agrees is not None]
     text = (
         f"{_table(rows)}\n\n{sum(stated)} of {len(stated)} agree.\n\n"
-        "Explanations tested: Table 1 with k, mu or both as they may have been unrounded\n\n"
+        "Explanation tested: Table 1 with possible unrounded values of k, mu or both\n\n"
         f"{_table(explanations)}"
     )
     outcome = [asdict(row) for row in [*rows, *explanations]]

@@ -21,8 +21,8 @@ from gait_entrainment_studies.phase_response.response import (
 )
 
 DESCRIPTION = (
-    "Advance of the heel strikes by one pulse, at every phase; and the locked phase at which the "
-    "advance is the unperturbed minus the pulse period, beside the exact one."
+    "Advance of the heel strikes by one pulse, at every phase, and the locked phase at which the "
+    "advance is the unperturbed minus the pulse period, compared with the exact one."
 )
 EXAMPLES = """examples:
   entrain phase-response                          predicted and exact lock at -50 ms
@@ -37,7 +37,7 @@ _POINTS = Setting("points on each branch", int, least=2, most=100_000)
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    shown = "-0.05; may be given again"
+    shown = "-0.05; may be repeated"
     cli.add_setting(parser, "period_offset", question.PERIOD_OFFSET, shown=shown, action="append")
     cli.add_setting(parser, "points", _POINTS, "201")
     question.add_gait_options(parser)
@@ -54,12 +54,12 @@ def run(options: argparse.Namespace) -> int:
     curve = np.column_stack([getattr(response, name) for name in _COLUMNS])
     locks = [
         {
-            "period_offset": one.period_offset,
-            "predicted_lag": one.predicted.lag,
-            "exact_lag": one.exact.lag,
-            "predicted_stable": one.predicted.stable,
+            "period_offset": prediction.period_offset,
+            "predicted_lag": prediction.predicted.lag,
+            "exact_lag": prediction.exact.lag,
+            "predicted_stable": prediction.predicted.stable,
         }
-        for one in found
+        for prediction in found
     ]
 
     def write(folder: Path) -> list[Path]:
@@ -80,7 +80,7 @@ def _summary(response: PhaseResponse, found: Sequence[Prediction]) -> str:
     ended = response.phase[np.isnan(response.shift)]
     if ended.size:
         lines.append(
-            f"falls, flies off at {ended.size} of {response.phase.size} phases, between"
+            f"falls or flies off at {ended.size} of {response.phase.size} phases, between"
             f" {np.nanmin(ended):.4f} and {np.nanmax(ended):.4f}"
         )
     lines += [

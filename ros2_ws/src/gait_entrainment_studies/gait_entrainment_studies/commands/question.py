@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the questions share: the walker and its pulses as options."""
+"""Options that the commands share: the walker and its pulses."""
 
 import argparse
 from dataclasses import dataclass
@@ -56,6 +56,6 @@ def chosen_offset(text: str, gait: PulsedGait) -> float:
     if abs(offset) <= CREEP:
         raise UsageError(
             f"period_offset: {offset:g} s is the stride period itself, at which a pulse in swing"
-            f" stays without a lock; allowed: more than {CREEP:g} s off it"
+            f" stays there without a lock; allowed: more than {CREEP:g} s off it"
         )
     return offset

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-entrain results: the page of results, made by the commands that it names.
+entrain results: the page of results, made by the commands that it contains.
 
-The page is `results.md` beside this module. Below each line with a command it gets the command's
-output, and it gets the figures that it shows; those of a sweep with the table they are drawn from.
+Its template is `results.md` next to this module. Each command's output is put below its line, and
+the figures shown are put into a folder, those of a sweep with the table they are drawn from.
 """
 
 import argparse
@@ -20,7 +20,7 @@ from pathlib import Path
 from gait_entrainment.errors import EntrainmentError
 from gait_entrainment_commands import main
 
-DESCRIPTION = "Run the commands that the page names and write results.md with its figures."
+DESCRIPTION = "Run the commands of the page of results and write results.md with its figures."
 EXAMPLES = "examples:\n  entrain results --out docs"
 
 TEMPLATE = Path(__file__).with_suffix(".md")
@@ -39,7 +39,7 @@ def run(options: argparse.Namespace) -> int:
     """Run every command of the page; raises EntrainmentError if one fails."""
     figures = options.out / "results"
     figures.mkdir(parents=True, exist_ok=True)
-    # Text before the first command, then by turns a command and the text after it.
+    # Text before the first command, then alternately a command and the text after it.
     page, *rest = COMMAND.split(TEMPLATE.read_text(encoding="utf-8"))
     for command, text in zip(rest[::2], rest[1::2], strict=True):
         print(f"entrain {command}", file=sys.stderr)
@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _shown(output: str) -> str:
-    """Return a command's output without its files; tables stay tables, the rest is a block."""
+    """Return a command's output without the files it lists, as a block unless it has a table."""
     lines = [
         line for line in output.splitlines() if not line.startswith(("figure  ", "written  "))
     ]

@@ -24,17 +24,17 @@ from gait_entrainment_studies.sweep.plan import Axis, SweepPlan
 from gait_entrainment_studies.sweep.row import StableInterval, exact_borders, sweep_row
 from gait_entrainment_studies.sweep.store import SweepStore, read_sweep
 
-# The exact borders are drawn at this many torques or more: those of a coarse sweep are smooth too.
+# The exact borders are drawn at this many torques or more, so a coarse sweep has smooth ones.
 _BORDER_TORQUES = 50
 
-_OUT = "folder of table and figures; what is there already is not walked again; default sweep"
+_OUT = "folder of table and figures; rows that it already has are not walked again; default sweep"
 DESCRIPTION = (
     "Two maps: whether a stable lock exists (solved), and the share of initial phases locked "
-    "by the last stride (walked). Writes tongue.parquet and a picture."
+    "by the last stride (walked). Writes tongue.parquet and figures."
 )
 EXAMPLES = """examples:
   entrain sweep --out tongue                 100 offsets x 50 torques x 16 initial phases
-  entrain sweep --out tongue                 again, after an interruption: goes on
+  entrain sweep --out tongue                 again, after an interruption: continues
   entrain sweep --out both --torque-fractions -0.2 0.2 81 --period-offsets -0.2 0.2 81
   entrain sweep --out tongue --scheduler tcp://host:8786
 """
@@ -46,7 +46,7 @@ _COUNT = Setting("number of values", int, least=1, most=10_000)
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    for name, told, *default in (
+    for name, axis, *default in (
         ("period_offsets", _OFFSET, "-0.12", "0.02", "100"),
         ("torque_fractions", _FRACTION, "0.005", "0.25", "50"),
     ):
@@ -55,7 +55,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
             nargs=3,
             default=default,
             metavar=("MIN", "MAX", "COUNT"),
-            help=f"{told.meaning} [{told.unit}]; default {' '.join(default)}",
+            help=f"{axis.meaning} [{axis.unit}]; default {' '.join(default)}",
         )
     cli.add_settings(parser, SweepPlan)
     cli.add_setting(parser, "jobs", JOBS)
@@ -65,7 +65,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Sweep what is missing, join, draw."""
+    """Compute the missing rows, join all, draw."""
     jobs = chosen_jobs(options.jobs)
     plan = cli.chosen(
         options,
@@ -81,20 +81,20 @@ def run(options: argparse.Namespace) -> int:
         count = plan.torque_fractions.count
         print(
             f"entrain sweep: interrupted after {count - len(store.missing())} of {count} torques;"
-            " the same command goes on",
+            " the same command continues",
             file=sys.stderr,
         )
         return 1
     return _report(plan, store, options)
 
 
-def _axis(name: str, told: Setting, texts: Sequence[str]) -> Axis:
-    least, most = (told.parse(name, text) for text in texts[:2])
+def _axis(name: str, setting: Setting, texts: Sequence[str]) -> Axis:
+    least, most = (setting.parse(name, text) for text in texts[:2])
     return Axis(least, most, _COUNT.parse(name, texts[2]))
 
 
 def _fill(plan: SweepPlan, store: SweepStore, jobs: int, scheduler: str | None) -> None:
-    """Make and write the rows that are missing."""
+    """Compute and write the missing rows."""
     missing = store.missing()
     if not missing:
         return
@@ -114,7 +114,7 @@ def _fill(plan: SweepPlan, store: SweepStore, jobs: int, scheduler: str | None) 
 def draw_sweep(
     plan: SweepPlan, table: Any, borders: Sequence[StableInterval], folder: Path
 ) -> list[Path]:
-    """Draw the pictures of a finished sweep; return their paths."""
+    """Draw the figures of a finished sweep; return their paths."""
     return [*draw_tongue(plan, table, borders, folder), *draw_locked_lags(plan, table, folder)]
 
 
@@ -144,20 +144,20 @@ def _report(plan: SweepPlan, store: SweepStore, options: argparse.Namespace) -> 
 
 
 def _counts(plan: SweepPlan, columns: dict[str, Any]) -> dict[str, int]:
-    # If walks were long enough to tell, both maps must agree.
-    asked = columns["problem"] == ""
+    # If walks were long enough to decide, both maps must agree.
+    walked = columns["problem"] == ""
     ended = columns["share_fell"] + columns["share_flew_off"]
-    told = asked & (columns["share_censored"] == 0) & (columns["share_alternating"] == 0)
-    told &= ended == 0
+    decided = walked & (columns["share_censored"] == 0) & (columns["share_alternating"] == 0)
+    decided &= ended == 0
     agree = (columns["stable_locks"] > 0) == (columns["share_locked"] > 0)
     counts = {
-        "cells": asked.size,
-        "cells not asked": (~asked).sum(),
-        "walks": asked.sum() * plan.phases,
+        "cells": walked.size,
+        "cells not asked": (~walked).sum(),
+        "walks": walked.sum() * plan.phases,
         "strides of each": plan.strides,
         "cells with a stable lock": (columns["stable_locks"] > 0).sum(),
-        "cells told by walking": told.sum(),
-        "of these agreeing": (told & agree).sum(),
+        "cells told by walking": decided.sum(),
+        "of these agreeing": (decided & agree).sum(),
         "cells with 2:2 locks": (columns["share_alternating"] > 0).sum(),
         "cells with falls": (columns["share_fell"] > 0).sum(),
         "cells with flights": (columns["share_flew_off"] > 0).sum(),

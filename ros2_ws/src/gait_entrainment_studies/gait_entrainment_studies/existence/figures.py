@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""For which stiffness and leg angle a period-one gait exists, as a picture."""
+"""Figure of the stiffness and leg angle for which a period-one gait exists."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,7 +20,7 @@ def draw_existence(
     """Draw the range of stiffness along the leg angle, and where the walker lies in it."""
     figure, axes = drawing.new_figure()
     corners = switches(walker, ranges)  # between the points of the map, where its lines bend
-    ranges = sorted([*ranges, *corners], key=lambda one: one.leg_angle)
+    ranges = sorted([*ranges, *corners], key=lambda r: r.leg_angle)
     angles = np.degrees([r.leg_angle for r in ranges])
     least = np.array([r.just_vault_over for r in ranges])
     most = np.array([r.just_fly_off for r in ranges])

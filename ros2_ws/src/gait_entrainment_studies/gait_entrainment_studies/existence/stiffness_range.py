@@ -5,7 +5,7 @@
 For which ankle stiffness a period-one gait exists, at one leg angle and along it.
 
 Below the just-vault-over stiffness the walker falls; above the just-fly-off stiffness the leading
-leg would have to pull. Both are closed forms but for a search over double stance (parameters).
+leg would have to pull. Both are closed forms except for a search over double stance (parameters).
 """
 
 import math
@@ -19,12 +19,12 @@ import numpy as np
 
 from gait_entrainment.parameters import ParameterError, WalkerParameters
 
-# Leg angles [rad] that are one: no range differs visibly between them.
+# Leg angles [rad] this close are taken as one: no range differs visibly between them.
 _SAME_ANGLE = 1e-9
 
 
 class Limit(str, Enum):
-    """Where in the gait an end of the range is felt."""
+    """Where in the gait an end of the range takes effect."""
 
     APEX = "apex of single stance"
     DOUBLE_STANCE = "within double stance"
@@ -34,7 +34,7 @@ class Limit(str, Enum):
 
 @dataclass(frozen=True)
 class StiffnessRange:
-    """Stiffness [N m/rad] between which a gait exists; there is none if the range is empty."""
+    """Stiffness [N m/rad] between which a gait exists; if the range is empty, no gait does."""
 
     leg_angle: float
     just_vault_over: float
@@ -44,7 +44,7 @@ class StiffnessRange:
 
     @property
     def limits(self) -> tuple[Limit, Limit]:
-        """Where in the gait its two ends are felt."""
+        """Where in the gait its two ends take effect."""
         return self.falls_at, self.flies_off_at
 
     @property
@@ -54,7 +54,7 @@ class StiffnessRange:
 
 
 class _AnyStiffness(WalkerParameters):
-    """A walker whose linkage closes, with a gait or without, to ask which limit ends its gait."""
+    """A walker whose linkage closes, with or without a gait, to find which limits end its gait."""
 
     def _check_gait(self) -> None:
         """Accept any stiffness."""
@@ -95,7 +95,7 @@ def stiffness_range(
 def switches(
     parameters: WalkerParameters, ranges: Sequence[StiffnessRange]
 ) -> list[StiffnessRange]:
-    """Return the ranges at the leg angles between these at which another instant decides."""
+    """Return the ranges at the leg angles between these at which a limit moves elsewhere."""
     found = []
     for before, after in pairwise(ranges):
         low, high = before, after

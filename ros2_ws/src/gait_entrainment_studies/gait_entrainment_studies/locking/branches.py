@@ -20,8 +20,8 @@ import numpy as np
 from gait_entrainment_studies.locking.pulsed_gait import Gaits, Place, PulsedGait
 from gait_entrainment_studies.locking.roots import ANGLE_TOLERANCE, Floats, solve
 
-# The scan along a branch, closer at its ends, where periods bend most, but not at the corners
-# themselves, where rounding would decide. What it brackets is solved for, so its step decides only
+# The scan along a branch, denser at its ends, where periods bend most, but not at the corners
+# themselves, where rounding would decide. What it brackets is solved for, so its step affects only
 # what may be overlooked.
 _SCAN = 0.5 - 0.5 * np.cos(np.linspace(1e-3, np.pi - 1e-3, 65))
 
@@ -122,19 +122,19 @@ def locked_gaits(
         along = partial(gait.gaits, piece.place)
         angles = piece.first.angle, piece.last.angle
         angle = solve(lambda x, along=along: along(x).period - period, *angles)  # type: ignore[misc]
-        one = along(np.array([angle])).at(0)
-        if one.end > one.start:
-            first, second = one.multipliers.tolist()
+        lock = along(np.array([angle])).at(0)
+        if lock.end > lock.start:
+            first, second = lock.multipliers.tolist()
             found.append(
                 LockedGait(
                     place=piece.place,
-                    period=float(one.period),
-                    onset=float(one.onset),
-                    lag=float(one.lag),
-                    phase=float(one.phase),
-                    speed=gait.speed(float(one.apex)),
+                    period=float(lock.period),
+                    onset=float(lock.onset),
+                    lag=float(lock.lag),
+                    phase=float(lock.phase),
+                    speed=gait.speed(float(lock.apex)),
                     multipliers=(first, second),
-                    stable=bool(one.stable),
+                    stable=bool(lock.stable),
                 )
             )
     return found
@@ -146,11 +146,11 @@ def stable_intervals(pieces: list[Piece]) -> list[Piece]:
 
 
 def basin_of(gait: PulsedGait, pieces: list[Piece]) -> tuple[float, float]:
-    """Return shortest and longest period with a stable lock [s]; the unperturbed one if none."""
+    """Return shortest and longest period with a stable lock [s]; without one, the unperturbed."""
     stable = stable_intervals(pieces)
     return (
-        min((one.least_period.period for one in stable), default=gait.unperturbed_period),
-        max((one.greatest_period.period for one in stable), default=gait.unperturbed_period),
+        min((piece.least_period.period for piece in stable), default=gait.unperturbed_period),
+        max((piece.greatest_period.period for piece in stable), default=gait.unperturbed_period),
     )
 
 
@@ -195,7 +195,7 @@ def _turns(
     if high - low < 4 * _BESIDE:
         yield angle, border, after
         return
-    # There may be more than one, such as a flip close to a fold: look right beside it.
+    # There may be more than one, such as a flip close to a fold: look right next to it.
     beside = np.clip([angle - _BESIDE, angle + _BESIDE], low, high)
     if border is Border.FOLD:
         left, here = _marks(along(beside))

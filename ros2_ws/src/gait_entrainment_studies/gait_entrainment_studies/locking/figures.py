@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The branches of locked gaits as a picture: pulse period against pulse phase."""
+"""Figure of the branches of locked gaits: pulse onset after toe-off against pulse period."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,7 +21,7 @@ def draw_branches(
 ) -> list[Path]:
     """Draw all branches, stable or not, their borders, and the locked gaits at one period."""
     figure, axes = drawing.new_figure()
-    for piece in (one for one in pieces if one.feasible):
+    for piece in (piece for piece in pieces if piece.feasible):
         gaits = gait.gaits(piece.place, np.linspace(piece.first.angle, piece.last.angle, 80))
         dash, width = ("-", 2.2) if piece.stable else ((0, (2, 2)), 1.2)
         style = {"color": PLACE_COLOURS[piece.place], "ls": dash, "lw": width}

@@ -2,14 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Gaits with one pulse a stride, exactly, in terms of where in double stance the pulse acts.
+Exact gaits with one pulse per stride, in terms of where in double stance the pulse acts.
 
-This is the independent solution: it shares only the closed forms of the linkage with the walker in
-time, so that each can be checked against the other.
+This solution is independent: it shares only the closed forms of the linkage with the simulated
+walker, so each can be checked against the other.
 
 A pulse of width w on the trailing leg acts from the ankle angle psi_s to psi_e. Energy then gives
 the speed of the gait that repeats itself in closed form, because the stride is linear in `apex`
-(below), and times are quadratures between known angles: nothing is integrated step by step and no
+(below). Times are quadratures between known angles: nothing is integrated step by step and no
 time is inverted. So a whole branch of gaits takes a few array operations.
 
 `apex` is the squared angular velocity [1/s^2] that the mass would have at the apex without further
@@ -22,8 +22,8 @@ strike [s], negative before it), and a pulse period tau_p gives the map
 
     apex' = A(apex, onset),    onset' = onset + tau_p - R(apex, onset),
 
-R being the time to the next such heel strike. Its fixed points are the 1:1 phase-locked gaits: the
-gaits below whose period R is tau_p. The Jacobian does not depend on tau_p and is exact.
+where R is the time to the next such heel strike. Its fixed points are the 1:1 phase-locked gaits,
+those whose period R is tau_p. The Jacobian does not depend on tau_p and is exact.
 """
 
 import math
@@ -40,14 +40,14 @@ from gait_entrainment.errors import UsageError
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment_studies.locking.roots import Floats, first_root, newton
 
-# The closed forms of the linkage are typed for numbers; being arithmetic only, they take arrays.
+# The closed forms of the linkage are typed for numbers but, being mere arithmetic, take arrays.
 _FORMS: Any = geometry
 
 # Gauss-Legendre rule of one stretch of double stance, and the weights that give the last two
-# Legendre coefficients. With Table 1 each is a third of the one before over a whole double stance,
-# so 24 nodes leave 3^-48 of the time. If the last two are not this small beside the mean, the
-# stretch has not converged and is halved, as many other walkers need: the error is then about
-# their square.
+# Legendre coefficients. With Table 1, over a whole double stance, each is a third of the one
+# before, so 24 nodes leave an error of 3^-48 of the time. If the last two are not this small
+# compared with the mean, the stretch has not converged and is halved, as many other walkers
+# require: the error is then about their square.
 _COUNT = 24
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(_COUNT)
 _LAST = np.arange(_COUNT - 2, _COUNT)
@@ -70,7 +70,7 @@ class Place(str, Enum):
 
 @dataclass(frozen=True)
 class Gaits:
-    """Gaits that repeat themselves, one element each; times in s, NaN if there is none."""
+    """Gaits that repeat themselves, one per element; times in s, NaN if there is no gait."""
 
     start: Floats
     """Ankle angle where the pulse begins to act [rad]."""
@@ -81,7 +81,7 @@ class Gaits:
     period: Floats
     """Time from one pulse to the next."""
     apex: Floats
-    """State of the speed at the section."""
+    """The speed at the section, as `apex`."""
     double_stance: Floats
     """Duration of the perturbed leg's push-off."""
     step: Floats
@@ -106,7 +106,7 @@ class Gaits:
     @property
     def slope(self) -> Floats:
         """
-        Derivative of the period by the onset, along the branch.
+        Derivative of the period with respect to the onset, along the branch.
 
         det(I - J) = (1 - dA/dapex) slope: a multiplier is 1 exactly where the branch folds.
         """
@@ -145,7 +145,7 @@ class _Stretch(NamedTuple):
 
     time: Floats
     by_apex: Floats
-    """Derivative of the time by `apex`."""
+    """Derivative of the time with respect to `apex`."""
     sound: Any
     """Whether the quadrature has converged, with the walker moving and on the ground."""
 
@@ -196,7 +196,7 @@ class PulsedGait:
     # Branches: where the pulse begins and ends.
 
     def gaits(self, place: Place, angle: Floats) -> Gaits:
-        """Return gaits of a branch by the ankle angle where the pulse ends (EARLY) or begins."""
+        """Return a branch's gaits for ankle angles where the pulse ends (EARLY) or begins."""
         if place is Place.EARLY:
             return self._gaits(np.full_like(angle, self.heel_strike), angle, place)
         if place is Place.INSIDE:
@@ -253,7 +253,7 @@ class PulsedGait:
         return torque
 
     def _pulse_gain(self, start: Floats, angle: Floats) -> Floats:
-        """Gain in squared rate by the pulse from `start` to `angle`."""
+        """Gain in squared rate from the pulse between `start` and `angle`."""
         loaded = np.minimum(np.maximum(start, self._unloaded), angle)
         left, last = self.toe_off - loaded, self.toe_off - angle
         spring = 0.5 * self.parameters.ankle_stiffness * (left**2 - last**2)
@@ -261,7 +261,7 @@ class PulsedGait:
         return gain
 
     def _gain(self, angle: Floats, sine: Floats, cosine: Floats) -> Floats:
-        """Gain in squared rate since heel strike without a pulse, by spring and height."""
+        """Gain in squared rate since heel strike from spring and height, without a pulse."""
         p = self.parameters
         work = _FORMS.torque_work(angle - self.heel_strike, p.peak_torque, p.ankle_stiffness)
         gain: Floats = self._per_energy * work + self._per_drop * _FORMS.drop(sine, cosine)
@@ -320,7 +320,7 @@ class PulsedGait:
         return _Stretch(time, by_apex, sound)
 
     def _pulse_time(self, start: Floats, end: Floats, apex: Floats | None = None) -> _Stretch:
-        """Time under the pulse, in two stretches where it unloads the trailing foot."""
+        """Time under the pulse, in two stretches if it unloads the trailing foot."""
         if apex is None:
             apex = self._apex(start, end)
         if self._unloaded == self.toe_off:
@@ -342,7 +342,7 @@ class PulsedGait:
         moving = np.nan_to_num(apex, nan=-1.0) > 0
         apex = np.where(moving, apex, np.nan)
         p = self.parameters
-        # The way to an apex after toe-off adds to the time, that from an apex before it takes off.
+        # The way to an apex after toe-off adds to the time; that from an apex before it subtracts.
         for angle in (p.toe_off_angle, p.leg_angle):
             sign, z = math.copysign(1, angle), math.sin(angle / 2) ** 2
             x, y, w = apex * (1 - z), apex + 2 * self._per_drop * z, apex
@@ -374,9 +374,9 @@ class PulsedGait:
         step = double_stance + swing.time
         onset = pulse.time - self.width if place is Place.EARLY else before.time
 
-        # Forward differentiation by (apex, onset), in the order of the motion.
-        one, none, column = np.ones_like(apex), np.zeros_like(apex), np.newaxis
-        d_apex, d_onset = np.stack([one, none], axis=-1), np.stack([none, one], axis=-1)
+        # Forward differentiation with respect to (apex, onset), in the order of the motion.
+        ones, zeros, column = np.ones_like(apex), np.zeros_like(apex), np.newaxis
+        d_apex, d_onset = np.stack([ones, zeros], axis=-1), np.stack([zeros, ones], axis=-1)
         begins, ends = place in (Place.INSIDE, Place.LATE), place in (Place.INSIDE, Place.EARLY)
         d_start = d_end = np.zeros_like(d_apex)
         with np.errstate(invalid="ignore"):
@@ -401,12 +401,12 @@ class PulsedGait:
         period, sound = step, before.sound & pulse.sound & after.sound & swing.sound
         arriving = self._collide(leaving)
         for _ in range(self.steps_per_pulse - 1):
-            whole = self._stretch(here, there, arriving)
+            double = self._stretch(here, there, arriving)
             swing = self._single_stance(arriving + self._step_gain)
-            period = period + whole.time + swing.time
-            d_period = d_period + (whole.by_apex + swing.by_apex)[..., column] * d_next
+            period = period + double.time + swing.time
+            d_period = d_period + (double.by_apex + swing.by_apex)[..., column] * d_next
             d_next = self._kept * d_next
-            sound = sound & whole.sound & swing.sound
+            sound = sound & double.sound & swing.sound
             arriving = self._collide(arriving + self._step_gain)
         jacobian = np.stack([d_next, d_onset - d_period], axis=-2)
         return Gaits(start, end, onset, period, apex, double_stance, step, jacobian, sound)

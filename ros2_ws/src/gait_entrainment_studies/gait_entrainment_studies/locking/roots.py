@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Roots of functions of the ankle angle [rad], which take arrays."""
+"""Roots of functions of the ankle angle [rad] that take arrays."""
 
 from collections.abc import Callable
 
@@ -11,15 +11,15 @@ from scipy.optimize import brentq
 
 Floats = NDArray[np.float64]
 
-# Ankle angles are solved to this [rad]: at 0.1 rad/s and faster, below 1e-11 s. Newton steps end
-# there too; their convergence is quadratic, so the next one would be rounding.
+# Ankle angles are solved to this [rad]: at 0.1 rad/s and faster, below 1e-11 s. Newton steps also
+# end there; their convergence is quadratic, so the next one would be rounding.
 ANGLE_TOLERANCE = 1e-12
 _MOST_STEPS = 100
-# If the next Newton step would still be longer than this [rad], there is no such angle.
+# If the next Newton step would still be longer than this [rad], there is no root.
 _NO_ROOT = 1e-10
 
-# Points of the scan for the first root. The function grows up to where the walker falls, and the
-# scan closes in on that place.
+# Points of the scan for the first root. The function grows up to where the walker falls, and each
+# further scan closes in on that angle.
 _SCAN_POINTS = 33
 _MOST_SCANS = 8
 
@@ -51,7 +51,7 @@ def newton(
 
 
 def first_root(function: Callable[[Floats], Floats], start: float, end: float) -> float:
-    """Return the root nearest to `start`, where the function is negative; `end` if none."""
+    """Return the root nearest to `start`, where the function is negative; without one, `end`."""
     angles = np.linspace(start, end, _SCAN_POINTS)
     for _ in range(_MOST_SCANS):
         with np.errstate(invalid="ignore"):
@@ -62,7 +62,7 @@ def first_root(function: Callable[[Floats], Floats], start: float, end: float) -
         bracket = angles[beyond[0] - 1], angles[beyond[0]]
         if values[beyond[0]] >= 0:
             return solve(function, *bracket)
-        # The walker has fallen there, and the time grows without bound on the way.
+        # The walker has fallen there, and the time grows without bound on the way to it.
         angles = np.linspace(*bracket, _SCAN_POINTS)
     return end
 

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Walks under a train of pulses, by the walker in time: they confirm the solved locks.
+Simulated walks under a train of pulses, which confirm the solved locks.
 
 A walk that has not locked is called slipping only once the pulses have gone through a whole gait
-cycle: then every phase has been tried. Near a border that takes about 2 tau_0 over the distance
-to it in strides, so a shorter walk proves nothing and is reported as censored.
+cycle, and so through every phase. Near a border this takes a number of strides of about 2 tau_0
+over the distance to it, so a shorter walk proves nothing and is reported as censored.
 """
 
 from collections.abc import Sequence
@@ -25,28 +25,28 @@ from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
 from gait_entrainment_studies.walks import Pulses, walk
 
 # A lag that creeps by less than this per stride [s], for several strides, is called locked. So
-# the solver, not walking, decides about a pulse period closer than this to a border.
+# the solver, not walking, decides for a pulse period closer than this to a border.
 CREEP = 1e-7
 _QUIET_STRIDES = 5
 
-# Gait cycles that the pulses must slip through: one, and what the first strides may skip.
+# Gait cycles that the pulses must slip through: one, plus what the first strides may skip.
 _SLIPPED_CYCLES = 1.25
 
-# What whole nanoseconds can count [s], with room for a pulse.
+# The longest time that whole nanoseconds can count [s], with room for a pulse.
 _CLOCK = 9e9
 
-# How close to a solved lock a walk must end [s]: what the creep still allowed adds up to at a
-# multiplier of 0.99, far below the distance between two locks.
+# How close to a solved lock a walk must end [s]: the sum of the creep that is still allowed, at a
+# multiplier of 0.99, which is far below the distance between two locks.
 _NEAR = 2e-5
 
-# Strides that a walk is given in addition to those that slipping takes.
+# Strides of a walk in addition to those that slipping takes.
 _SETTLING_STRIDES = 100
-# Near a fold or with a slow multiplier it takes longer; a censored walk is made again.
+# Near a fold or with a slow multiplier it takes longer; a censored walk is repeated, longer.
 _LONGEST = 4000
 
 
 class Outcome(str, Enum):
-    """What became of a walk under pulses, the better the earlier."""
+    """The outcome of a walk under pulses, from the best to the worst."""
 
     LOCKED = "locked"
     ALTERNATING = "locked 2:2: every other stride alike"
@@ -97,7 +97,7 @@ class PulsedWalk:
         return lags
 
     def outcome(self, creep: float = CREEP) -> Outcome:
-        """What became of the walk; locked if its lag creeps by less than `creep` [s] a stride."""
+        """The outcome of the walk; locked if its lag creeps by less than `creep` [s] a stride."""
         if self.ending is not None:
             return self.ending
         lags = self.unwrapped_lags
@@ -152,7 +152,7 @@ def shares_of(
     """
     Walk from `phases` initial phases, spread evenly over the stride, at a pulse period [s].
 
-    Return what became of the walks, and the share of them that each stable lock draws.
+    Return the outcomes of the walks, and the share of them that each stable lock draws.
     """
     distance = max(abs(period - gait.unperturbed_period), 1e-4)
     enough = _SETTLING_STRIDES + int(1.5 * gait.unperturbed_period / distance)

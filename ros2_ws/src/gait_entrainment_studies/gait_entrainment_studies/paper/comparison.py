@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Every number that Ahn and Hogan (2012) print, beside ours.
+Every number printed by Ahn and Hogan (2012), compared with ours.
 
-What they print is in `statements.yaml`, with the rules by which ours agrees; ours are never tuned
-to theirs. If one does not agree, `explain` tests what may lie behind the difference.
+The printed numbers are in `statements.yaml`, with the rules for agreement; ours are never tuned to
+match them. For those that do not agree, `explain` tests what may be behind the difference.
 """
 
 import math
@@ -41,12 +41,12 @@ from gait_entrainment_studies.paper.experiments import (
 STATEMENTS = yaml.safe_load(Path(__file__).with_name("statements.yaml").read_text())
 _ROUNDED = "k and mu are rounded in Table 1: see the table of explanations"
 
-Found = float | str | tuple[str, bool]  # a text may come with whether it agrees
+Found = float | str | tuple[str, bool]  # the tuple: a text, and whether it agrees
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """One published statement and what we find."""
+    """One published statement and our result."""
 
     name: str
     paper: float | str
@@ -58,7 +58,7 @@ class Comparison:
 
 
 def compare() -> list[Comparison]:
-    """Return all comparisons, for Table 1."""
+    """Return all comparisons, for the walker of Table 1."""
     rows = [*_gait(), *_entrainment()]
     for steps, every in ((2, "pulse in every stride"), (1, "pulse in every step")):
         rows += _speed_curve(steps, every)
@@ -66,7 +66,7 @@ def compare() -> list[Comparison]:
 
 
 def _rows(group: str, found: Mapping[str, Found], **words: Any) -> list[Comparison]:
-    """Hold what we found, by the keys of the statements of a group, against them."""
+    """Compare the statements of a group with what we found, given by their keys."""
     rows = []
     for statement in STATEMENTS[group]:
         paper, ours, agrees = statement["paper"], found[statement["key"]], None
@@ -109,17 +109,17 @@ def _entrainment() -> list[Comparison]:
     period = gait.unperturbed_period
     pieces = pieces_of(gait)
     shortest, longest = _basin(gait, pieces)
-    # At exactly 2 tau_0 every onset at which the pulse does nothing repeats itself: no lock.
+    # At exactly 2 tau_0 every onset at which the pulse does nothing repeats, which is not a lock.
     grid = np.concatenate([np.arange(-100, 0, 2), np.arange(2, 101, 2)])
     outcomes = outcomes_along(grid * 1e-3, np.array([0.0, 0.25, 0.5, 0.75]))
-    locked = [int(grid[i]) for i, one in enumerate(outcomes) if one is Outcome.LOCKED]
+    locked = [int(grid[i]) for i, outcome in enumerate(outcomes) if outcome is Outcome.LOCKED]
     least, coarse = min(locked), min(ms for ms in locked if ms % 4 == 0)
     walks = [paper_walk(-0.05, phase, 120) for phase in np.arange(24) / 24]
     lags = np.array([walk.lags[-1] for walk in walks])
-    lock = next(one for one in locked_gaits(gait, period - 0.05, pieces) if one.stable)
+    lock = next(lock for lock in locked_gaits(gait, period - 0.05, pieces) if lock.stable)
     last = float(walks[0].stride_periods[-1])
     none_longer, none_shorter = longest == 0 and max(locked) < 0, shortest > -0.08 and least > -80
-    # A pulse that reaches over toe-off begins at most its width before.
+    # A pulse that outlasts toe-off begins at most its width before it.
     close = bool(np.ptp(lags) < 1e-8 and -PULSE_WIDTH < lags.mean() <= 0)
     found: dict[str, Found] = {
         "longer": "none" if none_longer else f"up to {longest * 1e3:+.3f} ms",
@@ -163,8 +163,8 @@ def _speed_curve(steps: int, every: str) -> list[Comparison]:
         "range": 100 * (fastest / slowest - 1),
         "width": 100 * width / paper_pulses().unperturbed_period,
         "ratio": (longest - shortest) / width,
-        # Speed falls while the period grows.
-        "signs": " ".join("-" if one.last.period > one.first.period else "+" for one in pieces),
+        # Speed falls as the period grows.
+        "signs": " ".join("-" if p.last.period > p.first.period else "+" for p in pieces),
     }
     return _rows(
         "speed_curve",
@@ -179,9 +179,9 @@ def _speed_curve(steps: int, every: str) -> list[Comparison]:
 
 def explain() -> list[Comparison]:
     """
-    Test what may explain the differences: the values of k and mu behind the rounded Table 1.
+    Test whether the differences come from the rounding of k and mu in Table 1.
 
-    Of k alone, mu alone and both, the one with which every digit agrees explains them.
+    Of k alone, mu alone and both, the variant in which every digit agrees explains them.
     """
     p, degrees = TABLE_1, math.radians(147.6)
     turned = replace(p, max_plantarflexion=degrees)
@@ -189,12 +189,12 @@ def explain() -> list[Comparison]:
     stiffness = _stiffness_of_torque(p)
     rows = _rows("unrounded", {"stiffness": stiffness, "degrees": degrees})
     variants = {"k": replace(p, ankle_stiffness=stiffness), "mu": turned, "both": both}
-    for name, one in variants.items():
+    for name, walker in variants.items():
         found = {
-            "period": paper_pulses(one).unperturbed_period - 0.05,
-            "force": one.least_leading_force,
-            "peak_torque": one.peak_torque,
-            "vault_over": one.just_vault_over_stiffness,
+            "period": paper_pulses(walker).unperturbed_period - 0.05,
+            "force": walker.least_leading_force,
+            "peak_torque": walker.peak_torque,
+            "vault_over": walker.just_vault_over_stiffness,
         }
         rows += _rows("variant", found, name=name)
     gait = paper_pulses(both)
@@ -209,7 +209,7 @@ def _stiffness_of_torque(p: WalkerParameters) -> float:
 
 
 def _basin(gait: PulsedGait, pieces: list[Piece]) -> tuple[float, float]:
-    """Shortest and longest period with a stable lock, off the unperturbed one [s]."""
+    """Shortest and longest period with a stable lock, minus the unperturbed one [s]."""
     shortest, longest = (end - gait.unperturbed_period for end in basin_of(gait, pieces))
-    # Equal to rounding: the corner at toe-off is the unperturbed gait itself.
+    # Equal up to rounding: the corner at toe-off is the unperturbed gait itself.
     return shortest, 0.0 if abs(longest) < 1e-12 else longest

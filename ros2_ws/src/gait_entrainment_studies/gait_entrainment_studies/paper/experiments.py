@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The paper's numerical experiments on the walker of Table 1, repeated with the walker in time."""
+"""The paper's numerical experiments on the walker of Table 1, repeated with simulated walks."""
 
 import math
 from itertools import pairwise
@@ -20,7 +20,7 @@ PULSE_WIDTH = 0.1
 
 # This long before a collision [ns] the walker is certainly in single stance.
 _BEFORE_STRIKE = 10**6
-# No step from a speed near that of the gait takes longer [ns].
+# No step that starts near the speed of the gait takes longer [ns].
 _LONGEST_STEP = 4 * 10**9
 
 
@@ -30,17 +30,17 @@ def paper_pulses(walker: WalkerParameters = TABLE_1, steps_per_pulse: int = 2) -
 
 
 def paper_walk(period_offset: float, initial_phase: float, strides: int) -> PulsedWalk:
-    """Walk under the paper's pulses with this period [s] off the unperturbed stride period."""
+    """Walk under the paper's pulses, their period [s] off the unperturbed stride period."""
     gait = paper_pulses()
     return walk_under_pulses(gait, gait.unperturbed_period + period_offset, initial_phase, strides)
 
 
 def speeds_after_collisions(initial_speed: float, steps: int) -> Floats:
     """
-    Walk from an initial speed [m/s] and return the speeds after that many collisions.
+    Walk from an initial speed [m/s] and return the speed after each of `steps` collisions.
 
-    They are sampled in the single stance before and carried to the collision by energy, so that
-    the rounding of its instant to nanoseconds does not matter.
+    They are sampled in the single stance before each collision and carried to it by energy, so
+    that the rounding of its time to nanoseconds does not matter.
     """
     p = TABLE_1
     walker = Walker(p, Side.RIGHT, initial_speed)
@@ -90,7 +90,7 @@ def outcomes_along(offsets: Floats, initial_phases: Floats) -> list[Outcome]:
     """
     Walk at each pulse period offset [s] from every initial phase; return the worst outcomes.
 
-    A walk is made long enough to slip through a whole cycle.
+    Each walk is long enough to slip through a whole cycle.
     """
     period = paper_pulses().unperturbed_period
     found = []

@@ -21,7 +21,7 @@ from gait_entrainment_studies.paper.experiments import (
     torque_profiles,
 )
 
-# Pulse periods drawn in Fig. 5, off 2 tau_0 [ms].
+# Pulse periods drawn in Fig. 5, minus 2 tau_0 [ms].
 _ENTRAINED = (-76, -60, -50, -40, -20)
 _NOT_ENTRAINED = (-100, -80, 20, 60, 100)
 
@@ -48,7 +48,7 @@ def _convergence() -> Any:
     for factor, colour, dash in zip((1.2, 1.1, 1.05, 0.95, 0.9), COLOURS, DASHES, strict=False):
         speeds = speeds_after_collisions(factor * fixed, steps)
         errors = (np.array([factor * fixed, *speeds]) - fixed) / TABLE_1.leg_length
-        # Walking on, the angle theta falls: the angular velocity is negative.
+        # The angle theta falls while the walker advances: the angular velocity is negative.
         label = f"initial error {-errors[0]:+.3f} rad/s"
         axes.plot(range(errors.size), -errors, "o", ls=dash, color=colour, ms=4, label=label)
     axes.axhline(0, color=GREY, lw=0.8)
@@ -59,7 +59,7 @@ def _convergence() -> Any:
 
 
 def _entrainment() -> Any:
-    """Fig. 5: stride period against stride number, entrained and, one below another, not."""
+    """Fig. 5: stride period against stride number; entrained on top, the others below."""
     shares = [4.0] + [1.0] * len(_NOT_ENTRAINED)
     figure, (above, *below) = drawing.new_figure(
         len(shares), size=(7.2, 9.0), sharex=True, height_ratios=shares

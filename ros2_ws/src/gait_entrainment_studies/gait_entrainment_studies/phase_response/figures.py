@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The phase response curve, with the lock that it predicts beside the exact one."""
+"""The phase response curve, with the lock that it predicts and the exact one."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,7 +14,7 @@ from gait_entrainment_studies.phase_response.response import PhaseResponse, Pred
 def draw_response(
     response: PhaseResponse, predictions: Sequence[Prediction], folder: Path
 ) -> list[Path]:
-    """Draw shift against phase, and for each prediction the shift that locking asks for."""
+    """Draw shift against phase, and for each prediction the shift that locking requires."""
     figure, axes = drawing.new_figure()
     axes.plot(response.phase, response.shift * 1e3, color=BLUE, lw=2, label="in the end")
     axes.plot(
@@ -26,10 +26,10 @@ def draw_response(
         label="at the end of the stride",
     )
     stride = response.stride_period
-    for one in predictions:
-        wanted = -one.period_offset * 1e3
+    for prediction in predictions:
+        wanted = -prediction.period_offset * 1e3
         axes.axhline(wanted, color=GREY, ls=":", lw=0.8, label="what a lock asks for")
-        phases = [0.5 + lock.onset / stride for lock in (one.predicted, one.exact)]
+        phases = [0.5 + lock.onset / stride for lock in (prediction.predicted, prediction.exact)]
         style = {"mfc": "white", "mec": BLACK, "label": "lock predicted"}
         axes.plot(phases[:1], [wanted], "o", **style)
         axes.plot(phases[1:], [wanted], "x", color=BLACK, label="lock, exact")

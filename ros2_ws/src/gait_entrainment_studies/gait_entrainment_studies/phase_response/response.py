@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The phase response: what one single pulse, at each phase, does to the timing of the gait.
+The phase response: what a single pulse, at each phase, does to the timing of the gait.
 
 A single pulse is one in so many steps that its effect has died out before the next. So the curve
-is a branch of `locking.PulsedGait` with that many steps per pulse, exact like those, and the lock
-that the curve predicts (shift = unperturbed minus pulse period) is a locked gait of that walker.
-The prediction neglects what a pulse leaves for the next: a factor cos(2 alpha)^4 per stride.
+is a branch of `locking.PulsedGait` with that many steps per pulse, exact like any other, and the
+lock that it predicts (shift = unperturbed minus pulse period) is a locked gait of that walker.
+The prediction neglects what is left of a pulse at the next: a factor cos(2 alpha)^4 per stride.
 """
 
 import math
@@ -24,7 +24,7 @@ from gait_entrainment_studies.locking.branches import (
 from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
 from gait_entrainment_studies.locking.roots import Floats
 
-# What may be left of a disturbance when the gait has recovered: less than rounding.
+# The share of a disturbance that may be left once the gait has recovered: less than rounding.
 _RECOVERED = 1e-17
 
 
@@ -40,9 +40,9 @@ class PhaseResponse:
     lag: Floats
     """Onset after the perturbed leg's toe-off of the same stride."""
     shift: Floats
-    """How much earlier all later heel strikes come, in the end."""
+    """How much earlier all later heel strikes come, in the long run."""
     first_stride_shift: Floats
-    """How much earlier the heel strike comes that ends the stride of the pulse."""
+    """How much earlier the heel strike at the end of the pulse's stride comes."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Prediction:
 
 
 def single_pulse(gait: PulsedGait) -> PulsedGait:
-    """Return its gaits with so few pulses that the walker has recovered before the next."""
+    """Return the gaits with pulses so rare that the walker has recovered before the next."""
     kept = gait.parameters.floquet_multiplier
     strides = math.ceil(math.log(_RECOVERED) / math.log(kept) / 2)
     return PulsedGait(gait.parameters, gait.torque, gait.width, 2 * max(strides, 1))
@@ -68,7 +68,7 @@ def single_pulse(gait: PulsedGait) -> PulsedGait:
 
 def phase_response(gait: PulsedGait, points: int = 201) -> PhaseResponse:
     """
-    Return the response to a single pulse of a gait, with `points` points on each branch.
+    Return the response of a gait to a single pulse, with `points` points on each branch.
 
     It is NaN if the walker would fall or fly off under the pulse.
     """
@@ -78,10 +78,10 @@ def phase_response(gait: PulsedGait, points: int = 201) -> PhaseResponse:
         single.gaits(place, np.linspace(first, last, points))
         for place, first, last, _ in branches_of(single)
     ]
-    whole = single.unperturbed_period
-    shifts = [np.where(one.feasible, whole - one.period, np.nan) for one in branches]
-    firsts = [np.where(one.feasible, step - one.step, np.nan) for one in branches]
-    # Before and after, when the leg does not trail, a pulse does nothing.
+    cycle = single.unperturbed_period
+    shifts = [np.where(b.feasible, cycle - b.period, np.nan) for b in branches]
+    firsts = [np.where(b.feasible, step - b.step, np.nan) for b in branches]
+    # Before and after, when the leg does not trail, a pulse has no effect.
     toe_off, nothing = float(branches[-1].double_stance[-1]), np.zeros(2)
     onset = np.concatenate([[-step, -gait.width], *(b.onset for b in branches), [toe_off, step]])
     return PhaseResponse(
@@ -98,8 +98,8 @@ def predictions(gait: PulsedGait, period_offsets: Floats) -> list[Prediction]:
     """
     Compare predicted and exact stable locks at pulse periods [s] off the unperturbed stride.
 
-    If there are two attractors, each is compared with its like; a lock that only one of the two
-    methods finds is left out.
+    If there are two attractors, each is compared with its counterpart; a lock that only one of the
+    two methods finds is left out.
     """
     single = single_pulse(gait)
     single_pieces, pieces = pieces_of(single), pieces_of(gait)
@@ -107,7 +107,7 @@ def predictions(gait: PulsedGait, period_offsets: Floats) -> list[Prediction]:
     for offset in period_offsets:
         predicted = locked_gaits(single, single.unperturbed_period + offset, single_pieces)
         exact = locked_gaits(gait, gait.unperturbed_period + offset, pieces)
-        for lock in (one for one in exact if one.stable):
-            likes = [like for like in predicted if like.stable and like.place is lock.place]
-            found += [Prediction(float(offset), like, lock) for like in likes]
+        for lock in (lock for lock in exact if lock.stable):
+            same = [other for other in predicted if other.stable and other.place is lock.place]
+            found += [Prediction(float(offset), other, lock) for other in same]
     return found

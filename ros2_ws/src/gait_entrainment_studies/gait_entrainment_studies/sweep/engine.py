@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What makes the rows: processes of this machine, or the workers of a Dask cluster.
+Compute rows in processes on this machine, or on the workers of a Dask cluster.
 
-Rows come back in the order in which they are made.
+Rows are yielded in the order in which they are finished.
 """
 
 import asyncio
@@ -31,23 +31,23 @@ Made = TypeVar("Made")
 
 
 def chosen_jobs(text: str | None) -> int:
-    """Return the number of JOBS that is given; without one, of the cores of this process."""
+    """Return the given number of JOBS; by default, the number of cores of this process."""
     return len(os.sched_getaffinity(0)) if text is None else int(JOBS.parse("jobs", text))
 
 
 def by_processes(
     make: Callable[[int], Made], indices: Sequence[int], jobs: int
 ) -> Iterator[tuple[int, Made]]:
-    """Make things by number in `jobs` processes, in any order; one job: in this process."""
+    """Yield what `make` returns by index, from `jobs` processes in any order, or from this one."""
     if jobs == 1:
         for index in indices:
             yield index, make(index)
         return
-    # A fork of this process has everything loaded and starts at once, but the fork of a process
-    # with threads may hang; that one gets its workers from a server.
+    # A fork of this process has everything loaded and starts immediately, but a fork of a process
+    # with threads may hang: such a process gets its workers from a fork server.
     alone = threading.active_count() == 1
     context = multiprocessing.get_context("fork" if alone else "forkserver")
-    # Ctrl-C reaches every process of the terminal; only this one reacts to it.
+    # Ctrl-C reaches every process in the terminal; only this one reacts to it.
     pool = ProcessPoolExecutor(
         jobs, context, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)
     )
@@ -57,8 +57,8 @@ def by_processes(
             yield futures.pop(future), future.result()
     except BrokenProcessPool:
         raise SweepError(
-            f"one of {jobs} processes was killed, perhaps because memory ran out: give the same"
-            " command again, perhaps with fewer --jobs"
+            f"one of {jobs} processes was killed, perhaps because memory ran out: repeat the"
+            " command, perhaps with fewer --jobs"
         ) from None
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
@@ -66,9 +66,9 @@ def by_processes(
 
 def rows_by_dask(plan: SweepPlan, indices: Sequence[int], scheduler: str) -> Rows:
     """
-    Make rows on a Dask cluster.
+    Compute rows on a Dask cluster.
 
-    Raises SweepError if its scheduler does not answer or a row cannot be made there.
+    Raises SweepError if its scheduler does not answer or a row cannot be computed there.
     """
     try:
         dask: Any = importlib.import_module("distributed")  # optional, and slow to load
@@ -80,16 +80,16 @@ def rows_by_dask(plan: SweepPlan, indices: Sequence[int], scheduler: str) -> Row
         try:
             for future in dask.as_completed(list(futures)):
                 yield futures.pop(future), future.result()
-        except Exception as error:  # whatever a worker raised, or that it is gone
+        except Exception as error:  # whatever a worker raised, or the loss of the cluster
             what = f"{type(error).__name__}: {error}".partition("\n")[0]
             raise SweepError(
-                f"scheduler {scheduler}: a row could not be made ({what}): see that it runs, its"
-                " workers with this version of gait_entrainment; the same command goes on"
+                f"scheduler {scheduler}: a row could not be computed ({what}): check that it runs,"
+                " its workers with this version of gait_entrainment; the same command continues"
             ) from None
 
 
 def _ask_who_it_is(dask: Any, scheduler: str) -> None:
-    """Check that a scheduler answers: Dask's client waits forever for another service."""
+    """Check that a scheduler answers: Dask's client waits forever for any other service."""
 
     async def kind() -> str:
         async with dask.rpc(scheduler) as remote:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The Arnold tongue: what is solved and what is walked, side by side, never mixed."""
+"""Figures of the Arnold tongue: what is solved and what is walked, side by side, never mixed."""
 
 from collections.abc import Sequence
 from itertools import pairwise, product
@@ -25,11 +25,11 @@ def draw_tongue(
 ) -> list[Path]:
     """Draw the exact map and the walked one, with the exact borders over both."""
     figure, (left, right) = drawing.new_figure(1, 2, size=(9.6, 4.6), sharex=True, sharey=True)
-    for place in dict.fromkeys(one.place for one in borders):
+    for place in dict.fromkeys(row.place for row in borders):
         colour = PLACE_COLOURS[place]
-        for pair in _neighbours([one for one in borders if one.place == place]):
-            low, high = [one.shortest * 1e3 for one in pair], [one.longest * 1e3 for one in pair]
-            heights = [one.torque_fraction for one in pair]
+        for pair in _neighbours([row for row in borders if row.place == place]):
+            low, high = [row.shortest * 1e3 for row in pair], [row.longest * 1e3 for row in pair]
+            heights = [row.torque_fraction for row in pair]
             left.fill_betweenx(heights, low, high, color=colour, alpha=0.35, lw=0)
             for axes, line in ((left, BLACK), (right, "white")):
                 axes.plot(low, heights, color=line, lw=0.8)
@@ -38,7 +38,7 @@ def draw_tongue(
     offsets, fractions = plan.period_offsets.values * 1e3, plan.torque_fractions.values
     share = _cells(plan, table, "share_locked")
     _draw_map(plan, right, share, "share of the initial phases", vmin=0, vmax=1, cmap="cividis")
-    # Marks keep cells apart in which no walk can lock, because it ends or is not made.
+    # Marks distinguish cells in which no walk can lock, because it ends or is not made.
     for column, marker, label in (
         ("share_fell", "v", "a walk fell"),
         ("share_flew_off", "^", "a walk flew off"),
@@ -70,7 +70,7 @@ def draw_locked_lags(plan: SweepPlan, table: Any, folder: Path) -> list[Path]:
 
 
 def _draw_map(plan: SweepPlan, axes: Any, cells: Any, label: str, **style: Any) -> None:
-    """Draw a number for each cell in colours."""
+    """Draw one number per cell, as colours."""
     image = axes.imshow(cells, origin="lower", extent=_extent(plan), aspect="auto", **style)
     axes.figure.colorbar(image, ax=axes, label=label)
     axes.axvline(0, color=GREY, lw=0.6, ls=":")
@@ -94,13 +94,13 @@ def _extent(plan: SweepPlan) -> list[float]:
 def _neighbours(rows: Sequence[StableInterval]) -> list[tuple[StableInterval, StableInterval]]:
     """Pairs of intervals at neighbouring torques that continue each other."""
     by_torque: dict[float, list[StableInterval]] = {}
-    for one in sorted(rows, key=lambda one: one.torque_fraction):
-        by_torque.setdefault(one.torque_fraction, []).append(one)
+    for row in sorted(rows, key=lambda row: row.torque_fraction):
+        by_torque.setdefault(row.torque_fraction, []).append(row)
     pairs: list[tuple[StableInterval, StableInterval]] = []
     for here, there in pairwise(by_torque.values()):
         if len(here) == len(there):
             pairs += zip(here, there, strict=True)
-        else:  # one has split or ended: those that overlap belong together
+        else:  # an interval has split or ended: those that overlap belong together
             pairs += [
                 (one, other)
                 for one, other in product(here, there)

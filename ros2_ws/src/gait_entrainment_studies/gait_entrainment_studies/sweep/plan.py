@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a sweep goes through, and what identifies it when it is resumed."""
+"""The values that a sweep covers, and what identifies it when it is resumed."""
 
 import json
 import platform
@@ -21,7 +21,7 @@ _PACKAGES = ("gait_entrainment", "numpy", "scipy", "numba", "pyarrow")
 
 
 class SweepError(EntrainmentError):
-    """A sweep that cannot be made; the message is one line and says what to do."""
+    """A sweep that cannot be completed; the message is one line and says what to do."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class SweepPlan(Checked):
     """Pulse period minus the unperturbed stride period [s]."""
     torque_fractions: Axis
     """Height of the pulse as a fraction of the peak ankle torque."""
-    phases: int = setting(16, "initial phases walked from", within=(1, 10_000))
+    phases: int = setting(16, "number of initial phases", within=(1, 10_000))
     strides: int = setting(100, "strides of each walk", within=(10, 1_000_000))
     width: float = setting(0.1, "duration of the pulse", "s")
 
@@ -65,7 +65,7 @@ class SweepPlan(Checked):
         PulsedGait(self.walker, 0.0, self.width)
 
     def provenance(self) -> dict[str, Any]:
-        """Return the plan and the versions that it is made with, as JSON holds them."""
+        """Return the plan and the versions that run it, in JSON types."""
         versions = {"python": platform.python_version()}
         for package in _PACKAGES:
             try:

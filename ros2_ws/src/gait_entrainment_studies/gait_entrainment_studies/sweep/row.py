@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is solved and walked at one torque: the cells of a row, and the exact borders."""
+"""What is solved and what is walked at one torque: the cells of a row, and the exact borders."""
 
 from dataclasses import dataclass, fields
 from typing import Any
@@ -16,8 +16,8 @@ from gait_entrainment_studies.locking.roots import Floats
 from gait_entrainment_studies.locking.walked import Outcome, walk_under_pulses
 from gait_entrainment_studies.sweep.plan import SweepPlan
 
-# A lag that creeps by less than this per stride [s] counts as locked by the last stride. At a
-# pulse period closer than this to a border walking cannot tell, and the exact map decides.
+# A lag that creeps by less than this per stride [s] counts as locked by the last stride. For a
+# pulse period closer than this to a border, walking cannot decide, but the exact map does.
 _CREEP = 1e-5
 
 
@@ -40,7 +40,7 @@ class Cell:
     share_fell: float = np.nan
     share_flew_off: float = np.nan
     median_lag: float = np.nan
-    """Of the last pulses of the walks that locked [s]."""
+    """Median lag of the last pulses of the walks that locked [s]."""
     problem: str = ""
     """Why the cell was not walked."""
 
@@ -59,7 +59,7 @@ def sweep_row(plan: SweepPlan, index: int) -> Row:
     for offset in plan.period_offsets.values:
         period = float(gait.unperturbed_period + offset)
         locks = sum(
-            one.least_period.period < period < one.greatest_period.period for one in stable
+            piece.least_period.period < period < piece.greatest_period.period for piece in stable
         )
         if period <= plan.width:
             walked: dict[str, Any] = {"problem": "pulses overlap"}
@@ -73,7 +73,7 @@ def sweep_row(plan: SweepPlan, index: int) -> Row:
 
 
 def _walked(plan: SweepPlan, gait: PulsedGait, period: float) -> dict[str, float]:
-    """Return the fields of a cell that walks from every initial phase give."""
+    """Return the fields of a cell that come from walks from every initial phase."""
     walks = [
         walk_under_pulses(gait, period, float(phase), plan.strides)
         for phase in np.arange(plan.phases) / plan.phases
@@ -90,7 +90,7 @@ def _walked(plan: SweepPlan, gait: PulsedGait, period: float) -> dict[str, float
 
 @dataclass(frozen=True)
 class StableInterval:
-    """Pulse periods with a stable lock at one torque, off the unperturbed stride period [s]."""
+    """Pulse periods with a stable lock at one torque, minus the unperturbed stride period [s]."""
 
     torque_fraction: float
     place: Place

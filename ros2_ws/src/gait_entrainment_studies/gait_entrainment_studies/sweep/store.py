@@ -4,8 +4,8 @@
 """
 Results of a sweep on disk: one Parquet file per torque while it runs, one for all at the end.
 
-A file appears whole or not at all, so the same command resumes an interrupted sweep. With another
-plan or other versions it refuses a folder that is in use.
+A file appears complete or not at all, so the same command resumes an interrupted sweep. A folder
+that holds a sweep with another plan or other versions is refused.
 """
 
 import json
@@ -42,7 +42,7 @@ class SweepStore:
                 file.write_text(json.dumps(self._provenance, indent=1))
 
     def missing(self) -> list[int]:
-        """Return the rows that are not on disk yet, or damaged there."""
+        """Return the rows that are not yet on disk, or are damaged there."""
         return [index for index, part in enumerate(self._parts) if not _readable(part)]
 
     def add(self, index: int, row: Row) -> None:
@@ -68,7 +68,7 @@ class SweepStore:
             if stored.get(name) != wanted.get(name):
                 raise UsageError(
                     f"{description.parent} holds a sweep with {name} {stored.get(name)}, not"
-                    f" {wanted.get(name)}: resume it with that, or choose another folder"
+                    f" {wanted.get(name)}: resume it with that value, or choose another folder"
                 )
 
 
@@ -97,7 +97,7 @@ def _readable(part: Path) -> bool:
 
 @contextmanager
 def _whole(path: Path) -> Iterator[Path]:
-    """Give a file to write, which then takes its place under this name at once."""
+    """Yield a file to write, which then atomically takes its place under this name."""
     unfinished = path.with_suffix(".unfinished")
     yield unfinished
     os.replace(unfinished, path)

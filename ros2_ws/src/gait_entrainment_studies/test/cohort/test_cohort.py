@@ -115,7 +115,7 @@ def test_command_counts_every_subject_in_its_denominators(tmp_path, capsys):
         (["--initial-phase", "inf"], "initial_phase: 'inf'; allowed: at least 0 and below 1"),
         (["--subjects", "1"], "subjects: '1'; allowed: a whole number from 2 to 10000"),
         (["--seed", "-1"], "seed: '-1'; allowed: a whole number at least 0"),
-        (["--peak-torque", "0.9", "0.001"], "hardly a subject drawn has a gait"),
+        (["--peak-torque", "0.9", "0.001"], "hardly any subject drawn has a gait"),
     ],
 )
 def test_wrong_usage_is_one_line(arguments, message, capsys):

@@ -135,7 +135,8 @@ def test_rows_that_a_cluster_cannot_make_are_named():
         rows = rows_by_dask(plan, range(60), cluster.scheduler_address)
         next(rows)
         cluster.close()
-        with pytest.raises(SweepError, match=r"a row could not be made.*the same command goes on"):
+        message = r"a row could not be computed.*the same command continues"
+        with pytest.raises(SweepError, match=message):
             list(rows)
 
 
@@ -213,7 +214,7 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path, capsys):
     process.send_signal(signal.SIGINT)
     _, error = process.communicate()
     assert process.returncode == 1
-    assert b"the same command goes on" in error
+    assert b"the same command continues" in error
     kept = {path: path.stat().st_mtime_ns for path in parts.glob("*.parquet")}
     assert 0 < len(kept) < 12
     assert main([*command[3:], "--json"]) == 0
