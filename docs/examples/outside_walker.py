@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-A walker from outside this project, in the least that the role asks for (docs/person.md).
+A walker from outside this project, with the minimum that the role requires (docs/person.md).
 
-A metronome: strides of 0.8 s, made up. Put your own source of events in the place of `event_at`.
+It is a metronome with made-up strides of 0.8 s. Replace `event_at` with your own source of events.
 
     ROS_DOMAIN_ID=42 python docs/examples/outside_walker.py
     ROS_DOMAIN_ID=42 entrain run --real-time --walker person --elsewhere walker
@@ -23,14 +23,14 @@ STEP, PUSH_OFF, LATENCY = 400_000_000, 100_000_000, 50_000_000
 
 
 def event_at(place):
-    """Return stamp [ns since the first strike] and what happens there: strikes are 0, 2, 4, ..."""
+    """Return stamp [ns since the first strike] and fields of an event: strikes are 0, 2, 4, ..."""
     step, off = (place + 1) // 2, place % 2
     at = (step - off) * STEP + off * PUSH_OFF
     return at, {"kind": off, "side": (step + 1) % 2, "step": step, "uncertainty": 0.001}
 
 
 class OutsideWalker(rclpy.node.Node):
-    """Plays the walker; its node may have any name, the role is in the topics and the service."""
+    """Plays the walker; the node may have any name, as topics and service define the role."""
 
     def __init__(self):
         super().__init__("outside_walker")
@@ -46,7 +46,7 @@ class OutsideWalker(rclpy.node.Node):
         return response
 
     def hear(self, horizon):
-        if horizon.last:  # the experiment names the end of the run, which was far
+        if horizon.last:  # the end of the run, unknown until now
             self.end = horizon.until.sec * 10**9 + horizon.until.nanosec
 
     def report(self):
