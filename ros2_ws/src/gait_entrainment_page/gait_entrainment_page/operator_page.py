@@ -5,8 +5,8 @@
 operator_page: the page of a live run or a replay, as a node that only looks on.
 
 No node waits for it. Messages stay in subscriptions without an executor until they are taken, a
-few times a second; samples are subscribed to only while time passes at a walking pace. If it is
-the operator's heartbeat, it publishes a sign of life as long as the page is watched.
+few times a second; samples are subscribed to only at about real time. If the page is the
+operator's heartbeat, it publishes a sign of life as long as the page is watched.
 """
 
 import contextlib
@@ -151,7 +151,7 @@ class OperatorPage(Participant):
         self._readers[topic.name] = topic, RawReader(self, topic.type, topic.name, qos)
 
     def _follow(self, wanted: bool) -> None:
-        """Subscribe to the samples or unsubscribe, so that the walker does not wait for this."""
+        """Subscribe to the samples or not; without them the walker does not wait for this node."""
         policy = os.SCHED_OTHER if wanted else os.SCHED_BATCH
         for thread in map(int, os.listdir("/proc/self/task")):
             with contextlib.suppress(ProcessLookupError):
