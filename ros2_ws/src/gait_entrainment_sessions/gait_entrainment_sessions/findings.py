@@ -136,7 +136,7 @@ class StudyFindings:
     basin_deviation: Estimate
     phases: tuple[float, ...]  # mean phase of each person's entrained blocks
     direction: Direction  # of these
-    rayleigh: float  # p-value of their having none
+    rayleigh: float  # p-value of there being no common direction
 
     @classmethod
     def of(cls, findings: Sequence[Findings]) -> "StudyFindings":

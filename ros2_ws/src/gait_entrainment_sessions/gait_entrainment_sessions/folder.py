@@ -71,7 +71,7 @@ class SessionFolder:
                     f"{folder.path}: holds something else, and nothing is overwritten; give --out"
                 )
             cls._check_number(study, session)
-            for name in left:  # by a start that a crash cut short
+            for name in left:  # files of a start that a crash cut short
                 (folder.path / name).unlink()
             folder._begin(session)
         return folder

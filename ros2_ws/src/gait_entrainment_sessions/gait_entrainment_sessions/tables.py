@@ -133,9 +133,9 @@ def rows_of(placed: PlacedRun, kind: str) -> Iterator[Row]:
             yield seconds(stamp), *rest
     elif kind == "strides":
         for s, part, count in _strides_of(placed):
-            ends = (None, None) if sealed else (part, count)
+            revealing = (None, None) if sealed else (part, count)
             cells = s.side.name.lower(), seconds(s.start), s.period, *s.step_periods
-            yield s.number, ends[0], *cells, ends[1]
+            yield s.number, revealing[0], *cells, revealing[1]
     elif kind == "pulses":
         for block, p in ((part, p) for part in placed.parts for p in part.analysis.pulses):
             timing = placed.timings[p.onset]

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How much of a walk was locked. Separate, so that a report need not load what walks."""
+"""How much of a walk was locked. Separate, so that a report need not load the walker."""
 
 from itertools import groupby
 

@@ -84,9 +84,9 @@ def _summary(response: PhaseResponse, found: Sequence[Prediction]) -> str:
             f" {np.nanmin(ended):.4f} and {np.nanmax(ended):.4f}"
         )
     lines += [
-        f"lock at {one.period_offset * 1e3:+.3f} ms: lag predicted"
-        f" {one.predicted.lag * 1e3:.4f} ms, exact {one.exact.lag * 1e3:.4f} ms,"
-        f" difference {one.lag_error * 1e3:+.4f} ms"
-        for one in found
+        f"lock at {lock.period_offset * 1e3:+.3f} ms: lag predicted"
+        f" {lock.predicted.lag * 1e3:.4f} ms, exact {lock.exact.lag * 1e3:.4f} ms,"
+        f" difference {lock.lag_error * 1e3:+.4f} ms"
+        for lock in found
     ]
     return "\n".join(lines if found else [*lines, "no stable lock at the chosen pulse periods"])

@@ -38,7 +38,7 @@ def chosen_jobs(text: str | None) -> int:
 def by_processes(
     make: Callable[[int], Made], indices: Sequence[int], jobs: int
 ) -> Iterator[tuple[int, Made]]:
-    """Yield what `make` returns by index, from `jobs` processes in any order, or from this one."""
+    """Call `make` for each index in `jobs` processes, in any order; if 1, in this process."""
     if jobs == 1:
         for index in indices:
             yield index, make(index)
