@@ -362,7 +362,7 @@ class Shown:
 
     def _record_words(self, view: View) -> list[tuple[str, str]]:
         if self.page.bag is not None:
-            return [("bag", self.page.bag.path.name), ("holds", self.page.bag.record)]
+            return [("bag", self.page.bag.path.name), ("contents", self.page.bag.record)]
         nodes = {name.rpartition("/")[2]: state for name, state in view.nodes.items()}
         if (player := nodes.get("bag_player")) is not None:  # everything else heard was recorded
             return [("replay", player.message)]

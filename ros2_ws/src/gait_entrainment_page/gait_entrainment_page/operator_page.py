@@ -5,7 +5,7 @@
 operator_page: the page of a live run or a replay, as a node that only looks on.
 
 No node waits for it. Messages stay in subscriptions without an executor until they are taken, a
-few times a second; samples are subscribed to only at about real time. If the page is the
+few times a second; samples are subscribed to only up to four times real time. If it is the
 operator's heartbeat, it publishes a sign of life as long as the page is watched.
 """
 

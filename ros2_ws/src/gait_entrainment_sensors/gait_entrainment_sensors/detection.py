@@ -101,7 +101,7 @@ class SignalCounts:
     constant: int = _counted(
         "times the signal did not change: sensor dead or not worn, or nobody is walking"
     )
-    held: int = _counted("times the signal stuck in mid-movement: increase the sensor's range")
+    held: int = _counted("times the signal got stuck in mid-movement: increase the sensor's range")
     rejected: int = _counted("events were detected but rejected")
     lost: int = _counted("samples are zeros in mid-movement: lost in transmission; check the link")
     unlikely: int = _counted("angles beyond 2 rad: in degrees?")
@@ -131,7 +131,7 @@ class Detector(ABC):
     impossible: ClassVar[float] = math.inf
     # Magnitude that every walk reaches.
     reached: ClassVar[float] = 0.0
-    suspicion: ClassVar[str] = "check the units"  # if either does not hold
+    suspicion: ClassVar[str] = "check the units"  # hint if either is violated
     # Whether it notices sensors on the wrong feet.
     tells_sides: ClassVar[bool] = False
     # What its events cannot answer, reported before a run.
@@ -184,7 +184,7 @@ class Detector(ABC):
         total = 0.0
         for value in values:
             total += value if value >= 0.0 else -value
-        if not total < math.inf:  # false for NaN, too
+        if not total < math.inf:  # infinite or NaN
             self.counts.not_finite += 1
             return []
         if total > self._largest:

@@ -110,7 +110,7 @@ def find_sensor(text: str) -> tuple[str, EmulatedSettings]:
     """
     Return kind and settings of the emulated sensor named by a text, KIND:OPTION=VALUE,...
 
-    Raises UsageError if there is no such kind, LimitError for a wrong option.
+    Raises UsageError if the kind is unknown, LimitError for an invalid option.
     """
     kind, _, options = text.partition(":")
     if kind not in KINDS:

@@ -46,7 +46,7 @@ class Plate:
     times: Floats  # (n,) [s]
     force: Floats  # (n,) vertical, upwards positive [N]
     pressure: Floats  # (n, 3) centre of pressure [m]
-    low: Floats  # (3,) corner of the box that holds the plate [m]
+    low: Floats  # (3,) corner of the plate's bounding box [m]
     high: Floats  # (3,)
 
 
@@ -76,7 +76,7 @@ def read_c3d(
     try:
         file = ezc3d.c3d(str(path), extract_forceplat_data=plates)
     except (OSError, RuntimeError, ValueError, IndexError) as error:
-        reason = str(error).partition("\n")[0].partition(", please")[0]  # please tell ezc3d
+        reason = str(error).partition("\n")[0].partition(", please")[0]  # without ezc3d's request
         raise RecordingError(f"{path}: cannot be read as C3D: {reason}") from None
     # Some systems prefix each with the subject's name and a colon.
     labels = [label.rpartition(":")[2] for label in file["parameters"]["POINT"]["LABELS"]["value"]]

@@ -50,7 +50,7 @@ class Table:
     path: Path
     # By name, in lower case and without the unit: the factor to SI units, and the texts.
     columns: dict[str, tuple[float, list[str]]]
-    first: int  # row of the file that holds the first texts
+    first: int  # row of the file with the first texts
 
     def require(self, *names: str) -> None:
         """Raise RecordingError if a column is missing."""
@@ -160,7 +160,7 @@ def read_table(path: Path, separators: str = "\t;,") -> Table:
 
 
 def _is_data(row: Sequence[str], width: int) -> bool:
-    """Whether a row holds numbers, and as many fields as the others."""
+    """Whether a row contains numbers, and as many fields as the others."""
     return len(row) == width and any(f.strip() and _number(f) is not None for f in row)
 
 

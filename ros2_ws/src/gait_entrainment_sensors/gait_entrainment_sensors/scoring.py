@@ -38,13 +38,13 @@ def score(
     for reference, detected in feet:
         times, taken = sorted(detected), set[int]()
         events += len(reference)
-        for instant in sorted(reference):
-            place = bisect_left(times, instant)
+        for time in sorted(reference):
+            place = bisect_left(times, time)
             near = [i for i in (place - 1, place) if 0 <= i < len(times) and i not in taken]
-            best = min(near, key=lambda i: abs(times[i] - instant), default=None)
-            if best is not None and abs(times[best] - instant) <= tolerance:
+            best = min(near, key=lambda i: abs(times[i] - time), default=None)
+            if best is not None and abs(times[best] - time) <= tolerance:
                 taken.add(best)
-                errors.append(times[best] - instant)
+                errors.append(times[best] - time)
         if reference:
             first, last = min(reference) - tolerance, max(reference) + tolerance
             false += sum(first <= t <= last and i not in taken for i, t in enumerate(times))

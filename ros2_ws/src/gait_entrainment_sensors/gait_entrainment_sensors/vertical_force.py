@@ -112,7 +112,7 @@ class VerticalForceDetector(Detector):
         if self._downwards:
             lines += (f"{where}: {self._downwards} samples below {_PULLED:g} N: {self.suspicion}",)
         if self._walked_long and self._largest > self.reached and not self._unloaded:
-            lines += (f"{where}: never unloaded: zero it; are both feet on it, or nobody walks?",)
+            lines += (f"{where}: never unloaded: zero it; both feet on it, or nobody walking?",)
         return lines
 
     def _take(self, time: float, values: Sequence[float]) -> list[Detection]:
