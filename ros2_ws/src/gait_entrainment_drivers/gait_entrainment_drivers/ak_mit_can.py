@@ -55,7 +55,7 @@ class AkMotorOnCan(CanMotor):
     def enable(self) -> None:
         """Enter motor mode at zero torque."""
         # The motor keeps its last command across modes: send zero before and after. A reply does
-        # not say what it answers: drop the one to zero, lest it pass for one to a lost frame.
+        # not say what it answers: drop the first, which could pass for one to a lost frame.
         self._ask(lambda: self._command(0.0), self._reply)
         self.forget()
         self._ask(lambda: self._tell(ak_mit.ENTER), self._reply)

@@ -15,7 +15,7 @@ from gait_entrainment_drivers.device import Reading
 NOT_FOLLOWED = Fault(
     "torque_not_followed",
     "The measured torque does not follow the command: it is unrequested, in the wrong direction, "
-    "or too late, or the readings are of another device. If torque is felt, cut the power.",
+    "or too late, or the readings come from another device. If torque is felt, cut the power.",
 )
 NOT_FALLING = Fault(
     "torque_not_falling",

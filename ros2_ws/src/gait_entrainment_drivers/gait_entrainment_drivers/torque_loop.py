@@ -217,7 +217,7 @@ class TorqueLoop:
             self._end_torque()  # the parent knows why
         elif kind == "freeze":
             os.kill(os.getpid(), signal.SIGSTOP)
-            self._listen()  # what to do next was sent before it was continued
+            self._listen()  # the next message was sent before SIGCONT
         elif kind in ("open", "enable", "disable", "close"):
             error = ""
             try:
@@ -267,7 +267,7 @@ class TorqueLoop:
 
 
 def prefer_this_process() -> str:
-    """Request real-time scheduling and locked memory; return a text of what was not permitted."""
+    """Request real-time scheduling and locked memory; return what was refused, as text."""
     gc.collect()
     gc.freeze()
     gc.disable()  # nothing in the loop creates reference cycles
@@ -285,7 +285,7 @@ def main() -> int:
     """Serve the parent at the other end of the socket with the given descriptor."""
     for number in (signal.SIGINT, signal.SIGHUP, signal.SIGTSTP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)  # the parent obeys them, and then informs the loop
-    # A frozen loop whose parent dies is continued, and notices.
+    # When its parent dies, a frozen loop is continued and notices it.
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGCONT)
     link = Link(socket.socket(fileno=int(sys.argv[1])))
     device_type, options = link.first()
