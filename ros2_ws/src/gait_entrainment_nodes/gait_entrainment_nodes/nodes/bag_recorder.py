@@ -384,8 +384,8 @@ class BagRecorder(Participant):
         try:
             self._subscribe_to_new_topics()
             self._bag.flush()
-            sums = {"output": self.settings.output, "messages": sum(self._bag.counts.values())}
-            self.note_state(DiagnosticStatus.OK, "recording", **sums)
+            info = {"output": self.settings.output, "messages": sum(self._bag.counts.values())}
+            self.note_state(DiagnosticStatus.OK, "recording", **info)
         except BagError as error:
             self._break_off(error)
 

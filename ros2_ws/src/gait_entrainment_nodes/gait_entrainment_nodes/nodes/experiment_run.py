@@ -34,7 +34,7 @@ PERTURBATOR, WALKER, RECORDER = "perturbator", "walker_sim", "bag_recorder"
 
 
 class ExperimentError(NodeError):
-    """The run cannot go on."""
+    """The run cannot continue."""
 
 
 class Run:

@@ -69,7 +69,7 @@ class Run:
             return False
         if self.promised_until < self.end:
             return False
-        # With measured onsets the state at the closing instant is the last one.
+        # With measured onsets the state at the closing time is the last one.
         return self._measured is None or (
             self._closed and self._measured.states_until >= self.promised_until
         )

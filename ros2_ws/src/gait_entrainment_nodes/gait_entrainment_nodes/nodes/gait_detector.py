@@ -58,7 +58,7 @@ class Settings:
         0.03, "longest time from sample to arrival, plus one sample period", "s", (0.0, 1.0)
     )
     longest_age: float = setting(
-        0.5, "samples older than this, or ahead by a tenth of it, are ignored", "s", (0.01, 10.0)
+        0.5, "older samples, or ones ahead by over a tenth of it, are ignored", "s", (0.01, 10.0)
     )
     simulated: bool = setting(False, "sensor_sim replaces the person")
 

@@ -133,7 +133,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
         )
 
     def why_fixed(self, name: str) -> str:
-        """Return why a parameter cannot change now: the robot has been made with it."""
+        """Return why a parameter cannot change now: the robot was configured with it."""
         del name
         return "the robot is configured; clean it up first" if self._robots else ""
 
