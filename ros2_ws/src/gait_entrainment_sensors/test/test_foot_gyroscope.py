@@ -188,7 +188,7 @@ def test_sensors_on_the_wrong_feet_are_told():
         for side in Side:
             detector = FootGyroscopeDetector(side, UPRIGHT)
             fed(detector, zip(stream.times[:2000], stream.values[:2000], strict=True))
-            swapped = [line for line in detector.troubles() if "right feet" in line]
+            swapped = [line for line in detector.troubles() if "sensors swapped" in line]
             assert bool(swapped) == (side is not stream.side)
 
 
@@ -201,7 +201,7 @@ def test_degrees_per_second_are_told():
 def test_a_gyroscope_at_the_end_of_its_range_is_told():
     detector = FootGyroscopeDetector(Side.RIGHT, FootGyroscopeDetector.Settings(axis_x=1.0))
     fed(detector, sampled(lambda t: (max(-2.0, min(foot_rate(t), 2.0)), 0.0, 0.0), UNTIL))
-    assert any("raise the range" in line for line in detector.troubles())
+    assert any("increase the sensor's range" in line for line in detector.troubles())
 
 
 def test_a_heel_that_is_lifted_and_put_down_is_no_step():

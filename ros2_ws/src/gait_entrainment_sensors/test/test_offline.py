@@ -220,5 +220,5 @@ def test_nothing_is_overwritten_and_no_file_is_one_line(walk, tmp_path):
     with pytest.raises(RecordingError, match="cannot be read"):
         read_table(tmp_path / "none.csv")
     out.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(RecordingError, match="is no text"):
+    with pytest.raises(RecordingError, match="is not UTF-8 text"):
         read_table(out)

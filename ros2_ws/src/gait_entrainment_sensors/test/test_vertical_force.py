@@ -146,7 +146,7 @@ def test_who_stood_on_the_other_leg_is_not_taken_for_a_belt_that_is_not_zeroed()
         (lambda t: (force(t) + 300.0,), "never unloaded: zero it"),
         (lambda t: (-force(t),), "upwards positive"),
         (lambda t: (force(t) / 1e3,), "not in kN"),
-        (lambda t: (30.0 * force(t),), "cannot be"),
+        (lambda t: (30.0 * force(t),), "are impossible"),
         (lambda t: (min(force(t), 500.0),), "stuck in mid-movement"),
     ],
 )
