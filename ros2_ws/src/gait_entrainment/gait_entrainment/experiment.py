@@ -306,8 +306,8 @@ class Conductor:
         steady = self._is_steady(plan.baseline_steady)
         if not steady and started > _MOST_UNSTEADY:
             raise GaitError(
-                f"baseline: not steady after {started} strides; allowed: a baseline_steady "
-                f"above {plan.baseline_steady:g}"
+                f"baseline: not steady after {started} strides; allowed: a higher baseline_steady "
+                f"than {plan.baseline_steady:g}"
             )
         return steady
 

@@ -140,5 +140,5 @@ def test_what_is_no_driver_is_refused(monkeypatch):
     from gait_entrainment.robot import drivers
 
     monkeypatch.setitem(drivers.OWN_DRIVERS, "wrong", "pathlib:Path")
-    with pytest.raises(LimitError, match="no AnkleRobot"):
+    with pytest.raises(LimitError, match="not an AnkleRobot"):
         find_driver("wrong")
