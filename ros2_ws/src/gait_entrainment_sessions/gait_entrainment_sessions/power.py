@@ -35,14 +35,14 @@ class PowerPlan(Checked):
         0.02, "coefficient of variation of the stride period", "1", (0.0, 0.2)
     )
     hurst: float = setting(
-        0.75, "its correlation: 0.5 is white noise", "1", (0.5, 1.0), most_excluded=True
+        0.75, "its correlation: from 0.5 (white) to below 1", "1", (0.5, 1.0), most_excluded=True
     )
     stride: float = setting(1.1, "stride period", "s", (0.3, 5.0))
     baseline: int = setting(15, "strides before the pulses", "1", (2, 1000))
     gain: float = setting(
-        0.5, "share of the distance to its lock corrected in each stride", "1", (0.01, 1.0)
+        0.5, "share of the distance to its lock that a walk corrects per stride", "1", (0.01, 1.0)
     )
-    limit: float = setting(0.08, "largest correction, as a share of the stride", "1", (0.001, 1.0))
+    limit: float = setting(0.08, "largest correction as a share of a stride", "1", (0.001, 1.0))
     trials: int = setting(100, "walks of each kind", "1", (20, 100_000))
     seed: int = setting(0, "seed", "1", (0, 2**63 - 1))
 
