@@ -30,7 +30,7 @@ from gait_entrainment_nodes.messaging.environment import PACKAGE, dds_variables,
 
 # Argument of a launch file: name, default (None if it must be given), what --show-args shows.
 Argument = tuple[str, str | None, str]
-NAMESPACE: Argument = ("namespace", "", "of all nodes and topics, for several side by side")
+NAMESPACE: Argument = ("namespace", "", "of all nodes and topics, to run several side by side")
 PARAMETERS_FILE: Argument = ("params_file", str(settings_file()), "values for the nodes (YAML)")
 SHOW_PAGE: Argument = ("page", "false", "serve the operator's page: true or false")
 RVIZ: Argument = ("rviz", "false", "show the walker in RViz: true or false")

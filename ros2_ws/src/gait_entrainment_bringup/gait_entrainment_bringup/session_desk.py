@@ -64,7 +64,7 @@ class SessionDesk(Participant):
 
     def _pause(self, reason: str) -> str:
         if self._folder.paused is not None:
-            raise SessionError("the session is already asked to pause")
+            raise SessionError("a pause is already requested")
         self._folder.note("pause", self._folder.next_block() or 0, text=reason)
         return "the session will wait before its next block"
 

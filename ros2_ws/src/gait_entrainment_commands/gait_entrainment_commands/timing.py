@@ -4,8 +4,8 @@
 """
 When a pulse really came: commanded, sent and measured onset, from the device's own states.
 
-The commanded onset was planned. The sent onset is the stamp of the first state in which the device
-has been commanded the pulse. The measured onset is the instant at which the measured torque
+The commanded onset was planned. The sent onset is the stamp of the first state in which the pulse
+has been sent to the device. The measured onset is the instant at which the measured torque
 crosses a fraction of the pulse's height, interpolated between two states.
 """
 

@@ -40,7 +40,7 @@ EXAMPLES = """examples:
   entrain page --bag bags/paper_example         a recorded bag, at any time in it
   ROS_DOMAIN_ID=42 entrain page                 alongside a run or a replay in that domain
   entrain run --real-time --page                a run with its page
-  entrain page --host 0.0.0.0                   for a tablet: with tokens, to act and to look on
+  entrain page --host 0.0.0.0                   for a tablet: with tokens for acting and viewing
 """
 
 

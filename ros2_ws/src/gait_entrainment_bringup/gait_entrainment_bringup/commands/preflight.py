@@ -22,7 +22,7 @@ from gait_entrainment_drivers.proof import keep_preflight
 
 _TIMEOUT = Setting("how long to wait for the stop", unit="s", least=0.0, most=3600.0)
 DESCRIPTION = (
-    "Go through the checklist before a session: what the protocol asks for and what limits it, the"
+    "Go through the checklist before a session: the pulses of the protocol and their limits, the"
     " device's own watchdog, the stop, the loop that times the torque, the record, the clocks of"
     " other hosts. The robot is enabled at zero torque; no pulse is delivered. The result is"
     " remembered on this computer for this driver, and recorded in each bag."

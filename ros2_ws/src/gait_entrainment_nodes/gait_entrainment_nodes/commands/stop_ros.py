@@ -12,8 +12,8 @@ from concurrent.futures import ThreadPoolExecutor
 from gait_entrainment_nodes.messaging.domain import DomainError, domains_in_use, wanted_domain
 from gait_entrainment_nodes.messaging.environment import require_usable_environment
 
-# How long to look for perturbators [s], and in a domain that a run has claimed: until one is found
-# and all have answered, but no longer than TIMEOUT.
+# How long to look for perturbators [s]. In a domain that a run has claimed, the search lasts until
+# one is found and all have answered, but no longer than TIMEOUT.
 DISCOVERY = 2.0
 TIMEOUT = 6.0
 # The domain of nodes that were started one by one, without a run that claims a domain.
