@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Simulated subjects, drawn from stated distributions. An extension: none is in the paper."""
+"""Simulated subjects, drawn from stated distributions. An extension: the paper has none."""
 
 from dataclasses import dataclass, field, fields
 from typing import Any

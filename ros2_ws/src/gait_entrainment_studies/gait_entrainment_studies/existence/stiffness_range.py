@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-For which ankle stiffness a period-one gait exists, at one leg angle and along it.
+For which ankle stiffness a period-one gait exists, at one leg angle and over all of them.
 
 Below the just-vault-over stiffness the walker falls; above the just-fly-off stiffness the leading
 leg would have to pull. Both are closed forms except for a search over double stance (parameters).

@@ -40,7 +40,7 @@ from gait_entrainment.errors import UsageError
 from gait_entrainment.parameters import WalkerParameters
 from gait_entrainment_studies.locking.roots import Floats, first_root, newton
 
-# The closed forms of the linkage are typed for numbers but, being mere arithmetic, take arrays.
+# The closed forms of the linkage are typed for numbers, but as pure arithmetic also take arrays.
 _FORMS: Any = geometry
 
 # Gauss-Legendre rule of one stretch of double stance, and the weights that give the last two
