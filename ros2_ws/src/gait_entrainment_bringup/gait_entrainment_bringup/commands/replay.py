@@ -36,7 +36,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
     add_record_options(parser)
     parser.add_argument(
-        "--rate", metavar="FLOAT", help=f"{_RATE.meaning}; default: as fast as it goes"
+        "--rate", metavar="FLOAT", help=f"{_RATE.meaning}; default: as fast as possible"
     )
     parser.add_argument("--out", type=Path, help="record the replay into this folder")
     parser.add_argument("--json", action="store_true", help="print one JSON object")

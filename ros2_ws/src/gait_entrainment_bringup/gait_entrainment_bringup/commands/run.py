@@ -41,7 +41,7 @@ from gait_entrainment_page.access import Access
 
 DESCRIPTION = "Start the nodes, conduct a protocol, record a bag, print the outcome."
 EXAMPLES = """examples:
-  entrain run                          the paper's example, as fast as it goes
+  entrain run                          the paper's example, as fast as possible
   entrain run --real-time              the same at the pace of the wall clock
   entrain run my_protocol.yaml --out bags/mine
   entrain run --walker sensed --detector foot_switch      rehearse an experiment on a person
