@@ -67,9 +67,9 @@ def draw_results(out: Path, commands: Sequence[str] = QUICK) -> dict[Path, Path]
 def swept(table: Path) -> tuple[SweepPlan, Any]:
     """Return plan and table of a sweep that `entrain results` left."""
     rows, provenance = read_sweep(table)
-    told = provenance["plan"]
-    axes = {name: Axis(**told[name]) for name in ("period_offsets", "torque_fractions")}
-    return SweepPlan(**{**told, **axes, "walker": WalkerParameters(**told["walker"])}), rows
+    plan = provenance["plan"]
+    axes = {name: Axis(**plan[name]) for name in ("period_offsets", "torque_fractions")}
+    return SweepPlan(**{**plan, **axes, "walker": WalkerParameters(**plan["walker"])}), rows
 
 
 def draw_sweeps(out: Path) -> dict[Path, Path]:

@@ -18,7 +18,7 @@ import yaml
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.gait import GaitLimits
-from gait_entrainment.protocol import Protocol, said, write_protocol
+from gait_entrainment.protocol import Protocol, changes, write_protocol
 from gait_entrainment.robot import find_driver
 from gait_entrainment.run import settings_for
 from gait_entrainment_bags import BagError, BagReader
@@ -222,7 +222,7 @@ def limits_of(protocol: Protocol, *, worn: bool) -> dict[str, Any]:
     protocol sets this.
     """
     if not worn:
-        return said(protocol.limits)
+        return changes(protocol.limits)
     gentle: dict[str, float] = {
         "rising": RISING,
         # No two pulses are closer than the shortest plausible stride.
@@ -236,13 +236,13 @@ def limits_of(protocol: Protocol, *, worn: bool) -> dict[str, Any]:
     ]
     if any(rates):
         gentle["rate"] = min(max(rates), 1e6)
-    return gentle | said(protocol.limits)
+    return gentle | changes(protocol.limits)
 
 
 def _verdict(protocol: Protocol | None) -> dict[str, Any]:
     """Return what the analyzer must know about the protocol's pulses: irregular, or by phase."""
     settings = settings_for(protocol.sequence if protocol else ())
-    return {f"verdict.{n}": value for n, value in said(settings).items()} if settings else {}
+    return {f"verdict.{n}": value for n, value in changes(settings).items()} if settings else {}
 
 
 def _drawn(protocol: Protocol) -> dict[str, Any]:

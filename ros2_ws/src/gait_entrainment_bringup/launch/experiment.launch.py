@@ -60,7 +60,7 @@ def nodes(context: LaunchContext) -> list[Action]:
     made = [shared.make_node(context, name, namespace, given[name]) for name in names]
     over: list[Action] = [EmitEvent(event=Shutdown(reason="the experiment is over"))]
     if recorded:
-        over.insert(0, OpaqueFunction(function=tell, args=[bag]))
+        over.insert(0, OpaqueFunction(function=report, args=[bag]))
     ending = shared.ended_by(made, {"experiment", RECORDER} & set(names), over, bag)
     *others, experiment = made  # as in the list of nodes
     later = TimerAction(period=delay, actions=[experiment]) if delay else experiment
@@ -68,7 +68,7 @@ def nodes(context: LaunchContext) -> list[Action]:
     return [*ending, *seen, *others, later]
 
 
-def tell(_: LaunchContext, bag: Path) -> None:
+def report(_: LaunchContext, bag: Path) -> None:
     """Print the outcome of the run, and where its bag is."""
     # Not at the top: it takes a second to load.
     from gait_entrainment_bringup.run_report import report

@@ -20,19 +20,19 @@ Group = argparse._ActionsContainer  # a parser, or a group of its options
 def add_setting(
     group: Group,
     name: str,
-    told: Setting,
+    setting: Setting,
     default: str | None = None,
     shown: str | None = None,
     **more: Any,
 ) -> None:
     """Add the option for a setting, whose value is text; ``shown`` is its default in words."""
-    unit = f" [{told.unit}]" if told.unit else ""
+    unit = f" [{setting.unit}]" if setting.unit else ""
     text = f"; default {shown or default}" if shown or default else ""
     group.add_argument(
         "--" + name.replace("_", "-"),
         default=default,
-        metavar=told.kind.__name__.upper(),
-        help=told.meaning + unit + text,
+        metavar=setting.kind.__name__.upper(),
+        help=setting.meaning + unit + text,
         **more,
     )
 

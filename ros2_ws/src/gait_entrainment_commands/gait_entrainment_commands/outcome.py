@@ -311,7 +311,12 @@ def distribution(
 
 def timing_summary(outcome: dict[str, Any]) -> list[str]:
     """Return lines for people; no lines if every pulse came on time."""
-    lines = []
+    return [f"pulses {kind:<10}{text}" for kind, text in timing_findings(outcome).items()]
+
+
+def timing_findings(outcome: dict[str, Any]) -> dict[str, str]:
+    """Return how late "sent" and "measured" pulses came, without those that came on time."""
+    findings = {}
     for kind in ("sent", "measured"):
         figures = outcome[kind]
         if figures is None or not (figures["worst_ms"] or figures["missing"]):
@@ -319,8 +324,8 @@ def timing_summary(outcome: dict[str, Any]) -> list[str]:
         missing = f", {figures['missing']} never seen" if figures["missing"] else ""
         percent = figures["worst_percent"]
         share = "" if percent is None else f": {percent:.2f} % of a stride"
-        lines.append(
-            f"pulses {kind:<10}{figures['median_ms']:.1f} ms after their command (median), "
+        findings[kind] = (
+            f"{figures['median_ms']:.1f} ms after their command (median), "
             f"{figures['p99_ms']:.1f} (99 %), {figures['worst_ms']:.1f} (worst{share}){missing}"
         )
-    return lines
+    return findings

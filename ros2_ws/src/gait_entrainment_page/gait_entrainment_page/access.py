@@ -68,7 +68,7 @@ class Access:
         what = {ACT: "page, to act", LOOK: "page, to look on"}
         return [(what[role], f"{base}?token={token}") for token, role in self.tokens.items()]
 
-    def tell(self, port: int) -> None:
+    def announce(self, port: int) -> None:
         """Print the addresses on standard error."""
         for what, address in self.addresses(port):
             print(f"{what}: {address}", file=sys.stderr, flush=True)

@@ -117,7 +117,7 @@ class Command:
             )
         return f"entrain {self.name} has started"
 
-    def told(self, *, outcome: bool = True) -> list[str]:
+    def messages(self, *, outcome: bool = True) -> list[str]:
         """
         Return the last lines that the command printed, and how it ended.
 

@@ -82,7 +82,7 @@ class Page:
         ui.page("/", title="gait_entrainment", language="en-US")(self._show)
         ui.run_with(app, show_welcome_message=False, binding_refresh_interval=None, tailwind=False)
         self._server = Server(app, listener, access)
-        access.tell(self._server.port)
+        access.announce(self._server.port)
 
     def close(self) -> None:
         """Stop serving."""
@@ -354,7 +354,7 @@ class Shown:
                 button.set_enabled(self.acts)
             else:
                 button.set_enabled(self.acts and usable.get(name, name in offered))
-        lines = command.told(outcome=not view.blinded) if command is not None else []
+        lines = command.messages(outcome=not view.blinded) if command is not None else []
         self._set("answer", "\n".join([self.answer, *lines[-4:]]).strip())
         # The script must know this, and that what is shown is current.
         known = {"heartbeat": self.page.heartbeat, "acting": self.acts}

@@ -310,9 +310,9 @@ class View:
         """Return the faults of the robot on either ankle, empty if there are none."""
         return self._of_each(lambda robot: ", ".join(robot.faults))
 
-    def _of_each(self, tell: Callable[[Any], str]) -> str:
+    def _of_each(self, describe: Callable[[Any], str]) -> str:
         """Return a text about the robot, with the ankles named if they differ."""
-        texts = {side: tell(robot) for side, robot in sorted(self.robots.items())}
+        texts = {side: describe(robot) for side, robot in sorted(self.robots.items())}
         if len(set(texts.values())) <= 1:
             return next(iter(texts.values()), "")
         return ", ".join(f"{side.name.lower()} {words or 'none'}" for side, words in texts.items())

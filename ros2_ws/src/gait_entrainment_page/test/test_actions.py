@@ -30,7 +30,7 @@ def told(tmp_path, monkeypatch):
         command = Command(words, **options)
         assert command.start(preflight=preflight) == f"entrain {command.name} has started"
         command._process.wait(10)
-        return command.told(outcome=outcome)
+        return command.messages(outcome=outcome)
 
     return tell
 
@@ -62,8 +62,8 @@ def test_a_blinded_operator_is_not_told_what_the_checklist_is_about():
     command.name = "preflight"
     with subprocess.Popen(["true"]) as command._process:
         pass
-    assert [line[:10] for line in command.told(outcome=False)] == ["FAIL  stop", "entrain pr"]
-    assert "10 N m" in command.told()[0]
+    assert [line[:10] for line in command.messages(outcome=False)] == ["FAIL  stop", "entrain pr"]
+    assert "10 N m" in command.messages()[0]
 
 
 def test_one_goes_on_at_a_time(tmp_path, monkeypatch):

@@ -170,18 +170,18 @@ class StudyFindings:
     @property
     def rows(self) -> Rows:
         """Names and values, as text."""
-        phase = told(self.direction.phase, "{:.3f} of the stride")
+        phase = text(self.direction.phase, "{:.3f} of the stride")
         return [
             ("persons that entrained in some block", shown(self.entrained, "%", 100)),
             ("basin found, both sides, mean", shown(self.basin_mean, "% of the stride")),
             ("basin, standard deviation", shown(self.basin_deviation, "% of the stride")),
             ("mean phase of those that entrained", phase),
-            ("its resultant length over persons", told(self.direction.resultant, "{:.3f}")),
-            ("Rayleigh's p over persons", told(self.rayleigh, "{:.2g}")),
+            ("its resultant length over persons", text(self.direction.resultant, "{:.3f}")),
+            ("Rayleigh's p over persons", text(self.rayleigh, "{:.2g}")),
         ]
 
 
-def told(value: float, form: str) -> str:
+def text(value: float, form: str) -> str:
     """Return a value formatted as text, or a remark if it is unknown."""
     return "cannot be told" if math.isnan(value) else form.format(value)
 
@@ -190,4 +190,4 @@ def shown(estimate: Estimate, unit: str, factor: float = 1.0) -> str:
     """Return an estimate with its interval, as text."""
     value, low, high = (factor * number for number in estimate)
     interval = "" if math.isnan(low) else f" (95 %: {low:.3g} to {high:.3g})"
-    return told(value, f"{{:.3g}} {unit}{interval}")
+    return text(value, f"{{:.3g}} {unit}{interval}")

@@ -4,5 +4,5 @@
 """What an experiment should do: the validated protocol file."""
 
 from gait_entrainment.protocol.block import Block, ProtocolError, PulsePlan
-from gait_entrainment.protocol.protocol import FIELDS, Protocol, content_of, said
+from gait_entrainment.protocol.protocol import FIELDS, Protocol, changes, content_of
 from gait_entrainment.protocol.reader import DEFAULT_PROTOCOL, read_protocol, write_protocol

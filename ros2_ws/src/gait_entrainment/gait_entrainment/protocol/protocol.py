@@ -124,20 +124,20 @@ _ALWAYS_OF_PULSES = (
 
 def content_of(protocol: Protocol) -> dict[str, Any]:
     """Return the content of a protocol by section, field and block; enumerations as words."""
-    content = said(protocol, _ALWAYS)
-    content["pulses"] = said(protocol.pulses, _ALWAYS_OF_PULSES)
+    content = changes(protocol, _ALWAYS)
+    content["pulses"] = changes(protocol.pulses, _ALWAYS_OF_PULSES)
     if protocol.blocks:
         for name in ("baseline", "pulses", "washout"):
             del content[name]
         always = ("name", "baseline", "pulses", "washout")
         content["blocks"] = [
-            said(block, always) | {"pulses": said(block.pulses, _ALWAYS_OF_PULSES)}
+            changes(block, always) | {"pulses": changes(block.pulses, _ALWAYS_OF_PULSES)}
             for block in protocol.blocks
         ]
     return content
 
 
-def said(instance: Any, always: tuple[str, ...] = ()) -> dict[str, Any]:
+def changes(instance: Any, always: tuple[str, ...] = ()) -> dict[str, Any]:
     """Return settings by name: those in ``always``, and all that are not at their default."""
     values, defaults = asdict(instance), asdict(type(instance)())
     chosen = [

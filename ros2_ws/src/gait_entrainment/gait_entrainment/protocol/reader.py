@@ -22,8 +22,8 @@ from gait_entrainment.protocol.protocol import (
     FIELDS,
     SECTIONS,
     Protocol,
+    changes,
     content_of,
-    said,
 )
 from gait_entrainment.robot import DeviceError, LimitError, find_driver
 from gait_entrainment.settings import Setting, SettingError
@@ -106,7 +106,7 @@ def write_protocol(protocol: Protocol) -> str:
     content = content_of(protocol)
     for block in content.get("blocks", [content]):
         block["pulses"] = {k: v for k, v in block["pulses"].items() if v is not None}
-    content["limits"] = said(protocol.limits)
+    content["limits"] = changes(protocol.limits)
     text: str = yaml.safe_dump({k: v for k, v in content.items() if v != {}}, sort_keys=False)
     return text
 

@@ -11,7 +11,7 @@ from gait_entrainment.errors import UsageError
 from gait_entrainment.gait import analyze
 from gait_entrainment.robot import PulseTiming
 from gait_entrainment.run import Run
-from gait_entrainment_bags.commands.record_options import add_record_options, told_of_record
+from gait_entrainment_bags.commands.record_options import add_record_options, record_overrides
 from gait_entrainment_bags.figures import draw_figures
 from gait_entrainment_bags.recorded_run import (
     conducted,
@@ -67,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
     if options.bag is None or any(getattr(options, name) is not None for name in TABLES):
         return _of_tables(options)
     drawn = options.figures is not None
-    given = told_of_record(options)
+    given = record_overrides(options)
     recorded = read_run(options.bag, torques=drawn, onset=options.onset, **given)
     figures: list[Path] = []
     if drawn:
@@ -103,7 +103,7 @@ def _of_tables(options: argparse.Namespace) -> int:
         raise UsageError(f"give either BAG or --events, --pulses and --side; {wrong}")
     if options.figures is not None or options.onset is not None:
         raise UsageError("--figures and --onset need a BAG")
-    given = told_of_record(options)
+    given = record_overrides(options)
     bias = float(TOE_OFF_BIAS.parse("--toe-off-bias", options.toe_off_bias or "0"))
     events, onsets = read_events(options.events), read_onsets(options.pulses)
     analysis = analyze(without_bias(events, bias), onsets, given["side"])

@@ -28,7 +28,7 @@ def add_record_options(parser: argparse.ArgumentParser, *, needed: bool = True) 
     )
 
 
-def told_of_record(options: argparse.Namespace) -> dict[str, Any]:
+def record_overrides(options: argparse.Namespace) -> dict[str, Any]:
     """Return the protocol and the side given as options, None if not given."""
     return {
         "protocol": options.protocol and read_protocol(options.protocol),

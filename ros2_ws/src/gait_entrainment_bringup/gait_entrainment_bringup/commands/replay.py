@@ -10,7 +10,7 @@ from pathlib import Path
 from gait_entrainment.errors import UsageError
 from gait_entrainment.settings import Setting
 from gait_entrainment_bags import BagReader, find_definition
-from gait_entrainment_bags.commands.record_options import add_record_options, told_of_record
+from gait_entrainment_bags.commands.record_options import add_record_options, record_overrides
 from gait_entrainment_bags.errors import is_utf8
 from gait_entrainment_bags.recorded_run import RecordedRun, read_run
 from gait_entrainment_bringup.node_list import MOVED, parameter_arguments, replay_parameters
@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
         options.rate = _RATE.parse("--rate", options.rate)
     if options.out is not None:
         check_output(options.out)
-    recorded = read_run(options.bag, torques=False, **told_of_record(options))
+    recorded = read_run(options.bag, torques=False, **record_overrides(options))
     with claimed_domain() as domain:
         results = replay(options, domain)
     return report(options, recorded, results)
@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
 
 def replay(options: argparse.Namespace, domain: int) -> dict[str, list[bytes]]:
     """Start the nodes, play the bag, stop the nodes; return the results by topic."""
-    namespace, given = replay_parameters(options.bag, out=options.out, **told_of_record(options))
+    namespace, given = replay_parameters(options.bag, out=options.out, **record_overrides(options))
     given["bag_player"] |= {"rate": options.rate or 0.0, "start_paused": True}
     remaps = [f"__ns:={namespace}", *(f"{name}:={name[1:]}" for name in MOVED)]
     moved = [word for remap in remaps for word in ("-r", remap)] if namespace else []

@@ -101,7 +101,7 @@ def run(options: argparse.Namespace) -> int:
             domain,
             options,
             while_walking=partial(load_report, not options.no_figures),
-            once_recorded=partial(tell, options=options),
+            once_recorded=partial(report, options=options),
             quiet=options.json,
         )
     return 0
@@ -174,10 +174,10 @@ def start_page(
 ) -> None:
     """Start the operator's page and print its address, since its own output goes to its log."""
     supervisor.start(PAGE, arguments, "gait_entrainment_page")
-    Access.of_environment(options.host).tell(options.page_parameters["port"])
+    Access.of_environment(options.host).announce(options.page_parameters["port"])
 
 
-def tell(bag: Path, options: argparse.Namespace) -> None:
+def report(bag: Path, options: argparse.Namespace) -> None:
     """Print the outcome of a run, and draw its figures."""
     figures = not options.no_figures
     importlib.import_module(REPORT).report(bag, figures=figures, as_json=options.json)

@@ -31,11 +31,11 @@ class ClockOffset:
     uncertainty: float  # half the time from request to answer [s]
 
     @classmethod
-    def measured(cls, asked: int, told: int, answered: int) -> "ClockOffset":
+    def measured(cls, asked: int, reported: int, answered: int) -> "ClockOffset":
         """Return the offset of a clock that was read between two times of this one [ns]."""
         middle = (asked + answered) / 2
         uncertainty = (answered - asked) / 2 / NANOSECONDS_PER_SECOND
-        return cls((told - middle) / NANOSECONDS_PER_SECOND, uncertainty)
+        return cls((reported - middle) / NANOSECONDS_PER_SECOND, uncertainty)
 
     def check(self, name: str, longest: float) -> None:
         """Raise ClockError if the offset exceeds a limit [s], ExperimentError if unknown."""

@@ -175,7 +175,7 @@ class Run:
         for ankle in self._ankles.values():
             ankle.robot.cancel()  # all robots first, even if publishing fails
         for ankle in self._ankles.values():
-            ankle.tell_end(outcome, reason, fault=fault)
+            ankle.report_end(outcome, reason, fault=fault)
 
     def interrupt(self, reason: str) -> None:
         """End the torque; real robots must be armed again, as the run ended unexpectedly."""
@@ -245,7 +245,7 @@ class AnkleRun:
             for state in self.robot.read():
                 self._publish_state(state)
 
-    def tell_end(self, outcome: int, reason: str, *, fault: bool = False) -> None:
+    def report_end(self, outcome: int, reason: str, *, fault: bool = False) -> None:
         """
         Report to client and walker that the torque is zero now, whatever was promised.
 

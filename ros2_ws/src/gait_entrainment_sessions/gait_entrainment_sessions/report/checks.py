@@ -16,7 +16,7 @@ from gait_entrainment_bags.messages import state_of
 from gait_entrainment_bags.reader import bag_files
 from gait_entrainment_bags.recorded_run import RecordedRun, walker_timing
 from gait_entrainment_bags.topic_names import ROBOT_SETUP, ROBOT_STATE, TROUBLE
-from gait_entrainment_commands.outcome import holes_of, timing_outcome, timing_summary
+from gait_entrainment_commands.outcome import holes_of, timing_findings, timing_outcome
 
 GOOD, DOUBTFUL, BAD = "good", "doubtful", "bad"
 ORIGIN: tuple[str, ...] = ("commit", "driver", "mode", "seed")  # of the custom data of a bag
@@ -96,10 +96,9 @@ def _pulses(run: RecordedRun) -> Check:
 
 
 def _timing(run: RecordedRun) -> Iterator[Check]:
-    for line in timing_summary(timing_outcome(run.timings, run.measured_period)):
-        name, _, finding = line.partition("  ")
-        state = DOUBTFUL if "never seen" in line else GOOD
-        yield Check(name.strip(), state, finding.strip())
+    outcome = timing_outcome(run.timings, run.measured_period)
+    for kind, finding in timing_findings(outcome).items():
+        yield Check(f"pulses {kind}", DOUBTFUL if outcome[kind]["missing"] else GOOD, finding)
 
 
 def _torque(run: RecordedRun, reader: BagReader) -> Check:

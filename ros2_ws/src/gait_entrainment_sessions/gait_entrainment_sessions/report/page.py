@@ -20,7 +20,7 @@ from gait_entrainment_bags import BagReader
 from gait_entrainment_bags.figures import run_figures
 from gait_entrainment_bags.recorded_run import RecordedRun, read_run
 from gait_entrainment_commands.outcome import outcome_of, summary
-from gait_entrainment_sessions.findings import Findings, Rows, StudyFindings, shown, told
+from gait_entrainment_sessions.findings import Findings, Rows, StudyFindings, shown, text
 from gait_entrainment_sessions.report import figures
 from gait_entrainment_sessions.report.checks import Check, checks_of, origin_of, worst
 from gait_entrainment_sessions.runs import Place, PlacedRun, places_in, sessions_in
@@ -87,7 +87,7 @@ def write_report(path: Path, out: Path) -> None:
         "made": f"{datetime.now(timezone.utc):%Y-%m-%d %H:%M} UTC",
         "version": version("gait_entrainment"),
         "border": _border,
-        "told": told,
+        "text": text,
         "drawn_at_most": DRAWN_AT_MOST,
     }
     environment = Environment(
@@ -152,18 +152,18 @@ def statistics_of(findings: Findings) -> Rows:
     lengths = "none"
     if runs:
         lengths = f"{len(runs)}, {sum(runs) / len(runs):.1f} pulses long on average"
-    kappa = "above a million" if where.kappa > 1e6 else told(where.kappa, "{:.3g}")
+    kappa = "above a million" if where.kappa > 1e6 else text(where.kappa, "{:.3g}")
     return [
         (
             "variation of the stride period before the pulses",
-            told(findings.variation_percent, "{:.2f} %"),
+            text(findings.variation_percent, "{:.2f} %"),
         ),
         ("slope of the lag, last 10 pulses", shown(findings.slope, "ms per stride", 1e3)),
-        (f"mean direction, last {where.count} pulses", told(where.phase, "{:.3f} of the stride")),
-        ("resultant length", told(where.resultant, "{:.3f}")),
+        (f"mean direction, last {where.count} pulses", text(where.phase, "{:.3f} of the stride")),
+        ("resultant length", text(where.resultant, "{:.3f}")),
         ("concentration (von Mises kappa)", kappa),
         ("time constant of the lag's approach", shown(findings.time_constant, "pulses")),
-        ("pulses within 5 % of the stride of most of them", told(100 * locking.share, "{:.0f} %")),
+        ("pulses within 5 % of the stride of most of them", text(100 * locking.share, "{:.0f} %")),
         ("spans of such pulses", lengths),
     ]
 
