@@ -31,6 +31,9 @@ class RunRecord:
         # Numbers from 0, by topic, run, and (for a profile) ankle.
         self._numbers: dict[tuple[TopicInfo, int, int], set[int]] = {}
         self._ended: set[tuple[TopicInfo, int, int]] = set()
+        # Of profiles: the latest revision, and how many come after a later one.
+        self._latest: dict[tuple[TopicInfo, int, int], int] = {}
+        self._misplaced: Counter[tuple[TopicInfo, int, int]] = Counter()
 
     def announce(self, *topics: str) -> None:
         """Add the names of topics that are in the bag, with or without messages."""
@@ -52,6 +55,8 @@ class RunRecord:
                 numbers.add(max(2 * message.step - message.kind, 0))  # strike 0 is the first
                 return
             numbers.add(message.revision)
+            self._misplaced[place] += message.revision < self._latest.get(place, 0)
+            self._latest[place] = message.revision
             if message.last or message.stop:
                 self._ended.add(place)
         except (BagError, AttributeError):
@@ -70,4 +75,8 @@ class RunRecord:
                 holes.append(f"{topic.name}: {missing} {_NAMES[topic.type]} of run {run}")
             if topic.type == _PROFILE and place not in self._ended:
                 holes.append(f"{topic.name}: the end of run {run}")
+            if misplaced := self._misplaced[place]:
+                holes.append(
+                    f"{topic.name}: the order of {misplaced} torque profiles of run {run}"
+                )
         return holes
