@@ -23,10 +23,11 @@ import logging
 import os
 import sys
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import redirect_stdout, suppress
 from typing import Any
 
 from gait_entrainment.errors import EntrainmentError
+from gait_entrainment_commands.printable import PrintableOutput, printable
 from gait_entrainment_commands.signals import stop_on_signals
 
 ENTRY_POINTS = "gait_entrainment.commands"
@@ -43,11 +44,17 @@ _DESCRIPTION = "Rehearse, run and analyze entrainment experiments."
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return 0 if it succeeded, 1 if it failed, 2 for wrong usage."""
-    if isinstance(sys.stdout, io.TextIOWrapper):  # None if it is closed
-        sys.stdout.reconfigure(errors="backslashreplace")  # characters that a terminal lacks
+    output: Any = sys.stdout
+    if isinstance(output, io.TextIOWrapper):  # None if it is closed
+        output.reconfigure(errors="backslashreplace")  # characters that a terminal lacks
+        output = PrintableOutput(output)
     os.environ.pop("MPLBACKEND", None)  # for windows, maybe unknown here: figures are files
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it works without a cache folder
-    words = sys.argv[1:] if arguments is None else list(arguments)
+    with redirect_stdout(output):
+        return _run(sys.argv[1:] if arguments is None else list(arguments))
+
+
+def _run(words: list[str]) -> int:
     name = words[0] if words else ""
     prog = f"entrain {name}"
     try:
@@ -61,8 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except EntrainmentError as error:
         # One line, whatever names it contains, followed by the indented end of a node's log.
         reason, indented, log = str(error).partition("\n  ")
-        printable = (c if c.isprintable() else repr(c)[1:-1] for c in reason)
-        _tell(f"{prog}: {''.join(printable)}{indented}{log}")
+        _tell(f"{prog}: {printable(reason)}{indented}{log}")
         return error.exit_code
     except ModuleNotFoundError as error:
         package = (error.name or "").partition(".")[0]
