@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Lets these tests import what stands beside them."""
+"""Let these tests import the modules in this folder."""
 
 import sys
 from pathlib import Path

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Public gait recordings, which stand beside the repository and are not part of it."""
+"""Public gait recordings, which lie next to the repository and are not part of it."""
 
 import csv
 import itertools
@@ -21,7 +21,7 @@ IMU_RATE = 204.8  # Hz, of the sample and of the indices of its reference
 
 def needed(path):
     if not path.exists():
-        pytest.skip(f"public data are not here: {path}")
+        pytest.skip(f"public data not found: {path}")
     return path
 
 
@@ -32,20 +32,20 @@ def foot_rates():
     streams = []
     for side in Side:
         sensor = f"{side.name.lower()}_sensor"
-        places = [
-            place
+        columns = [
+            column
             for axis in "xyz"
-            for place, (s, a) in enumerate(zip(sensors, axes, strict=True))
+            for column, (s, a) in enumerate(zip(sensors, axes, strict=True))
             if (s, a) == (sensor, f"gyr_{axis}")
         ]
         times = [int(row[0]) / IMU_RATE for row in rows]
-        values = [tuple(math.radians(float(row[p])) for p in places) for row in rows]
+        values = [tuple(math.radians(float(row[c])) for c in columns) for row in rows]
         streams.append(Stream(side, times, values))
     return streams
 
 
 def foot_reference():
-    """Return what motion capture tells of that walk: (kind, side) -> instants [s]."""
+    """Return the events of that walk in motion capture: (kind, side) -> times [s]."""
     with needed(DATA / "gaitmap" / "stride_events_sample.csv").open() as file:
         rows = list(csv.DictReader(file))
     kinds = {EventKind.HEEL_STRIKE: ("ic", "pre_ic"), EventKind.TOE_OFF: ("tc",)}
@@ -67,10 +67,10 @@ def belt():
 
 def children():
     """
-    Return the events of both feet that the stride periods of 50 children tell, every tenth lost.
+    Return events of both feet from the stride periods of 50 children, with every tenth lost.
 
-    The record is of one foot's strides; those of the other are put in their middle, toe-offs at
-    an eighth of a stride after the other foot's strike.
+    The record holds one foot's strides. The other foot's strikes are placed halfway between its
+    strikes, and toe-offs an eighth of a stride after the other foot's strike.
     """
     found = []
     for path in sorted(needed(DATA / "gait_maturation").glob("*-*.txt")):

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What every detector owes, whatever its samples: counts, no exception, nothing late."""
+"""What every detector guarantees for any samples: counts, no exceptions, no late events."""
 
 import math
 import sys
@@ -35,7 +35,7 @@ def test_detectors_are_found_by_name_with_options():
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_each_says_what_it_reads_how_late_it_is_and_when_it_fails(name):
+def test_each_documents_its_latency_uncertainty_and_failures(name):
     detector = find_detector(name).make(Side.RIGHT)
     for word in ("Latency:", "Uncertainty:", "Fails:"):
         assert word in type(detector).__doc__
@@ -53,50 +53,50 @@ def test_each_says_what_it_reads_how_late_it_is_and_when_it_fails(name):
         ("foot_gyroscope:cutoff=x", "cutoff"),
     ],
 )
-def test_what_is_no_detector_is_refused_in_one_line(text, words):
+def test_an_invalid_detector_is_refused_in_one_line(text, words):
     with pytest.raises(EntrainmentError, match=words) as refused:
         find_detector(text)
     assert "\n" not in str(refused.value)
 
 
-class Unmade(FootGyroscopeDetector):
-    def _restart(self):  # which the constructor calls
+class BrokenConstructor(FootGyroscopeDetector):
+    def _restart(self):  # called by the constructor
         raise KeyError("calibration")
 
 
-class Settingless(FootGyroscopeDetector):
+class WithoutSettings(FootGyroscopeDetector):
     Settings = None
 
 
 @pytest.mark.parametrize(
-    ("made", "words"),
+    ("loaded", "words"),
     [
         ("1 / 0", "ZeroDivisionError"),
         ("raise SystemExit(3)", r"SystemExit\(3\)"),
         ("Detector = (", "SyntaxError"),
         ("", "AttributeError"),
         ("class Detector: pass", "is not a Detector"),
-        (Unmade, "KeyError.*calibration"),
-        (Settingless, "TypeError.*dataclass"),
+        (BrokenConstructor, "KeyError.*calibration"),
+        (WithoutSettings, "TypeError.*dataclass"),
     ],
 )
-def test_whatever_somebody_elses_detector_does_when_loaded_is_told(
-    monkeypatch, tmp_path, made, words
+def test_any_failure_to_load_an_external_detector_is_reported(
+    monkeypatch, tmp_path, loaded, words
 ):
-    module = tmp_path.name  # which no other test has
-    if isinstance(made, str):
-        (tmp_path / f"{module}.py").write_text(made)
+    module = tmp_path.name  # unique to this test
+    if isinstance(loaded, str):
+        (tmp_path / f"{module}.py").write_text(loaded)
         monkeypatch.syspath_prepend(tmp_path)
     else:
-        monkeypatch.setitem(sys.modules, module, SimpleNamespace(Detector=made))
+        monkeypatch.setitem(sys.modules, module, SimpleNamespace(Detector=loaded))
     odd = {"odd": f"{module}:Detector"}
     monkeypatch.setattr(detection, "detector_names", lambda: odd)
-    with pytest.raises(EntrainmentError, match=rf"odd \({module}:Detector\) .*{words}") as told:
+    with pytest.raises(EntrainmentError, match=rf"odd \({module}:Detector\) .*{words}") as refused:
         find_detector("odd")
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(refused.value)
 
 
-def test_a_measured_bias_is_taken_off():
+def test_a_measured_bias_is_subtracted():
     samples = walk()
     plain = fed(VerticalForceDetector(Side.RIGHT), samples)
     settings = VerticalForceDetector.Settings(toe_off_bias=0.01, heel_strike_bias=-0.02)
@@ -106,7 +106,7 @@ def test_a_measured_bias_is_taken_off():
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
-def test_what_is_no_number_is_left_out_and_told(bad):
+def test_values_that_are_not_finite_are_skipped_and_reported(bad):
     samples = walk()
     samples[500:505] = [(time, (bad,)) for time, _ in samples[500:505]]
     detector = VerticalForceDetector(Side.RIGHT)
@@ -116,7 +116,7 @@ def test_what_is_no_number_is_left_out_and_told(bad):
     assert any("not numbers" in line for line in detector.troubles())
 
 
-def test_a_sensor_that_dies_is_told():
+def test_a_dead_sensor_is_reported():
     detector = VerticalForceDetector(Side.RIGHT)
     fed(detector, walk()[:1000])
     assert detector.troubles(now=5.02) == ()
@@ -124,7 +124,7 @@ def test_a_sensor_that_dies_is_told():
     assert "no sample yet" in VerticalForceDetector(Side.RIGHT).troubles(now=1.0)[0]
 
 
-def test_a_dropout_is_told_and_nothing_reaches_across_it():
+def test_a_dropout_is_counted_and_contains_no_events():
     samples = walk()
     detector = VerticalForceDetector(Side.RIGHT)
     found = fed(detector, samples[:500] + samples[700:])
@@ -133,7 +133,7 @@ def test_a_dropout_is_told_and_nothing_reaches_across_it():
     assert not [d for d in found if inside[0] < d.time < inside[1]]
 
 
-def test_a_clock_that_stands_still_or_jumps_is_told():
+def test_a_clock_that_goes_back_or_jumps_is_counted():
     samples = walk()
     detector = VerticalForceDetector(Side.RIGHT)
     fed(detector, [*samples[:500], samples[499], *samples[500:1500], *samples[500:]])
@@ -142,13 +142,13 @@ def test_a_clock_that_stands_still_or_jumps_is_told():
     assert detector.counts.dropouts == 0
 
 
-def test_a_constant_signal_is_told_once():
+def test_a_constant_signal_is_counted_once():
     detector = FootGyroscopeDetector(Side.RIGHT, FootGyroscopeDetector.Settings(axis_y=1.0))
     fed(detector, sampled(lambda _: (0.0, 0.1, 0.0), UNTIL))
     assert detector.counts.constant == 1
 
 
-def test_a_signal_in_which_nothing_is_found_is_told():
+def test_a_signal_without_events_is_reported():
     contacts = sampled(lambda t: ((force(t) > 0) * 0.5, 0.0), UNTIL)  # neither closed nor open
     detector = find_detector("foot_switch:open_below=0.1,closed_above=0.55").make(Side.RIGHT)
     detector.reached = 0.0
@@ -166,7 +166,7 @@ SAMPLE = st.tuples(
 
 @settings(max_examples=40, deadline=None)
 @given(samples=st.lists(SAMPLE, max_size=80), name=st.sampled_from(NAMES))
-def test_no_sample_whatever_raises_or_is_published_late(samples, name):
+def test_samples_never_cause_an_exception_or_a_late_event(samples, name):
     detector: Detector = find_detector(name).make(Side.LEFT)
     time, interval = 0.0, 0.0
     for step, values in samples:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Emulated sensors: the same however a walk is cut, and what each setting does."""
+"""Emulated sensors: samples that do not depend on how a walk is cut, and each setting's effect."""
 
 from dataclasses import replace
 
@@ -42,7 +42,7 @@ def test_how_a_walk_is_cut_changes_no_bit(kind, cuts, jitter):
     assert measured(kind, cuts, usual)[0] == measured(kind, (), usual)[0]
 
 
-def test_seeds_and_sides_differ_and_repeat():
+def test_samples_repeat_and_depend_on_the_seed():
     first, again = measured("insole_force")[0], measured("insole_force")[0]
     assert first == again
     assert measured("insole_force", seed=4)[0] != first
@@ -63,8 +63,8 @@ def test_an_ideal_sensor_measures_the_walker():
 def test_noise_resolution_range_clock_and_dropouts_are_as_set():
     quiet = EmulatedSettings(rate=500.0)
     plain = np.array([v for _, (v,) in measured("treadmill_force", settings=quiet)[0]])
-    told = replace(quiet, noise=7.0, bias=3.0, drift=2.0)
-    noisy = np.array([v for _, (v,) in measured("treadmill_force", settings=told)[0]])
+    disturbed = replace(quiet, noise=7.0, bias=3.0, drift=2.0)
+    noisy = np.array([v for _, (v,) in measured("treadmill_force", settings=disturbed)[0]])
     times = np.arange(plain.size) / 500.0
     slope, offset = np.polyfit(times, noisy - plain, 1)
     assert slope == pytest.approx(2.0, abs=0.5)
@@ -101,7 +101,7 @@ def test_a_foot_slaps_after_its_strike_and_is_released_at_toe_off():
         assert rates[n + 60] < 0.2
 
 
-def test_the_knee_leans_the_shank_forward_until_the_toes_are_off():
+def test_the_knee_leans_the_shank_forward_until_toe_off():
     plain = EmulatedSettings(rate=1000.0)
     bent, stiff = (
         np.array([v[1] for _, v in measured("shank_gyroscope", settings=each)[0]])
@@ -113,11 +113,11 @@ def test_the_knee_leans_the_shank_forward_until_the_toes_are_off():
     toe_offs = [e.stamp for e in events if (e.kind, e.side) == (EventKind.TOE_OFF, Side.RIGHT)]
     for strike, toe_off in zip(strikes, toe_offs[-len(strikes) :], strict=True):
         n, m = strike // 1_000_000, toe_off // 1_000_000
-        # 35 degrees in push-off, 20 more thereafter: half of either by the shank.
+        # 35 degrees in push-off, 20 more afterwards; the shank turns by half of each.
         assert np.sum(knee[n + 1 : m + 1]) * 1e-3 == pytest.approx(0.6, abs=0.05)
         assert np.sum(knee[m + 1 : m + 500]) * 1e-3 == pytest.approx(0.35, abs=0.05)
         assert not np.any(knee[n - 300 : n])
-        # A plateau that toe-off ends, and the swing soon after it.
+        # Toe-off ends the plateau, and the swing follows soon after.
         assert min(bent[n + 1 : m]) > 0.0
         assert bent[m + 70] < 0.0
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Foot gyroscope: a real walk beside motion capture, closed forms, and how it was put on."""
+"""Foot gyroscope: a real walk with motion capture, closed forms, and the mounting."""
 
 import math
 
@@ -25,7 +25,7 @@ UNTIL = 15.0
 @pytest.mark.parametrize(
     "text", ["foot_gyroscope", "foot_gyroscope:axis_y=1"], ids=["axis found", "axis given"]
 )
-def test_a_walk_beside_motion_capture(text):
+def test_a_real_walk_agrees_with_motion_capture(text):
     events, _ = detect(find_detector(text), foot_rates())
     found = [event.detection for event in events]
     reference = foot_reference()
@@ -46,12 +46,12 @@ def test_a_walk_beside_motion_capture(text):
 
 
 @pytest.mark.parametrize("rate", [100.0, 200.0, 1000.0])
-def test_events_of_a_closed_form(rate):
+def test_events_of_a_closed_form_signal(rate):
     detector = FootGyroscopeDetector(Side.RIGHT, UPRIGHT)
     found = fed(detector, sampled(lambda t: (0.01, foot_rate(t), 0.0), UNTIL, rate))
     strikes, toe_offs = times(found, STRIKE), times(found, TOE_OFF)
-    assert len(strikes) == 13  # of the first no swing comes before
-    # The slap passes 0.25 rad/s 2 ms after the strike; the fall three quarters after 5 ms.
+    assert len(strikes) == 13  # not the first, as no swing comes before it
+    # The slap passes 0.25 rad/s 2 ms after the strike; push-off falls to three quarters in 5 ms.
     for n, time in enumerate(strikes, 1):
         assert time == pytest.approx(OFFSET[Side.RIGHT] + n * STRIDE + 2e-3, abs=6e-3)
     for n, time in enumerate(toe_offs):
@@ -93,7 +93,7 @@ def test_the_mounting_is_found_in_the_first_steps(axis):
     assert sum(a * b for a, b in zip(detector._axis, axis, strict=True)) > 0.99
 
 
-def test_a_sensor_that_was_put_on_the_other_way_round_is_told():
+def test_a_sensor_mounted_the_wrong_way_round_is_reported():
     detector = FootGyroscopeDetector(Side.RIGHT, UPRIGHT)
     fed(detector, sampled(lambda t: (0.0, -foot_rate(t), 0.0), UNTIL))
     assert any("other way round: set axis_x" in line for line in detector.troubles())
@@ -103,8 +103,8 @@ def test_a_sensor_that_was_put_on_the_other_way_round_is_told():
 
 
 @pytest.mark.parametrize("stood", [3.5, 3.9, 4.3, 4.7])
-def test_one_step_from_standing_does_not_tell_the_mounting(stood):
-    """Within the first five seconds there are half a step to a step and a half."""
+def test_one_step_from_standing_does_not_determine_the_mounting(stood):
+    """The first five seconds contain between half a step and one and a half steps."""
     start = OFFSET[Side.RIGHT] + STANCE - 0.15 - stood
 
     def signal(time):
@@ -116,7 +116,7 @@ def test_one_step_from_standing_does_not_tell_the_mounting(stood):
     assert len(times(found, STRIKE)) >= 4
 
 
-def test_a_sensor_that_turns_over_in_mid_trial_is_told():
+def test_a_sensor_that_turns_over_in_mid_trial_is_reported():
     detector = FootGyroscopeDetector(Side.RIGHT)
     fed(detector, sampled(lambda t: (0.0, foot_rate(t) * (-1 if t > 10 else 1), 0.0), 25.0))
     assert any("the other way round: set" in line for line in detector.troubles())
@@ -144,7 +144,7 @@ def test_a_first_step_without_a_push_off_does_not_hide_the_mounting():
     assert FootGyroscopeDetector.calibrated(axes, walk).axis == (0.0, 1.0, 0.0)
 
 
-def test_who_turns_round_for_longer_than_walks_has_the_axis_of_the_walk():
+def test_the_axis_is_that_of_the_walk_even_if_turning_is_faster():
     def turning(time):
         rate = foot_rate(time)
         return (0.0, rate, 0.0) if time < 8.0 else (1.5 * foot_rate(time), 0.2 * rate, 0.0)
@@ -154,7 +154,7 @@ def test_who_turns_round_for_longer_than_walks_has_the_axis_of_the_walk():
     assert FootGyroscopeDetector.calibrated(axes, walk).axis == (0.0, 1.0, 0.0)
 
 
-def test_the_slap_of_a_slow_first_step_is_no_push_off():
+def test_the_slap_of_a_slow_first_step_is_not_a_push_off():
     found = fed(
         FootGyroscopeDetector(Side.RIGHT, UPRIGHT),
         sampled(lambda t: (0.0, foot_rate(t / 4), 0.0), UNTIL),
@@ -163,14 +163,14 @@ def test_the_slap_of_a_slow_first_step_is_no_push_off():
     assert times(found, TOE_OFF) == pytest.approx([e for e in ends if e < UNTIL], abs=0.04)
 
 
-def test_gaps_do_not_turn_the_mounting_over():
+def test_gaps_do_not_invert_the_mounting():
     for stream in foot_rates():
         kept = [(t, v) for t, v in zip(stream.times, stream.values, strict=True) if t % 9 < 6]
         settings = FootGyroscopeDetector.calibrated(UPRIGHT.__class__(), kept)
         assert settings.axis == (0.0, 1.0, 0.0)
 
 
-def test_single_samples_that_are_lost_as_zeros_are_no_events():
+def test_single_lost_samples_that_read_zero_are_not_events():
     samples = sampled(lambda t: (0.0, foot_rate(t) + 0.01, 0.0), UNTIL)
     whole = fed(FootGyroscopeDetector(Side.RIGHT, UPRIGHT), samples)
     for first in range(25):
@@ -183,7 +183,7 @@ def test_single_samples_that_are_lost_as_zeros_are_no_events():
         assert any("zeros in mid-movement" in line for line in detector.troubles())
 
 
-def test_sensors_on_the_wrong_feet_are_told():
+def test_sensors_on_the_wrong_feet_are_reported():
     for stream in foot_rates():
         for side in Side:
             detector = FootGyroscopeDetector(side, UPRIGHT)
@@ -192,19 +192,19 @@ def test_sensors_on_the_wrong_feet_are_told():
             assert bool(swapped) == (side is not stream.side)
 
 
-def test_degrees_per_second_are_told():
+def test_degrees_per_second_are_reported():
     detector = FootGyroscopeDetector(Side.RIGHT, UPRIGHT)
     fed(detector, sampled(lambda t: (0.0, math.degrees(foot_rate(t)), 0.0), UNTIL))
     assert any("rad/s are expected" in line for line in detector.troubles())
 
 
-def test_a_gyroscope_at_the_end_of_its_range_is_told():
+def test_a_saturated_gyroscope_is_reported():
     detector = FootGyroscopeDetector(Side.RIGHT, FootGyroscopeDetector.Settings(axis_x=1.0))
     fed(detector, sampled(lambda t: (max(-2.0, min(foot_rate(t), 2.0)), 0.0, 0.0), UNTIL))
     assert any("increase the sensor's range" in line for line in detector.troubles())
 
 
-def test_a_heel_that_is_lifted_and_put_down_is_no_step():
+def test_a_heel_that_is_lifted_and_put_down_is_not_a_step():
     def lifted(time):
         return (0.0, 0.6 * math.sin(2 * math.pi * time / 1.5), 0.0)
 

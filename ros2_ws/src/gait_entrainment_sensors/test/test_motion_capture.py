@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""C3D files, written by ezc3d: whose foot is on which plate, and events from markers."""
+"""C3D files, written by ezc3d: which foot is on which plate, and events from markers."""
 
 import math
 
@@ -25,7 +25,7 @@ LABELS_IN_WORDS = ["Left_Heel", "Left Toe", "RightHeel", "Bob:right.toe", "Sacru
 
 
 def feet(side, time):
-    """Return heel and toe [mm] of a foot: it swings to its plate close to the ground, and on."""
+    """Return heel and toe [mm] of a foot that swings close to the ground to its plate and on."""
     own = [contact for contact in CONTACTS if contact[1] is side]
     plate, strike, toe_off = own[0][0], own[0][2], own[-1][3]
     swung = max(strike - 0.05 - time, 0.0) - max(time - toe_off - 0.05, 0.0)  # [s]
@@ -38,9 +38,9 @@ def write(
     path, *, sign=-1.0, wrong=False, units="mm", labels=LABELS, plates=2, points=None, border=False
 ):
     """
-    Write two plates, and feet on them.
+    Write a file of plates and of feet on them.
 
-    ``wrong``: the left foot on the right foot's, too; ``border``: all 0.25 m further ahead.
+    ``wrong``: both feet are on the right foot's plate. ``border``: the right foot is 0.25 m ahead.
     """
     file = ezc3d.c3d()
     point, analog, plate = (file["parameters"][n] for n in ("POINT", "ANALOG", "FORCE_PLATFORM"))
@@ -66,7 +66,7 @@ def write(
     for place, _, strike, toe_off in CONTACTS[:plates]:
         loaded = 800.0 * np.sin(np.pi * np.clip((time - strike) / (toe_off - strike), 0, 1))
         file["data"]["analogs"][0, 6 * place + 2] = sign * loaded
-        if border:  # the centre of pressure is at the border, too [N mm]
+        if border:  # moves the centre of pressure to the border [N mm]
             file["data"]["analogs"][0, 6 * place + 4] = sign * loaded * (250.0 - 500.0 * place)
     corners = np.array([[0, 600, 600, 0], [0, 0, 400, 400], [0, 0, 0, 0]], float)
     plate["USED"]["value"] = np.array([plates])
@@ -81,22 +81,22 @@ def write(
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_contacts_are_the_feet_s_that_stand_there(tmp_path, sign):
-    found, told = events_on_plates(read_c3d(write(tmp_path / "a.c3d", sign=sign)), FORCE)
-    assert told == ()
+def test_a_contact_belongs_to_the_foot_that_stands_there(tmp_path, sign):
+    found, troubles = events_on_plates(read_c3d(write(tmp_path / "a.c3d", sign=sign)), FORCE)
+    assert troubles == ()
     for _, side, strike, toe_off in CONTACTS:
         own = [d for d in found if d.side is side]
         assert times(own, STRIKE) == [pytest.approx(strike, abs=0.012)]
         assert times(own, TOE_OFF) == [pytest.approx(toe_off, abs=0.012)]
 
 
-def test_a_plate_without_a_contact_is_told(tmp_path):
-    found, told = events_on_plates(read_c3d(write(tmp_path / "a.c3d", sign=-1e-3)), FORCE)
+def test_a_plate_without_a_contact_is_reported(tmp_path):
+    found, troubles = events_on_plates(read_c3d(write(tmp_path / "a.c3d", sign=-1e-3)), FORCE)
     assert found == []
-    assert told[0] == "plate 1: no contact: forces of -1 to 0 N"
+    assert troubles[0] == "plate 1: no contact: forces of -1 to 0 N"
 
 
-def test_plates_without_a_sample_are_none(tmp_path):
+def test_plates_without_samples_are_ignored(tmp_path):
     path = write(tmp_path / "a.c3d", labels=LABELS_IN_WORDS)
     assert len(read_c3d(path).plates) == 2
     file = ezc3d.c3d(str(path))
@@ -108,14 +108,14 @@ def test_plates_without_a_sample_are_none(tmp_path):
     assert (len(capture.plates), len(capture.markers)) == (0, 5)
 
 
-def test_a_contact_of_both_feet_is_nobody_s_and_told(tmp_path):
-    found, told = events_on_plates(read_c3d(write(tmp_path / "a.c3d", wrong=True)), FORCE)
+def test_a_contact_of_both_feet_is_discarded_and_reported(tmp_path):
+    found, troubles = events_on_plates(read_c3d(write(tmp_path / "a.c3d", wrong=True)), FORCE)
     assert found == []
-    assert "plate 1: 1 contacts of both feet" in told[0]
+    assert "plate 1: 1 contacts of both feet" in troubles[0]
 
 
 def test_a_foot_on_two_plates_at_once_strikes_once(tmp_path, monkeypatch):
-    """The right foot comes down across the border of the plates, the heel first."""
+    """The right foot lands heel first across the border between the plates."""
     monkeypatch.setattr(
         f"{__name__}.CONTACTS",
         [(0, Side.RIGHT, 1.0, 1.5), (1, Side.RIGHT, 1.2, 1.7), (1, Side.LEFT, 9.0, 9.5)],
@@ -128,7 +128,7 @@ def test_a_foot_on_two_plates_at_once_strikes_once(tmp_path, monkeypatch):
     ]
 
 
-def test_belts_are_named_where_there_are_no_markers(tmp_path):
+def test_without_markers_each_plate_needs_a_foot(tmp_path):
     path = write(tmp_path / "a.c3d", labels=["A", "B", "C", "D", "E"])
     with pytest.raises(RecordingError, match="lacks markers left_heel, left_toe, right_heel"):
         events_on_plates(read_c3d(path), FORCE)
@@ -140,7 +140,7 @@ def test_belts_are_named_where_there_are_no_markers(tmp_path):
     assert len(events_on_plates(read_c3d(path, named), FORCE)[0]) == 4
 
 
-def test_a_plate_of_which_nothing_tells_where_it_lies_is_named(tmp_path):
+def test_a_plate_without_a_position_is_refused(tmp_path):
     path = write(tmp_path / "a.c3d")
     file = ezc3d.c3d(str(path))
     plate = file["parameters"]["FORCE_PLATFORM"]
@@ -151,7 +151,7 @@ def test_a_plate_of_which_nothing_tells_where_it_lies_is_named(tmp_path):
             events_on_plates(read_c3d(path), FORCE, sides)
 
 
-def test_a_file_that_is_none_and_markers_that_are_not_there_are_one_line(tmp_path):
+def test_an_invalid_file_a_missing_marker_and_an_unknown_unit_are_refused(tmp_path):
     path = tmp_path / "none.c3d"
     path.write_bytes(b"nothing")
     with pytest.raises(RecordingError, match="cannot be read as C3D"):
@@ -163,7 +163,7 @@ def test_a_file_that_is_none_and_markers_that_are_not_there_are_one_line(tmp_pat
 
 
 def test_heel_and_toe_relative_to_the_pelvis(tmp_path):
-    """Each marker swings as a cosine about the pelvis, furthest ahead at its foot's strikes."""
+    """Markers swing as cosines: heels furthest ahead at strikes, toes furthest back at toe-off."""
     points = np.ones((4, len(LABELS), FRAMES))
     time = np.arange(FRAMES) / RATE
     for place, (side, late) in enumerate(
@@ -180,6 +180,6 @@ def test_heel_and_toe_relative_to_the_pelvis(tmp_path):
         own = [d for d in found if d.side is side]
         for kind, late in ((STRIKE, 0.0), (TOE_OFF, STANCE)):
             assert len(times(own, kind)) >= 2
-            for instant in times(own, kind):
-                off = (instant - OFFSET[side] - late + STRIDE / 2) % STRIDE - STRIDE / 2
+            for found_at in times(own, kind):
+                off = (found_at - OFFSET[side] - late + STRIDE / 2) % STRIDE - STRIDE / 2
                 assert abs(off) < 0.011

@@ -27,18 +27,18 @@ def numbered(found, **options):
     return numbering, [event for event in events if event is not None]
 
 
-def test_a_walk_is_numbered_as_the_simulated_walker_numbers_its_own():
+def test_a_walk_is_numbered_like_that_of_the_simulated_walker():
     numbering, events = numbered(detections(20))
     strikes = [e for e in events if e.kind is STRIKE]
     assert [e.step for e in strikes] == list(range(40))
     assert [e.side for e in strikes] == [Side.RIGHT, Side.LEFT] * 20
     assert sorted(e.place for e in events) == [0, *range(2, 80), 81]
     assert numbering.period == pytest.approx(STRIDE)
-    # The first toe-off of the left foot, and the strike before the last toe-off, are not there.
+    # The left foot's first toe-off and the strike before the last toe-off are missing.
     assert numbering.troubles() == ("2 events were missed",)
 
 
-def test_the_side_with_even_numbers_can_be_said():
+def test_the_side_with_even_numbers_can_be_chosen():
     _, events = numbered(detections(5), first_side=Side.LEFT)
     assert events[0].step == 1
 
@@ -85,7 +85,7 @@ def test_lost_and_doubled_events_change_no_other_number(seed, variation):
 
 
 @pytest.mark.parametrize("change", ["delete", "double"])
-def test_of_a_real_walk_27_right_strides_are_left_whatever_event_is_lost_or_doubled(change):
+def test_27_right_strides_of_a_real_walk_remain_if_any_event_is_lost_or_doubled(change):
     events, _ = detect(find_detector("foot_gyroscope:axis_y=1"), foot_rates())
     found = [event.detection for event in events]
     for place, detection in enumerate(found):
@@ -146,8 +146,8 @@ def test_a_pause_is_a_gap():
 
 
 @pytest.mark.parametrize("begin", [0, 4])
-def test_who_runs_keeps_the_numbers_of_strikes_and_is_told(begin):
-    """Stance is a third of a stride, so there is no double stance; perhaps after two strides."""
+def test_running_keeps_the_strike_numbers_and_is_reported(begin):
+    """Running, with stance a third of a stride, from the start or after two walked strides."""
     found = [d for d in detections(2) if d.time < begin]
     for n in range(40):
         side, strike = Side(1 - n % 2), begin + 0.35 * n
@@ -170,14 +170,14 @@ def test_force_plates_with_a_step_between_them_are_numbered():
     assert [e.step for e in events] == [0, 2, 3, 5]
 
 
-def test_a_wrong_first_event_does_not_silence_the_walk():
+def test_a_false_first_event_does_not_suppress_the_walk():
     wrong = Detection(STRIKE, Side.RIGHT, 0.0, 0.01, 0.0)
     _, events = numbered([wrong, *detections(30)])
     analysis = analyze(events, (), Side.RIGHT)
     assert len(analysis.strides) >= 25
 
 
-def test_a_clock_that_jumps_back_begins_the_count_anew():
+def test_a_clock_that_jumps_back_restarts_the_count():
     found = detections(10)
     later = [
         Detection(d.kind, d.side, d.time - 5.0, d.detected_at - 5.0, 0.0) for d in detections(20)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Recordings made elsewhere: tables in, events.tsv out, and every refused input in one line."""
+"""Recordings made elsewhere: tables in, events.tsv out, one line for every refused input."""
 
 import json
 import math
@@ -46,14 +46,14 @@ def events_of(path, **options):
     return detect(*streams_of(path, **options))
 
 
-def test_a_table_goes_through_and_comes_back(walk, tmp_path):
+def test_events_found_in_a_table_are_written_and_read_back(walk, tmp_path):
     events, troubles = events_of(walk)
     assert troubles == ("1 events were missed",)  # the left toe-off before the first strike
     out = tmp_path / "walk_events.tsv"
     write_events(out, events)
     assert [*read_table(out).columns] == [*COLUMNS]
     sidecar = json.loads((tmp_path / "walk_events.json").read_text())
-    assert {name: told.get("Units") for name, told in sidecar.items()}["onset"] == "s"
+    assert {name: column.get("Units") for name, column in sidecar.items()}["onset"] == "s"
     again = read_events(out)
     assert again == sorted((e.event for e in events), key=lambda e: e.stamp)
     assert {e.uncertainty for e in again} == {0.003}
@@ -72,7 +72,7 @@ def test_events_without_steps_are_numbered(walk, tmp_path):
     ]
 
 
-def test_columns_of_other_names_and_units_are_read(walk, tmp_path):
+def test_columns_with_other_names_and_units_are_read(walk, tmp_path):
     text = walk.read_text().replace("time,left_force_z,right_force_z", "t,Fz1,Fz2")
     theirs = tmp_path / "theirs.csv"
     theirs.write_text(text)
@@ -94,28 +94,28 @@ def in_milliseconds(text):
     return "\n".join(["\t".join(["Time (ms)", *head[1:]]), *rows])
 
 
-def heads(*lines):
+def with_header(*lines):
     return lambda text: "\n".join([*lines, *text.splitlines()[1:]])
 
 
 @pytest.mark.parametrize(
-    "written",
+    "rewrite",
     [
         with_comma,
         in_milliseconds,
-        heads("# lab A", "subject;3", "TIME [s],Left_Force_Z [N],right_force_z (N)"),
-        heads("time,left_force_z,right_force_z", "s,N,N"),
-        heads("time,left,right", ",force_z,force_z", "s,,"),
+        with_header("# lab A", "subject;3", "TIME [s],Left_Force_Z [N],right_force_z (N)"),
+        with_header("time,left_force_z,right_force_z", "s,N,N"),
+        with_header("time,left,right", ",force_z,force_z", "s,,"),
         lambda text: text.replace("\n", "\r\n") + "\r\n \r\n",
     ],
 )
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
-def test_a_table_is_read_as_others_write_it(walk, written, encoding):
+def test_common_ways_of_writing_a_table_are_read(walk, rewrite, encoding):
     plain = events_of(walk)
-    walk.write_text(written(walk.read_text()), encoding=encoding)
+    walk.write_text(rewrite(walk.read_text()), encoding=encoding)
     columns = {"left_force_z": "left force_z", "right_force_z": "right force_z"}
-    told = "left force_z" in read_table(walk).columns
-    again = events_of(walk, columns=columns if told else {})
+    two_rows = "left force_z" in read_table(walk).columns
+    again = events_of(walk, columns=columns if two_rows else {})
     assert [(e.event.step, e.detection.kind) for e in again[0]] == [
         (e.event.step, e.detection.kind) for e in plain[0]
     ]
@@ -124,7 +124,7 @@ def test_a_table_is_read_as_others_write_it(walk, written, encoding):
     )
 
 
-def test_an_empty_line_of_a_single_column_is_a_missing_sample(tmp_path):
+def test_an_empty_line_in_a_single_column_is_a_missing_sample(tmp_path):
     path = tmp_path / "one.csv"
     path.write_text("left_force_z\n1.5\n\n3\n")
     _, (stream,) = streams_of(path, rate=100.0)
@@ -132,7 +132,7 @@ def test_an_empty_line_of_a_single_column_is_a_missing_sample(tmp_path):
     assert [v for (v,) in stream.values] == pytest.approx([1.5, math.nan, 3.0], nan_ok=True)
 
 
-def test_toe_offs_before_the_first_strike_are_kept_and_in_no_stride(walk, tmp_path):
+def test_toe_offs_before_the_first_strike_are_written_but_not_read(walk, tmp_path):
     lines = walk.read_text().splitlines()
     walk.write_text("\n".join([lines[0], *lines[230:]]))  # both feet stand
     events, _ = events_of(walk)
@@ -143,13 +143,13 @@ def test_toe_offs_before_the_first_strike_are_kept_and_in_no_stride(walk, tmp_pa
     assert read_events(tmp_path / "e.tsv")[0] == second.event
 
 
-def test_a_sensor_that_dies_before_the_record_ends_is_told(walk):
+def test_a_sensor_that_dies_before_the_record_ends_is_reported(walk):
     chosen, (left, right) = streams_of(walk)
     dead = Stream(right.side, right.times[:1000], right.values[:1000])
     assert "right vertical_force: no sample for 7.00 s" in detect(chosen, [left, dead])[1]
 
 
-def test_a_missing_sample_is_told(walk):
+def test_a_missing_sample_is_reported(walk):
     lines = walk.read_text().splitlines()
     lines[400] = lines[400].rpartition(",")[0] + ","
     walk.write_text("\n".join(lines))
@@ -172,7 +172,7 @@ def test_a_missing_sample_is_told(walk):
         ("time,left_foot_gyro_x\n0,1", "lacks column left_foot_gyro_y, left_foot_gyro_z"),
     ],
 )
-def test_a_refused_table_is_named_with_its_column(tmp_path, text, words):
+def test_a_refused_table_is_reported_in_one_line(tmp_path, text, words):
     path = tmp_path / "bad.csv"
     path.write_text(text)
     with pytest.raises(RecordingError) as refused:
@@ -194,7 +194,7 @@ def test_a_refused_table_is_named_with_its_column(tmp_path, text, words):
         ("onset,trial_type,side,uncertainty\n1,toe_off,left,-1", "'-1'; allowed: 0 to 1 s"),
     ],
 )
-def test_refused_events_are_named_with_row_and_column(tmp_path, text, words):
+def test_refused_events_are_reported_with_row_and_column(tmp_path, text, words):
     path = tmp_path / "bad.tsv"
     path.write_text(text)
     with pytest.raises(EntrainmentError) as refused:
@@ -202,7 +202,7 @@ def test_refused_events_are_named_with_row_and_column(tmp_path, text, words):
     assert words in str(refused.value)
 
 
-def test_pulses_are_a_column_onset(tmp_path):
+def test_pulses_are_read_from_the_column_onset(tmp_path):
     path = tmp_path / "pulses.tsv"
     path.write_text("onset\tduration\n2.5\t0.1\n1.25\t0.1\n")
     assert read_onsets(path) == [1_250_000_000, 2_500_000_000]
@@ -211,7 +211,7 @@ def test_pulses_are_a_column_onset(tmp_path):
         read_onsets(path)
 
 
-def test_nothing_is_overwritten_and_no_file_is_one_line(walk, tmp_path):
+def test_files_are_not_overwritten_and_unreadable_ones_are_refused(walk, tmp_path):
     events, _ = events_of(walk)
     out = tmp_path / "walk_events.tsv"
     write_events(out, events)

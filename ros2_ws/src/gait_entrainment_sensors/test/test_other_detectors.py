@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Foot switch, shank gyroscope, ankle encoder: closed forms."""
+"""Foot switch, shank gyroscope and ankle encoder: signals in closed form."""
 
 import math
 from itertools import pairwise
@@ -28,7 +28,7 @@ def contacts(time):
     return float(phase < 0.6 * STANCE), float(0.15 < phase < STANCE)
 
 
-def test_contacts_are_timed_to_half_a_sample():
+def test_contacts_are_timed_to_within_half_a_sample():
     detector = FootSwitchDetector(Side.RIGHT)
     found = fed(detector, sampled(contacts, UNTIL, 200.0))
     for kind, late in ((STRIKE, 0.0), (TOE_OFF, STANCE)):
@@ -51,13 +51,13 @@ def test_a_contact_that_bounces_counts_once():
     assert len(times(found, STRIKE)) in (10, 11)
 
 
-def test_a_contact_that_stays_closed_in_the_shoe_is_told():
+def test_a_contact_that_stays_closed_in_the_shoe_is_reported():
     detector = FootSwitchDetector(Side.RIGHT)
     assert fed(detector, sampled(lambda _: (1.0, 1.0), UNTIL)) == []
     assert any("did not change" in line for line in detector.troubles())
 
 
-def test_volts_and_thresholds_without_hysteresis_are_refused():
+def test_volts_are_reported_and_thresholds_without_hysteresis_refused():
     detector = FootSwitchDetector(Side.RIGHT)
     fed(detector, sampled(lambda t: tuple(5.0 * c for c in contacts(t)), UNTIL))
     assert any("not volts" in line for line in detector.troubles())
@@ -66,7 +66,7 @@ def test_volts_and_thresholds_without_hysteresis_are_refused():
 
 
 def shank_rate(time):
-    """Lean forward through stance, a peak at toe-off, swing back, a peak at strike [rad/s]."""
+    """Return a rate [rad/s]: forward lean in stance, peaks at toe-off and strike, a swing back."""
     phase = phase_of(time)
     if time < OFFSET[Side.RIGHT]:
         return 0.0
@@ -77,7 +77,7 @@ def shank_rate(time):
     return stance + push + (swing if phase > STANCE else 0.0) + strike
 
 
-def test_peaks_of_the_shank_are_its_events():
+def test_peaks_of_the_shank_rate_are_events():
     settings = ShankGyroscopeDetector.Settings(axis_y=1.0)
     detector = ShankGyroscopeDetector(Side.RIGHT, settings)
     found = fed(detector, sampled(lambda t: (0.0, shank_rate(t), 0.0), UNTIL))
@@ -89,12 +89,12 @@ def test_peaks_of_the_shank_are_its_events():
     assert all(d.detected_at - d.time <= detector.latency + 0.005 for d in found)
 
 
-def test_toe_off_ends_the_plateau_of_push_off_and_a_jump_is_a_strike():
+def test_toe_off_ends_the_push_off_plateau_and_a_jump_is_a_strike():
     def plateau(time):
         phase = phase_of(time)
         if time < OFFSET[Side.RIGHT] or phase < STANCE - 0.16:
             return (0.0, 1.2 if time > OFFSET[Side.RIGHT] else 0.0, 0.0)
-        if phase < STANCE:  # its peak is well before its end
+        if phase < STANCE:  # the peak comes well before the end
             return (0.0, 3.0 - 2.0 * (phase - STANCE + 0.16), 0.0)
         return (0.0, -6.0 * math.sin(math.pi * (phase - STANCE) / (STRIDE - STANCE)) - 0.3, 0.0)
 
@@ -121,7 +121,7 @@ def ankle(time, amplitude=0.3):
     return amplitude * math.cos(2 * math.pi * (time - OFFSET[Side.RIGHT]) / STRIDE)
 
 
-def test_the_encoder_follows_the_period_and_says_what_it_is():
+def test_the_encoder_follows_the_period_and_is_reported_as_a_fallback():
     detector = AnkleEncoderDetector(Side.RIGHT)
     found = fed(detector, sampled(lambda t: (ankle(t), 0.0), UNTIL))
     strikes = times(found, STRIKE)
@@ -132,7 +132,7 @@ def test_the_encoder_follows_the_period_and_says_what_it_is():
     assert any("a fallback" in line for line in detector.troubles())
 
 
-def test_the_encoder_is_not_read_while_torque_moves_the_ankle():
+def test_the_encoder_is_ignored_while_torque_moves_the_ankle():
     def pulsed(time):
         pushed = 0.3 < phase_of(time) < 0.4
         return ankle(time) + (0.5 if pushed else 0.0), 10.0 if pushed else 0.0
@@ -142,19 +142,19 @@ def test_the_encoder_is_not_read_while_torque_moves_the_ankle():
     assert times(found, STRIKE) == times(plain, STRIKE)
 
 
-def test_an_angle_in_degrees_is_told():
+def test_an_angle_in_degrees_is_reported():
     detector = AnkleEncoderDetector(Side.RIGHT)
     fed(detector, sampled(lambda t: (math.degrees(ankle(t)), 0.0), UNTIL))
     assert any("in degrees?" in line for line in detector.troubles())
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_an_encoder_that_counts_the_other_way_round_is_told(sign):
+def test_an_encoder_with_the_wrong_sign_is_reported(sign):
     def pushed_off(time):
         place = phase_of(time) / STRIDE
         return sign * min(place / 0.2, (1 - place) / 0.8) * 0.3, 0.0
 
     detector = AnkleEncoderDetector(Side.RIGHT)
     fed(detector, sampled(pushed_off, UNTIL))
-    told = any("plantarflexion must be positive" in line for line in detector.troubles())
-    assert told == (sign < 0)
+    reported = any("plantarflexion must be positive" in line for line in detector.troubles())
+    assert reported == (sign < 0)

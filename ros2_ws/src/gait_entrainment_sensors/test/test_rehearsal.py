@@ -34,7 +34,7 @@ def errors(rehearsal, kind):
 
 
 @pytest.mark.parametrize(("kind", "detector"), CHAINS)
-def test_the_paper_locks_also_through_sensors(kind, detector):
+def test_the_gait_also_entrains_through_sensors(kind, detector):
     protocol = replace(Protocol(), variation=Variation(0.0))
     rehearsal = rehearse(protocol, Sensors(kind, find_detector(detector), protocol.side, seed=5))
     assert rehearsal.analysis.entrainments[-1].verdict is Verdict.ENTRAINED
@@ -42,14 +42,14 @@ def test_the_paper_locks_also_through_sensors(kind, detector):
     strikes, toe_offs = (errors(rehearsal, k) for k in EventKind)
     assert statistics.median(map(abs, strikes.errors)) < 5e-3
     assert (strikes.false, toe_offs.false) == (0, 0)
-    # Before its axis is found a gyroscope sees three strides or so.
+    # A gyroscope needs about three strides before its axis is found.
     assert strikes.missed <= 8
-    # The lag is that of the exact events, shifted by what the toe-offs are late.
+    # The lag is that of the exact events, shifted by the delay of the toe-offs.
     lags = [a.pulses[-1].phase_lag for a in (rehearsal.analysis, rehearsal.true_analysis)]
     assert lags[0] - lags[1] == pytest.approx(-toe_offs.bias, abs=4 * toe_offs.deviation + 2e-3)
 
 
-def test_steps_have_the_numbers_of_the_walker():
+def test_step_numbers_agree_with_the_walker():
     protocol = replace(Protocol(), variation=Variation(0.02), seed=1)
     sensors = Sensors("foot_switch", find_detector("foot_switch"), protocol.side, seed=1)
     rehearsal = rehearse(protocol, sensors)
@@ -62,7 +62,7 @@ def test_steps_have_the_numbers_of_the_walker():
     assert set(rehearsal.onsets) <= planned
 
 
-def test_where_no_toe_off_is_found_the_verdict_rests_on_heel_strikes():
+def test_without_toe_offs_the_verdict_rests_on_heel_strikes():
     protocol = replace(Protocol(), variation=Variation(0.0))
     kind, stiff = find_sensor("shank_gyroscope:knee_angle=0")
     chain = Sensors(kind, find_detector(kind), protocol.side, stiff, seed=5)
@@ -72,6 +72,6 @@ def test_where_no_toe_off_is_found_the_verdict_rests_on_heel_strikes():
     last = rehearsal.analysis.pulses[-1]
     strikes = [stride.end for stride in rehearsal.true_analysis.strides]
     lags = [(last.onset - strike) / 1e9 for strike in strikes]
-    # Its heel strikes are 23 ms late there (docs/sensors.md).
+    # With a stiff knee heel strikes are 23 ms late (docs/sensors.md).
     assert last.phase_lag == pytest.approx(min(lags, key=abs), abs=0.03)
     assert last.toe_off is None

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Vertical force: a real belt, closed forms, steps on the wrong belt, and what cannot be."""
+"""Vertical force: a real belt, closed forms, steps on the wrong belt, implausible signals."""
 
 import math
 import random
@@ -24,12 +24,12 @@ def detected(signal, rate=1000.0, side=Side.RIGHT):
     return detector, fed(detector, sampled(signal, UNTIL, rate))
 
 
-def test_every_strike_of_a_real_belt_and_none_else():
+def test_every_strike_on_a_real_belt_is_found_and_no_other():
     detector = VerticalForceDetector(Side.LEFT)
     found = fed(detector, belt())
     strikes = times(found, STRIKE)
     assert len(strikes) == 46
-    # A walk without a gap: each stride is that of the others, to 10 %.
+    # The walk has no gap: strides differ by less than 10 %.
     strides = [b - a for a, b in pairwise(strikes)]
     assert max(strides) < 1.1 * min(strides)
     assert len(times(found, TOE_OFF)) == 47  # the record begins in stance
@@ -39,7 +39,7 @@ def test_every_strike_of_a_real_belt_and_none_else():
 @pytest.mark.parametrize("rate", [100.0, 400.0, 1000.0])
 def test_crossings_of_a_half_sine_are_interpolated(rate):
     _, found = detected(lambda t: (force(t),), rate)
-    # 20 N are crossed this long after the sine begins, and before it ends.
+    # 20 N are crossed this long after the sine begins and before it ends.
     late = STANCE / 3.14159 * 20.0 / 800.0
     for n, time in enumerate(times(found, STRIKE)):
         assert time == pytest.approx(OFFSET[Side.RIGHT] + n * STRIDE + late, abs=0.15 / rate)
@@ -48,7 +48,7 @@ def test_crossings_of_a_half_sine_are_interpolated(rate):
     assert len(times(found, STRIKE)) == 11
 
 
-def test_the_zero_follows_a_drift_in_swing():
+def test_the_zero_follows_drift_during_swing():
     detector, found = detected(lambda t: (force(t) + 15.0 + 6.0 * t,))
     assert len(times(found, STRIKE)) >= 10
     assert detector._zero > 60.0
@@ -63,7 +63,7 @@ def test_a_belt_that_was_never_zeroed_is_zeroed():
         assert time == pytest.approx(OFFSET[Side.RIGHT] + n * STRIDE + late, abs=2e-3)
 
 
-def test_a_step_of_the_other_foot_on_this_belt_is_no_event():
+def test_a_step_of_the_other_foot_on_this_belt_is_not_an_event():
     other = 5 * STRIDE + OFFSET[Side.RIGHT] + STANCE + 0.05
 
     def signal(time):  # the other foot comes down on this belt in the middle of the swing
@@ -90,8 +90,8 @@ def test_a_stance_that_both_feet_share_ends_without_a_toe_off():
     assert times(found, STRIKE) == pytest.approx(times(plain, STRIKE), abs=1e-3)
 
 
-def test_single_samples_are_no_foot():
-    """Every 50th sample is lost as a zero, and every 50th is a spike; plates shake by 25 N."""
+def test_single_samples_are_not_a_foot():
+    """Every 50th sample is lost and reads zero, every 50th is a spike; the noise is 25 N."""
     generator = random.Random(1)
 
     def signal(time):
@@ -106,8 +106,8 @@ def test_single_samples_are_no_foot():
 
 
 @pytest.mark.parametrize("factor", [1.0, 4.0])
-def test_who_stops_or_walks_slowly_leaves_the_ground_when_he_does(factor):
-    """Strides of 4.4 s; or the foot stands for five strides in mid-walk, on and off its load."""
+def test_toe_offs_are_timed_in_slow_walking_and_after_standing(factor):
+    """Strides of 4.4 s, or a foot that stands for five strides in mid-walk under varying load."""
     stands = OFFSET[Side.RIGHT] + 3 * STRIDE, OFFSET[Side.RIGHT] + 8 * STRIDE + STANCE
 
     def signal(time):
@@ -125,8 +125,8 @@ def test_who_stops_or_walks_slowly_leaves_the_ground_when_he_does(factor):
     assert detector._zero == pytest.approx(0.0, abs=5.0)
 
 
-def test_who_stood_on_the_other_leg_is_not_taken_for_a_belt_that_is_not_zeroed():
-    """Of a foot that bears 120 N for three seconds, and then walks."""
+def test_standing_on_the_other_leg_is_not_mistaken_for_a_belt_that_is_not_zeroed():
+    """The foot bears 120 N for three seconds and then walks."""
     stands = OFFSET[Side.RIGHT] + 2 * STRIDE + 0.3, OFFSET[Side.RIGHT] + 5 * STRIDE + 0.3
 
     def signal(time):
@@ -150,7 +150,7 @@ def test_who_stood_on_the_other_leg_is_not_taken_for_a_belt_that_is_not_zeroed()
         (lambda t: (min(force(t), 500.0),), "stuck in mid-movement"),
     ],
 )
-def test_what_cannot_be_is_told(signal, words):
+def test_implausible_signals_are_reported(signal, words):
     detector, _ = detected(signal)
     assert any(words in line for line in detector.troubles())
 

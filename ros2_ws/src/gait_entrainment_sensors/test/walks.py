@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Signals in closed form, of feet whose events are known."""
+"""Signals in closed form of feet with known events."""
 
 import math
 
@@ -36,11 +36,11 @@ def foot_rate(time, side=Side.RIGHT):
     """
     Sagittal rate of a foot, toes down positive [rad/s].
 
-    It slaps flat in 0.1 s after the strike; in the last 0.15 s of stance it turns down ever
-    faster, and from toe-off on the rate falls within 20 ms; the swing is a sine that ends at zero.
+    The foot slaps flat within 0.1 s of the strike. In the last 0.15 s of stance it turns down ever
+    faster; after toe-off the rate falls within 20 ms. The swing is a sine that ends at zero.
     """
     phase = (time - OFFSET[side]) % STRIDE
-    if time < OFFSET[side] + 0.1:  # it stood before
+    if time < OFFSET[side] + 0.1:  # standing before
         return 0.0
     if phase < 0.1:
         return 4.0 * math.sin(math.pi * phase / 0.1)
@@ -54,7 +54,7 @@ def foot_rate(time, side=Side.RIGHT):
 
 
 def detections(strides, stride=STRIDE, stance=STANCE, latency=0.02):
-    """Return what a perfect detector finds of both feet, in order."""
+    """Return the detections of a perfect detector for both feet, in order."""
     found = []
     for side in Side:
         for n in range(strides):
