@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Every run of these tests has a domain of its own, and hears this host only."""
+"""Each run of these tests has its own domain and hears only this host."""
 
 import os
 import sys

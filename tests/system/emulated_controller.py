@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What the driver sees of a robot under ros2_control: an effort controller, a state broadcaster.
+A robot under ros2_control as the driver sees it: an effort controller, a state broadcaster.
 
     python emulated_controller.py DOMAIN [--timeout S] [--namespace NAME] ...
 
-The torque follows the command by a lag of 30 Hz. Without a timeout the last command is held, as
-ros2_control's effort controllers do. With --manager NAME=STATE a controller_manager answers a
-strict switch as that of Jazzy does, by services of its types. Prints a line when it is there.
+The torque follows the command with a lag of 30 Hz. Without a timeout the last command is held, as
+in ros2_control's effort controllers. With --manager NAME=STATE, a controller_manager with Jazzy's
+service types answers a strict switch as Jazzy's does. Prints a line when it is ready.
 """
 
 import argparse
@@ -26,7 +26,7 @@ from std_msgs.msg import Float64MultiArray
 
 
 class Controller(Node):
-    """Two joints, of which the ankle is driven."""
+    """Two joints, knee and ankle; only the ankle is driven."""
 
     def __init__(self, options):
         super().__init__("controller_manager", namespace=options.namespace)
@@ -39,7 +39,7 @@ class Controller(Node):
             self.manage()
         if not options.deaf:
             topic = "effort_controller/commands"
-            self.create_subscription(Float64MultiArray, topic, self.obey, 1)
+            self.create_subscription(Float64MultiArray, topic, self.on_command, 1)
 
     def manage(self):
         from controller_manager_msgs.srv import ListControllers, SwitchController
@@ -68,7 +68,7 @@ class Controller(Node):
             trace.write(f"{self.state}\n")
         return response
 
-    def obey(self, message):
+    def on_command(self, message):
         self.advance()
         (command,) = message.data
         self.command = command if self.state in ("", "active") else 0.0
@@ -82,7 +82,7 @@ class Controller(Node):
         self.torque = self.command + (self.torque - self.command) * decay
         self.now = now
 
-    def tell(self):
+    def publish_state(self):
         self.advance()
         message = JointState(name=["knee", "ankle"], position=[1.0, 0.1], velocity=[0.0, 0.0])
         stamp = time.time_ns() - round(self.options.behind * 1e9)
@@ -98,24 +98,24 @@ def main():
     parser.add_argument("--rate", type=float, default=500.0)
     parser.add_argument("--namespace", default="")
     parser.add_argument("--joint-states", default="joint_states")
-    parser.add_argument("--behind", type=float, default=0.0, help="of its clock [s]")
-    parser.add_argument("--manager", default="", metavar="NAME=STATE", help="of its controller")
-    parser.add_argument("--trace", type=Path, default=os.devnull, help="of what it switches to")
-    parser.add_argument("--silent", action="store_true", help="a manager that switches nothing")
+    parser.add_argument("--behind", type=float, default=0.0, help="lag of its clock [s]")
+    parser.add_argument("--manager", default="", metavar="NAME=STATE", help="its controller")
+    parser.add_argument("--trace", type=Path, default=os.devnull, help="states switched to")
+    parser.add_argument("--silent", action="store_true", help="no service to switch")
     parser.add_argument("--deaf", action="store_true", help="no controller")
-    parser.add_argument("--no-effort", action="store_true", help="nothing is measured")
+    parser.add_argument("--no-effort", action="store_true", help="no torque is measured")
     options = parser.parse_args()
     rclpy.init(args=[], domain_id=options.domain)
     node = Controller(options)
     executor = EventsExecutor()
     executor.add_node(node)
     for thread in Path("/proc/self/task").iterdir():
-        with contextlib.suppress(OSError):  # it stands for hardware, which waits for nobody
+        with contextlib.suppress(OSError):  # it emulates hardware, which waits for no process
             os.sched_setscheduler(int(thread.name), os.SCHED_FIFO, os.sched_param(60))
     print("ready", flush=True)
     due = time.monotonic()
     while True:
-        node.tell()
+        node.publish_state()
         due += 1 / options.rate
         while (left := due - time.monotonic()) > 0:
             executor.spin_once(timeout_sec=left)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Runs as processes, and a probe that listens to them: what the system tests share."""
+"""Runs as processes and a probe that listens to them, shared by the system tests."""
 
 import json
 import math
@@ -36,13 +36,13 @@ from gait_entrainment_nodes.messaging.environment import come_before_others
 from gait_entrainment_nodes.messaging.stamps import header
 from gait_entrainment_nodes.messaging.topics import GROUND_REACTION, STRIDES, Topic
 
-# Long enough for a machine whose two cores are shared; nothing waits for it to pass.
+# Long enough for a machine with two shared cores; only a failing test waits this long [s].
 PATIENCE = 60.0
-# Similar to the walker of the paper, in sixteenfold gravity: angles and torques are the same, and
-# everything takes a quarter of the time. For what must be waited for in real time.
+# Dynamically similar to the paper's walker, in sixteenfold gravity: the same angles and torques in
+# a quarter of the time. For tests that have to wait in real time.
 QUICK = ("--gravity=156.96", "--mass=5", "--period-offset=-0.0125", "--width=0.025")
 LONG = (*QUICK, "--pulses=2000")
-# What architecture.md promises to be the same, byte for byte, in two lock-step runs.
+# Topics that architecture.md promises to be the same, byte for byte, in two lock-step runs.
 PROMISED_TOPICS = (
     "/joint_states",
     "/gait_events",
@@ -60,7 +60,7 @@ PROMISED_TOPICS = (
 
 
 def open_files(pid: int) -> set[str]:
-    """Return what a process has open; what it closes meanwhile is left out."""
+    """Return the files that a process has open, without those that it closes meanwhile."""
     opened = set()
     for descriptor in Path(f"/proc/{pid}/fd").iterdir():
         with suppress(FileNotFoundError):
@@ -69,7 +69,7 @@ def open_files(pid: int) -> set[str]:
 
 
 def protocol_of(*options: str) -> Protocol:
-    """Return the protocol that these options of the command line name."""
+    """Return the protocol that these command-line options describe."""
     import argparse
 
     from gait_entrainment_commands.protocol_options import add_protocol_options, chosen_protocol
@@ -84,7 +84,7 @@ def stamp_of(header: Any) -> int:
 
 
 def payloads(bag: Path, topics: Sequence[str]) -> dict[str, list[tuple[int, bytes]]]:
-    """Return log time and bytes of every message, by topic, in the order of the record."""
+    """Return log time and bytes of every message by topic, in recorded order."""
     with BagReader(bag) as reader:
         found: dict[str, list[tuple[int, bytes]]] = {topic: [] for topic in topics}
         for message in reader.messages([t for t in topics if t in reader.topics]):
@@ -93,7 +93,7 @@ def payloads(bag: Path, topics: Sequence[str]) -> dict[str, list[tuple[int, byte
 
 
 def events_since_start(bag: Path) -> list[tuple[int, int, int, int]]:
-    """Return instant, kind, side and step of every recorded gait event."""
+    """Return time since the start, kind, side and step of every recorded gait event."""
     with BagReader(bag) as reader:
         events = [message for _, message in reader.decoded(["/gait_events"])]
     start = stamp_of(events[0].header)
@@ -101,14 +101,14 @@ def events_since_start(bag: Path) -> list[tuple[int, int, int, int]]:
 
 
 def simulated_events(bag: Path) -> list[tuple[int, int, int, int]]:
-    """Return what ``events_since_start`` should, as one process computes it."""
+    """Return what ``events_since_start`` should return, computed in one process."""
     with BagReader(bag) as reader:
         simulation = simulate(read_protocol(reader.custom_data["protocol"]))
     return [(e.stamp, int(e.kind), int(e.side), e.step) for e in simulation.events]
 
 
 class Probe:
-    """A client of the tests in one domain: what it waits for must come."""
+    """The tests' client in one domain; a wait that times out fails the test."""
 
     def __init__(self, domain: int) -> None:
         self.client = Client("probe", domain=domain)
@@ -119,7 +119,7 @@ class Probe:
     ) -> Any:
         """Serve ROS until a condition holds; return its value."""
         value = self.client.wait(condition, patience)
-        assert value, f"waited in vain for {what}"
+        assert value, f"timed out waiting for {what}"
         return value
 
     def listen(self, topic: Topic) -> list[Any]:
@@ -135,7 +135,7 @@ class Probe:
         return self.client.call(kind, service, request, period=math.inf)
 
     def send_goal(self, kind: Any, action: str, goal: Any) -> Any:
-        """Send a goal to a node that offers ~/ready; return its handle once it is answered."""
+        """Send a goal to a node that offers ~/ready; return its handle once there is an answer."""
         self.client.action(kind, action)
         self.client.wait_to_be_known(action.rpartition("/")[0])
         return self.client.send_goal(kind, action, goal)
@@ -143,12 +143,12 @@ class Probe:
     def result(self, handle: Any) -> Any:
         """Wait for the result of a goal."""
         answer = self.client.result(handle, PATIENCE)
-        assert answer, "waited in vain for a result"
+        assert answer, "timed out waiting for a result"
         return answer
 
 
 class Feet:
-    """Two force sensors of one's own, on each of which a person stands half of the time."""
+    """A person's two force sensors, each loaded 60 % of the time."""
 
     def __init__(self, probe: Probe) -> None:
         self.probe = probe
@@ -160,7 +160,7 @@ class Feet:
         self.ahead = 0  # [ns]
 
     def tick(self) -> None:
-        """Publish a sample of each foot, 200 a second."""
+        """Publish a sample of each foot, at 200 Hz."""
         now = time.time_ns()
         for side in set(Side) - self.silent:
             phase = (now / 1e9 + 0.5 * side) % 1.0
@@ -182,31 +182,31 @@ class Feet:
 
 @contextmanager
 def probe(domain: int) -> Iterator[Probe]:
-    """Give a probe in a domain."""
+    """Yield a probe in a domain."""
     made = Probe(domain)
     with made.client:
         yield made
 
 
 @contextmanager
-def as_prompt_as_a_node() -> Iterator[None]:
-    """Have this process scheduled as the nodes of a real-time run: a test stands for one."""
+def scheduled_like_a_node() -> Iterator[None]:
+    """Schedule this process like the nodes of a real-time run, for a test that acts as one."""
     come_before_others()
     try:
         yield
     finally:
         for thread in Path("/proc/self/task").iterdir():
-            with suppress(OSError):  # has ended meanwhile
+            with suppress(OSError):  # ended meanwhile
                 os.sched_setscheduler(int(thread.name), os.SCHED_OTHER, os.sched_param(0))
 
 
 def stat(pid: int) -> list[str]:
-    """Return what the system says of a process, from its state on."""
+    """Return the fields of a process's /proc/PID/stat, from its state on."""
     return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
 
 
 def alive(pid: int) -> bool:
-    """Whether a process runs; one that is only waiting to be reaped does not."""
+    """Return whether a process is running, not merely waiting to be reaped."""
     try:
         return stat(pid)[0] != "Z"
     except FileNotFoundError:
@@ -219,9 +219,9 @@ def cpu_seconds(pid: int) -> float:
 
 
 class Started:
-    """A command that starts nodes, as a process, with a look at the processes that it starts."""
+    """A command that starts nodes, run as a process; it also finds the nodes' processes."""
 
-    names: Sequence[str] = NODES  # that it starts
+    names: Sequence[str] = NODES  # of the nodes that it starts
 
     def __init__(self, command: Sequence[str], out: Path, **environment: str) -> None:
         self.out = out
@@ -232,7 +232,7 @@ class Started:
                 stdout=out_file,
                 stderr=subprocess.STDOUT,
                 env={**os.environ, **environment},
-                # A shell's background job, and so a test in one, ignores it.
+                # A shell's background jobs ignore it, and so would tests run in one.
                 preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
             )
         self.nodes: dict[str, int] = {}
@@ -245,7 +245,7 @@ class Started:
         self.ended_at = time.monotonic()
 
     def wait(self) -> int:
-        """Wait for its end; return its exit code."""
+        """Wait for it to end; return its exit code."""
         self._watcher.join(PATIENCE)
         code = self.process.poll()
         assert code is not None, self.text
@@ -257,7 +257,7 @@ class Started:
         return self.out.read_text(errors="replace")
 
     def find_nodes(self, names: Sequence[str] = ()) -> dict[str, int]:
-        """Return the process ids of all its nodes, once they are there."""
+        """Return the process ids of all its nodes, once they are running."""
         names = names or self.names
         deadline = time.monotonic() + PATIENCE
         while self.nodes.keys() != set(names):
@@ -278,11 +278,11 @@ class Started:
         return self.nodes
 
     def survivors(self) -> list[int]:
-        """Return which of its processes are still there."""
+        """Return those of its processes that are still running."""
         return [pid for pid in (self.process.pid, *self.nodes.values()) if alive(pid)]
 
     def end(self) -> None:
-        """Leave nothing behind, whatever the test found."""
+        """Kill what still runs, whether or not the test passed."""
         for pid in self.survivors():
             os.kill(pid, signal.SIGKILL)
         self._watcher.join()
@@ -297,13 +297,13 @@ class EntrainRun(Started):
         super().__init__(command, bag.with_name(bag.name + ".out"), **environment)
 
     def outcome(self) -> dict[str, Any]:
-        """Wait for its end, which must be a good one; return what ``--json`` printed."""
+        """Wait for it to end successfully; return what ``--json`` printed."""
         assert self.wait() == 0, self.text
         return dict(json.loads(self.text.splitlines()[-1]))
 
     def domain(self) -> int:
         """Return its domain."""
-        self.find_nodes()  # by then it has claimed one, by the name of a socket
+        self.find_nodes()  # by then it has claimed one, by a socket's name
         held = open_files(self.process.pid)
         for line in Path("/proc/net/unix").read_text().splitlines():
             words = line.split()
@@ -312,7 +312,7 @@ class EntrainRun(Started):
         raise AssertionError("it has claimed no domain")
 
     def wait_for_stride(self, number: int) -> None:
-        """Wait until the analyzer has seen a stride."""
+        """Wait until the analyzer has published this stride or a later one."""
         with probe(self.domain()) as listener:
             strides = listener.listen(STRIDES)
             listener.until(
@@ -326,7 +326,7 @@ class EntrainRun(Started):
 
 @contextmanager
 def entrain_run(bag: Path, *options: str, **environment: str) -> Iterator[EntrainRun]:
-    """Start ``entrain run``, and see that nothing of it stays."""
+    """Start ``entrain run``; leave no process behind."""
     run = EntrainRun(bag, *options, **environment)
     try:
         yield run
@@ -335,7 +335,7 @@ def entrain_run(bag: Path, *options: str, **environment: str) -> Iterator[Entrai
 
 
 class Session:
-    """The nodes of an experiment without ``entrain run``: the test conducts."""
+    """The nodes of an experiment without ``entrain run``: the test conducts it."""
 
     def __init__(
         self,
@@ -396,14 +396,14 @@ def session(
     **walker: str,
 ) -> Iterator[Session]:
     """
-    Start nodes in a domain of their own; stop them in the end.
+    Start nodes in their own domain; stop them at the end.
 
-    ``walker`` and ``detector`` are those of `parameters`. If ``strangers`` may ask for pulses,
-    the perturbator knows no protocol that these must be of.
+    ``walker`` and ``detector`` are those of `parameters`. If ``strangers`` may request pulses,
+    the perturbator knows no protocol that these must belong to.
     """
     with claimed_domain() as domain:
-        told = (options, real_time, participants, strangers, RECORDER in nodes)
-        running = Session(folder, domain, *told, **walker)
+        settings = (options, real_time, participants, strangers, RECORDER in nodes)
+        running = Session(folder, domain, *settings, **walker)
         try:
             running.start(*nodes)
             yield running

@@ -4,9 +4,9 @@
 """
 Two hosts on one machine: network namespaces joined by a link that delays and loses frames.
 
-Each end is a TAP interface; between the two a thread carries every Ethernet frame. That does what
-netem would do to a veth pair, on kernels without it as well, and counts what crosses. Each
-host has a /dev/shm of its own: nothing can pass by the link.
+Each end is a TAP interface, and a thread carries every Ethernet frame between the two. This does
+what netem would do to a veth pair, also on kernels without netem, and counts what crosses. Each
+host has its own /dev/shm, so nothing can bypass the link.
 """
 
 import fcntl
@@ -29,17 +29,17 @@ _LONGEST_FRAME = 2048
 
 
 def obstacle() -> str:
-    """Return why there cannot be two hosts on this machine, or an empty text."""
+    """Return why this machine cannot have two hosts, or an empty text."""
     if os.geteuid() != 0:
         return "network namespaces need root"
     if shutil.which("ip") is None:
-        return "the command ip (iproute2) is not here"
+        return "the command ip (iproute2) is not installed"
     if not Path("/dev/net/tun").exists():
         return "there is no /dev/net/tun"
     name = f"gait{os.getpid()}"
     made = subprocess.run(["ip", "netns", "add", name], capture_output=True, text=True)
     if made.returncode:
-        return f"ip netns add is refused: {made.stderr.strip()}"
+        return f"ip netns add failed: {made.stderr.strip()}"
     subprocess.run(["ip", "netns", "delete", name], check=True)
     return ""
 
@@ -51,20 +51,20 @@ class SlowLink:
     Parameters
     ----------
     delay
-        Of every frame, one way [s].
+        One-way delay of every frame [s].
     jitter
         Standard deviation of the delay [s]; frames overtake each other.
     loss
-        Fraction of the frames that are lost, each way.
+        Fraction of the frames lost each way.
 
     Attributes
     ----------
     hosts
         Names of the namespaces.
     addresses
-        Of the two ends.
+        IP addresses of the two ends.
     carried, lost, octets
-        Frames each way, and octets of those carried: from the first host, from the second.
+        Frames carried and lost, and octets carried: [from the first host, from the second].
 
     """
 
@@ -90,7 +90,7 @@ class SlowLink:
                 _ip("-n", host, "link", "set", "lo", "up")
                 _ip("-n", host, "address", "add", f"{address}/24", "dev", host)
                 _ip("-n", host, "link", "set", host, "up", "multicast", "on")
-                # Discovery goes by multicast, whose packets need a route.
+                # Discovery uses multicast, whose packets need a route.
                 _ip("-n", host, "route", "add", "224.0.0.0/4", "dev", host)
         except BaseException:
             self._remove()
@@ -115,7 +115,7 @@ class SlowLink:
             subprocess.run(["ip", "netns", "delete", host], capture_output=True)
 
     def _carry(self) -> None:
-        under_way: list[tuple[float, int, int, bytes]] = []  # due, number, to which end, frame
+        under_way: list[tuple[float, int, int, bytes]] = []  # due, number, target end, frame
         number = 0
         while not self._closing.is_set():
             wait = max(under_way[0][0] - time.monotonic(), 0.0) if under_way else 0.1

@@ -4,7 +4,7 @@
 """
 A process that subscribes reliably to every topic of a run, as `ros2 topic echo` may.
 
-Prints "listens" once it does, and "hears" once the walker has been heard.
+Prints "listens" once it has subscribed, and "hears" once it has heard the walker.
 """
 
 from gait_entrainment_nodes.messaging import topics

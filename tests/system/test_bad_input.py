@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Mistakes on the command line and in parameters: one clear line, and nothing is left behind."""
+"""Mistakes on the command line and in parameters give one clear line and leave nothing behind."""
 
 import os
 import resource
@@ -17,7 +17,7 @@ from gait_entrainment_msgs.srv import Ready
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 
 BAG = Path(__file__).parents[2] / "bags" / "paper_example"
-# What is wrong; the options; what the line must name, field and allowed range.
+# What is wrong, the options, and what the line must name: field and allowed range.
 WRONG_USAGE = {
     "negative width": (["--width=-0.1"], ["width", "-0.1", "1e-09 to 10 s"]),
     "overlapping pulses": (["--width=0.4", "--period=0.3"], ["width", "0.3", "intervals above"]),
@@ -57,7 +57,7 @@ def assert_one_line(text, named):
 
 
 @pytest.mark.parametrize("case", WRONG_USAGE)
-def test_wrong_usage_is_one_line_and_leaves_nothing(case, tmp_path):
+def test_wrong_usage_gives_one_line_and_leaves_nothing_behind(case, tmp_path):
     options, named = WRONG_USAGE[case]
     code, text = entrain(tmp_path, *options)
     assert code == 2
@@ -80,14 +80,14 @@ def test_wrong_usage_is_one_line_and_leaves_nothing(case, tmp_path):
         ),
     ],
 )
-def test_what_the_robot_cannot_do_is_one_line_and_leaves_nothing(options, named, tmp_path):
+def test_impossible_robot_options_give_one_line_and_leave_nothing_behind(options, named, tmp_path):
     code, text = entrain(tmp_path, *options)
     assert code == 1
     assert_one_line(text, named)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_unknown_key_is_named_with_its_line(tmp_path):
+def test_unknown_key_is_reported_with_its_line(tmp_path):
     protocol = tmp_path / "mine.yaml"
     protocol.write_text("baseline: 5\npulses:\n  widht: 0.1\n")
     code, text = entrain(tmp_path, "mine.yaml")
@@ -114,7 +114,7 @@ def test_output_that_cannot_be_written_is_refused_before_anything_starts(tmp_pat
     code, text = entrain(tmp_path, "--out=/proc/bag")
     assert code == 2
     assert_one_line(text, ["--out", "/proc", "cannot be written to"])
-    code, text = entrain(tmp_path, b"--out=\xff")  # it could be no parameter of a node
+    code, text = entrain(tmp_path, b"--out=\xff")  # it could not be a node parameter
     assert code == 2
     assert_one_line(text, ["--out", "udcff", "UTF-8"])
 
@@ -138,7 +138,7 @@ def test_domain_in_use_is_refused(tmp_path):
         (["ready", "no name"], "7", 2, ["no name", "alphanumerics"]),
     ],
 )
-def test_node_and_ready_refuse_what_is_no_domain_and_no_name(words, domain, code, named):
+def test_node_and_ready_refuse_an_invalid_domain_or_name(words, domain, code, named):
     done = subprocess.run(
         ["entrain", *words],
         capture_output=True,
@@ -162,7 +162,7 @@ def test_node_and_ready_refuse_what_is_no_domain_and_no_name(words, domain, code
     ],
     ids=" ".join,
 )
-def test_environment_that_ros_cannot_start_in_is_one_line(command, tmp_path):
+def test_environment_in_which_ros_cannot_start_gives_one_line(command, tmp_path):
     done = subprocess.run(
         command,
         cwd=tmp_path,
@@ -176,7 +176,7 @@ def test_environment_that_ros_cannot_start_in_is_one_line(command, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_run_needs_neither_home_nor_output(tmp_path):
+def test_run_needs_neither_home_nor_standard_output(tmp_path):
     environment = {name: value for name, value in os.environ.items() if name != "HOME"}
     words = ["--baseline=2", "--pulses=1", "--washout=0", "--no-figures", "--out=bag"]
     done = subprocess.run(
@@ -193,12 +193,12 @@ def test_run_needs_neither_home_nor_output(tmp_path):
 
 @pytest.fixture
 def small_disk(tmp_path):
-    """Give a folder on a file system of 6 MB, or skip where none may be made."""
+    """Yield a folder on a 6 MB file system; skip if none can be mounted."""
     place = tmp_path / "disk"
     place.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", "size=6m", "tmpfs", str(place)]
     if not shutil.which("mount") or subprocess.run(mount, capture_output=True).returncode:
-        pytest.skip("no file system may be mounted here")
+        pytest.skip("file systems cannot be mounted here")
     yield place
     subprocess.run(["umount", str(place)], check=True)
 
@@ -208,7 +208,7 @@ def assert_readable(bag):
         assert sum(1 for _ in reader.messages()) == reader.message_count > 0
 
 
-def test_full_disk_ends_the_run_where_the_record_is_required(small_disk):
+def test_full_disk_ends_the_run_if_the_record_is_required(small_disk):
     with entrain_run(small_disk / "bag", *LONG, "--sample-rate=1000", "--require-record") as run:
         run.find_nodes()
         assert run.wait() == 1
@@ -219,20 +219,20 @@ def test_full_disk_ends_the_run_where_the_record_is_required(small_disk):
 
 
 @pytest.mark.parametrize("mode", [(), ("--real-time",)], ids=["lock-step", "real time"])
-def test_full_disk_lets_the_walk_end_and_then_fails(mode, small_disk):
-    # The recorder puts 3 MB aside; little is left for a walk of a few seconds.
+def test_full_disk_fails_the_run_only_after_the_walk(mode, small_disk):
+    # The recorder reserves 3 MB, which leaves little for a walk of a few seconds.
     (small_disk / "filler").write_bytes(bytes(2_700_000))
     options = (*QUICK, "--baseline=2", "--pulses=14", "--washout=1", "--sample-rate=1000")
     with entrain_run(small_disk / "bag", *mode, *options) as run:
         assert run.wait() == 1
-        # Said only once the experiment has conducted all of the protocol.
+        # Reported only once the experiment has conducted the whole protocol.
         assert "bag_recorder did not complete the record" in run.text.splitlines()[0]
         assert "disk full" in run.text
         assert "Traceback" not in run.text
         assert_readable(run.bag)
 
 
-def test_file_that_may_not_grow_ends_the_run_with_a_readable_bag(tmp_path):
+def test_file_size_limit_ends_the_run_with_a_readable_bag(tmp_path):
     with entrain_run(tmp_path / "bag", *LONG, "--sample-rate=1000", "--require-record") as run:
         run.wait_for_stride(1)
         limits = (2 * 2**20, resource.RLIM_INFINITY)
@@ -245,7 +245,7 @@ def test_file_that_may_not_grow_ends_the_run_with_a_readable_bag(tmp_path):
 
 
 def test_fall_is_reported_with_its_bag(tmp_path):
-    # Dorsiflexion pulses take the push-off away that the walker needs to vault over.
+    # Dorsiflexion pulses take away the push-off that the walker needs to vault over.
     with entrain_run(tmp_path / "bag", "--torque=-29", "--width=0.4", "--json") as run:
         assert run.wait() == 1
         first = run.text.splitlines()[0]
@@ -255,11 +255,11 @@ def test_fall_is_reported_with_its_bag(tmp_path):
         assert_readable(run.bag)
 
 
-# Node, arguments, what the one line must name.
+# Node, arguments, and what the line must name.
 WRONG_PARAMETERS = [
     ("walker_sim", ["-p", "mass:=-1.0"], ["mass", "-1.0", "above 0 and at most 10000 kg"]),
     ("walker_sim", ["-p", "mass:=-80"], ["mass", "-80", "above 0 and at most 10000 kg"]),
-    # A whole number does for a real one: what is refused is the other.
+    # An integer is accepted for a float, so it is the other parameter that is refused.
     ("walker_sim", ["-p", "mass:=80", "-p", "sample_rate:=2000"], ["sample_rate", "2000"]),
     ("walker_sim", ["-p", "mass:=heavy"], ["mass", "heavy", "above 0 and at most 10000 kg"]),
     ("walker_sim", ["-p", "mass:=0.0"], ["mass", "0.0", "above 0"]),
@@ -268,7 +268,7 @@ WRONG_PARAMETERS = [
     ("walker_sim", ["-p", "first_heel_strike:=middle"], ["first_heel_strike", "left, right"]),
     ("perturbator", ["-p", "side:=up"], ["side", "'up'", "left, right"]),
     ("perturbator", ["-p", "limits.torque:=1000.0"], ["limits.torque", "1000.0", "0 to 200"]),
-    # In a section of the node's own it is no other node's: a mistyped limit.
+    # In the node's own section an unknown name is a typo, not another node's parameter.
     ("perturbator", ["-p", "limits.torqe:=5.0"], ["limits.torqe", "unknown", "limits.torque"]),
     ("gait_analyzer", ["-p", "side:=3"], ["side", "3"]),
     ("gait_analyzer", ["-p", "onset:=felt"], ["onset", "'felt'", "commanded, measured"]),
@@ -301,7 +301,7 @@ def test_node_refuses_a_wrong_parameter_in_one_line(node, arguments, named, tmp_
     assert list(tmp_path.iterdir()) == []
 
 
-def test_unknown_parameters_are_warned_of_in_one_line(tmp_path):
+def test_unknown_parameters_are_warned_about_in_one_line(tmp_path):
     file = tmp_path / "shared.yaml"
     file.write_text("/**: {ros__parameters: {masss: 80.0, camera.rate: 30, mass: 80.0}}")
     with claimed_domain() as domain, probe(domain) as listener:

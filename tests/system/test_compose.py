@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
-"""The services of docker/compose.yaml, run without containers: their commands as processes."""
+"""The services of docker/compose.yaml without containers: their commands run as processes."""
 
 import os
 import re
@@ -22,7 +22,7 @@ ENTRYPOINT = str(ROOT / "docker" / "entrypoint.bash")
 
 
 def services(**variables):
-    """Return the services, with variables put in as Docker Compose does."""
+    """Return the services, with variables substituted as Docker Compose does."""
 
     def value(match):
         return variables.get(match[1], match[2])
@@ -31,18 +31,18 @@ def services(**variables):
     return yaml.safe_load(re.sub(r"\$\{(\w+):-(.*?)\}", value, text))["services"]
 
 
-def assert_no_state_is_counted(bag):
+def assert_states_are_not_counted(bag):
     """
-    Hold the final counts of /diagnostics against what happened in the run.
+    Check the final counts of /diagnostics against what happened in the run.
 
-    A node that starts before the recorder has told its state to nobody: that is no loss.
+    The state of a node that starts before the recorder reaches no reader, which is not a loss.
     """
     with BagReader(bag) as reader:
         decoded = [m for _, m in reader.decoded(["/diagnostics", "/published_counts"])]
     names = [s.name for m in decoded if hasattr(m, "status") for s in m.status]
-    told = [m for m in decoded if hasattr(m, "counts")]
-    assert told
-    for message in told:
+    finals = [m for m in decoded if hasattr(m, "counts")]
+    assert finals
+    for message in finals:
         counted = message.counts[message.topics.index("/diagnostics")]
         assert counted <= names.count(f"{message.node.strip('/')}: run"), message.node
 
@@ -55,7 +55,7 @@ def test_services_conduct_and_record_one_experiment(tmp_path):
         environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
 
         def run(words):
-            # Nothing is inherited but what the image has, too.
+            # It inherits nothing that the image does not have as well.
             process = subprocess.Popen(
                 words, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, text=True
             )
@@ -75,19 +75,19 @@ def test_services_conduct_and_record_one_experiment(tmp_path):
         awaited = defined["experiment"]["depends_on"]
         assert set(awaited) == set(NODES) - {"experiment"}
         running = {name: start(name) for name in awaited}
-        assert healthy("perturbator")  # the others' commands differ in the name alone
+        assert healthy("perturbator")  # the others' commands differ only in the name
         running["experiment"] = start("experiment")
         for name in defined["outcome"]["depends_on"]:
             assert running[name].wait(PATIENCE) == 0, name
         text, _ = start("outcome").communicate(timeout=PATIENCE)
         assert "strides          9, pulses placed in them: 5" in text
-        assert_no_state_is_counted(tmp_path / "bags/from_compose")
+        assert_states_are_not_counted(tmp_path / "bags/from_compose")
         for name in set(NODES) - {"bag_recorder", "experiment"}:
             running[name].terminate()
             assert running[name].wait(PATIENCE) == 0, name
 
 
-def test_every_service_drops_its_privileges_and_hears_no_network():
+def test_every_service_drops_its_privileges_and_has_no_network():
     for name, service in services().items():
         assert service["cap_drop"] == ["ALL"], name
         assert service["security_opt"] == ["no-new-privileges:true"], name

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Processes that die or stall in mid-run: the rest end, the bag stays readable."""
+"""Processes that die or stall during a run: the others end and the bag stays readable."""
 
 import os
 import signal
@@ -13,9 +13,9 @@ from harness import LONG, PATIENCE, entrain_run
 from gait_entrainment_bags import BagReader
 from gait_entrainment_bringup.node_list import NODES
 
-# From a death to the end of everything [s]: how long a person may have to wait.
+# From a death to the end of all processes [s]: how long a person may have to wait.
 END_WITHIN = 5.0
-# Patience with a silent process, before that [s].
+# How long a silent process is tolerated before that [s].
 SILENCE_TIMEOUT = 3.0
 
 
@@ -27,7 +27,7 @@ def assert_readable(bag):
 
 
 def assert_ended_because_of(run, node, begin, limit):
-    """Check how a run ended whose process met with an accident."""
+    """Check how a run ended after one of its processes died or stalled."""
     assert run.wait() == 1, run.text
     assert run.ended_at - begin < limit, run.text
     assert run.survivors() == []
@@ -41,7 +41,7 @@ def assert_ended_because_of(run, node, begin, limit):
 
 @pytest.mark.parametrize("node", NODES)
 def test_death_ends_the_run(node, tmp_path):
-    # A bag that has to be rescued is small: how long that takes follows from its size.
+    # The bag may have to be rescued, so keep it small: the time for that depends on its size.
     small = ("--sample-rate=0", "--no-ground-reaction")
     with entrain_run(tmp_path / "bag", *LONG, *small) as run:
         run.wait_for_stride(200)
@@ -54,11 +54,11 @@ def test_death_ends_the_run(node, tmp_path):
 @pytest.mark.parametrize(
     ("mode", "stalled"),
     [(("--real-time",), NODES[:3]), (("--real-time",), NODES[3:]), ((), ("bag_recorder",))],
-    ids=["real time", "real time too", "lock-step"],
+    ids=["real time, first nodes", "real time, other nodes", "lock-step"],
 )
 def test_stalled_process_ends_the_run(mode, stalled, tmp_path):
-    # Several at once: most of the time is spent waiting. How long it takes is then no measure of
-    # one run any more, save where there is only one.
+    # Several at once, because most of the time is spent waiting. Their duration then says nothing
+    # about a single run, so the strict limit is only for a run alone.
     limit = SILENCE_TIMEOUT + 2 * END_WITHIN if len(stalled) == 1 else PATIENCE
     runs = {}
     try:
@@ -78,7 +78,7 @@ def test_stalled_process_ends_the_run(mode, stalled, tmp_path):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_interruption_ends_the_run_in_order(number, tmp_path):
+def test_interruption_ends_the_run_cleanly(number, tmp_path):
     with entrain_run(tmp_path / "bag", "--real-time", *LONG) as run:
         run.wait_for_stride(1)
         begin = time.monotonic()
@@ -100,5 +100,5 @@ def test_nothing_outlives_a_killed_command(tmp_path):
         begin = time.monotonic()
         while run.survivors():
             assert time.monotonic() - begin < END_WITHIN
-            time.sleep(0.02)  # there is no event of the end of another's child
+            time.sleep(0.02)  # only their parent could wait for their end
         assert_readable(run.bag)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""walker_display: what it draws is the walker at that instant, and nobody waits for it."""
+"""walker_display draws the walker at the time of its samples, and no node waits for it."""
 
 import cmath
 import math
@@ -26,25 +26,25 @@ from gait_entrainment_nodes.messaging.topics import (
     WALKER_PROGRESS,
 )
 
-# The pulses begin before toe-off and end behind it.
+# The pulses begin before toe-off and end after it.
 WALK = (*QUICK, "--baseline=2", "--pulses=2", "--washout=0", "--initial-phase=0.655")
 SCALE = 0.035
 
 
 def turned(transform):
-    """Return the angle about y of a transform that turns about nothing else."""
+    """Return the angle about y of a transform that turns about y only."""
     q = transform.transform.rotation
     assert q.x == q.z == 0
     return 2 * math.atan2(q.y, q.w)
 
 
 def arc_angle(marker):
-    """Return the angle from begin to tip of an arc around the ankle."""
+    """Return the angle from start to tip of an arc around the ankle."""
     directions = [complex(p.z, p.x) for p in marker.points[:-3]]
     return sum(cmath.phase(after / before) for before, after in pairwise(directions))
 
 
-def test_pictures_agree_with_the_samples_of_the_same_instant(tmp_path):
+def test_pictures_agree_with_the_samples_of_the_same_stamp(tmp_path):
     with session(tmp_path, *WALK, nodes=(*NODES, DISPLAY)) as nodes:
         topics = (JOINT_STATES, ANKLE_TORQUE, GAIT_EVENTS, TF, MARKERS, ROBOT_DESCRIPTION)
         heard = {topic.name: nodes.probe.listen(topic) for topic in topics}
@@ -59,7 +59,7 @@ def test_pictures_agree_with_the_samples_of_the_same_instant(tmp_path):
             ),
             "the last picture",
         )
-    # Who comes late has the description all the same.
+    # Late subscribers get the description as well.
     (description,) = heard[ROBOT_DESCRIPTION.name]
     assert ElementTree.fromstring(description.data).get("name") == "sagittal_walker"
 
@@ -81,13 +81,13 @@ def test_pictures_agree_with_the_samples_of_the_same_instant(tmp_path):
             assert turned(by_child[f"{side}_sole"]) == pytest.approx(
                 position[f"{side}_ankle"], abs=1e-12
             )
-        # One of the feet stands where the last heel strike was.
+        # One foot stands where the last heel strike was.
         x = by_child["base_footprint"].transform.translation.x
         heel = step_length * (sum(strike <= stamp for strike in strikes) - 1)
         lean = [position["l_hip"], position["r_hip"]]
         assert min(abs(x + math.sin(hip) - heel) for hip in lean) < 1e-6
 
-    seen = set()  # whether a pulse acts, as drawn
+    seen = set()  # whether each drawn pulse acts
     for drawn in heard[MARKERS.name]:
         stamp = stamp_of(drawn.markers[0].header)
         assert stamp in bodies
@@ -107,8 +107,8 @@ def test_pictures_agree_with_the_samples_of_the_same_instant(tmp_path):
     assert seen == {True, False}
 
 
-def test_a_display_that_hangs_holds_up_nobody(tmp_path):
-    # More samples than a writer keeps for a reader that it waits for.
+def test_a_hanging_display_holds_up_no_other_node(tmp_path):
+    # More samples than a writer queues for a reader that it waits for.
     walk = ("--baseline=20", "--pulses=2", "--washout=0")
     with session(tmp_path, *walk, nodes=(*NODES, DISPLAY), real_time=False) as nodes:
         progress = nodes.probe.listen(WALKER_PROGRESS)

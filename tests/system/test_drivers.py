@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Other robots than the ideal one behind the perturbator; the kit and the stop from outside."""
+"""Robots other than the ideal one behind the perturbator; the kit and the stop from outside."""
 
 import os
 import re
@@ -16,10 +16,10 @@ from harness import (
     PROMISED_TOPICS,
     QUICK,
     Session,
-    as_prompt_as_a_node,
     entrain_run,
     payloads,
     probe,
+    scheduled_like_a_node,
     session,
     stamp_of,
 )
@@ -53,7 +53,7 @@ CHANNEL = "239.74.163.2"
 
 
 def entrain(domain, *arguments):
-    """Run one command, in a domain or its own; return exit code, standard output and error."""
+    """Run a command in this domain or its own; return exit code, standard output and error."""
     chosen = {} if domain is None else {"ROS_DOMAIN_ID": str(domain)}
     done = subprocess.run(
         ["entrain", *arguments],
@@ -65,7 +65,7 @@ def entrain(domain, *arguments):
 
 @contextmanager
 def emulated_motor(tmp_path, *options, number=0):
-    """Run the emulated motor, its own watchdog on; gives the driver's text and the trace."""
+    """Run the emulated motor with its own watchdog on; yield the driver's text and the trace."""
     port = 20_000 + (os.getpid() + number) % 20_000
     trace = tmp_path / f"trace{number}"
     process = subprocess.Popen(
@@ -75,7 +75,7 @@ def emulated_motor(tmp_path, *options, number=0):
     )
     assert "ready" in process.stdout.readline()
     try:
-        # Patience for a machine that others share.
+        # Long timeouts for a shared machine.
         yield (
             f"ak_mit_can:interface=udp_multicast,channel={CHANNEL},port={port},"
             "rate=200,silence=0.9,lateness=0.9,host_silence=1",
@@ -89,7 +89,7 @@ def emulated_motor(tmp_path, *options, number=0):
 
 @pytest.fixture
 def motor(tmp_path):
-    """Give what emulated_motor gives, as a fixture."""
+    """Yield what emulated_motor yields."""
     with emulated_motor(tmp_path) as given:
         yield given
 
@@ -99,7 +99,7 @@ def torques_of(trace):
     return [float(line[2]) for line in lines]
 
 
-def test_emulated_robot_walks_as_in_the_simulation_and_twice_the_same(tmp_path):
+def test_emulated_robot_walks_as_in_the_simulation_and_repeats_exactly(tmp_path):
     driver = "--driver=emulated:state_rate=250"
     options = (driver, "--seed=5", "--onset=measured", "--json", *SHORT)
     bags = [tmp_path / "first", tmp_path / "second"]
@@ -125,7 +125,7 @@ def test_emulated_robot_walks_as_in_the_simulation_and_twice_the_same(tmp_path):
     timing = outcome["pulse_timing"]
     assert timing["measured"]["pulses"] == 3
     assert 5 < timing["measured"]["median_ms"] < 20
-    # Onsets as measured: online, offline and simulated alike, and not those of the commands.
+    # Online, offline and simulated analyses all use the measured onsets, not the commanded ones.
     offline = read_run(bags[0], torques=False)
     assert (offline.onset, offline.differences) == ("measured", ())
     lags = [pulse.phase_lag for pulse in simulation.analysis.pulses]
@@ -191,7 +191,7 @@ blocks:
 """
 
 
-def test_a_session_with_a_motor_on_each_ankle(tmp_path):
+def test_a_session_runs_with_a_motor_on_each_ankle(tmp_path):
     session, study = tmp_path / "session.yaml", tmp_path / "study"
     motors = [emulated_motor(tmp_path, number=number) for number in (0, 1)]
     with motors[0] as (left, left_trace), motors[1] as (right, right_trace):
@@ -204,10 +204,10 @@ def test_a_session_with_a_motor_on_each_ankle(tmp_path):
     folder = study / "sub-P01/ses-1"
     rows = [row.split("\t") for row in (folder / "events.tsv").read_text().splitlines()]
     pulses = [(row[3], row[7], row[8]) for row in rows if row[6] == "pulse"]
-    # Which ankle's pulse comes first, and is told first, is left to robots and middleware.
+    # Robots and middleware decide which ankle's pulse comes, and is published, first.
     both = [("both legs", "left", "1"), ("both legs", "right", "1")]
     assert [pulses[0], *sorted(pulses[1:])] == [("one leg", "right", "1"), *both]
-    # The first pulse is half as high, on each ankle.
+    # On each ankle the first pulse is half as high.
     assert max(torques_of(right_trace)) == pytest.approx(0.5, abs=0.1)
     assert max(torques_of(left_trace)) == pytest.approx(0.5, abs=0.1)
     recorded = read_run(folder / "bags/block-02")
@@ -216,7 +216,7 @@ def test_a_session_with_a_motor_on_each_ankle(tmp_path):
     assert all(timing.measured is not None for _, timing in recorded.delivered)
 
 
-def test_killed_perturbator_leaves_zero_torque_by_the_motors_own_watchdog(tmp_path, motor):
+def test_the_motors_own_watchdog_ends_the_torque_of_a_killed_perturbator(tmp_path, motor):
     driver, trace = motor
     pulses = ("--torque=8", "--width=0.4", "--limit-rising=1", *SHORT)
     options = (f"--driver={driver}", *ARMED, *pulses)
@@ -234,31 +234,31 @@ def test_killed_perturbator_leaves_zero_torque_by_the_motors_own_watchdog(tmp_pa
         time.sleep(0.05)
 
 
-def test_beside_a_page_that_is_a_heartbeat_a_frozen_command_ends_the_torque(tmp_path, motor):
+def test_frozen_command_ends_the_torque_despite_the_heartbeat_of_a_page(tmp_path, motor):
     driver, trace = motor
     quick = (*QUICK, "--baseline=4", "--limit-rising=1")
     options = (f"--driver={driver}", *ARMED, *quick, "--heartbeat")
     beats = OPERATOR_HEARTBEAT
     with (
         entrain_run(tmp_path / "bag", *options) as run,
-        as_prompt_as_a_node(),
+        scheduled_like_a_node(),
         probe(run.domain()) as page,
     ):
         states, troubles = page.listen(ROBOT_STATE), page.listen(TROUBLE)
         heart = page.node.create_publisher(beats.type, beats.name, beats.qos)
 
-        def watched_until(condition):
+        def beat_until(condition):
             def beat():
                 heart.publish(beats.type(data="operator_page"))
                 return condition()
 
-            page.until(beat, "what is watched", 120)
+            page.until(beat, "the condition", 120)
 
-        watched_until(lambda: states and states[-1].measured_torque > 2)
+        beat_until(lambda: states and states[-1].measured_torque > 2)
         run.process.send_signal(signal.SIGSTOP)
-        watched_until(lambda: troubles)
+        beat_until(lambda: troubles)
         assert "operator_silent: entrain_run silent for 0.3 s" in troubles[0].message
-        watched_until(lambda: abs(torques_of(trace)[-1]) < 0.1)
+        beat_until(lambda: abs(torques_of(trace)[-1]) < 0.1)
         run.process.send_signal(signal.SIGCONT)
         assert run.wait() == 1
         assert "operator_silent: entrain_run silent" in run.text
@@ -277,7 +277,7 @@ def test_beside_a_page_that_is_a_heartbeat_a_frozen_command_ends_the_torque(tmp_
         ),
     ],
 )
-def test_what_a_robot_refuses_in_a_run_is_one_line(tmp_path, options, words):
+def test_refusal_by_a_robot_in_a_run_is_reported_in_one_line(tmp_path, options, words):
     with entrain_run(tmp_path / "bag", *options) as run:
         assert run.wait() == 1
         assert re.fullmatch(f"entrain run: {words}.*; the bag .*\n", run.text)
@@ -303,7 +303,7 @@ def test_node_refuses_a_real_robot_in_simulated_time(tmp_path):
 
 
 def assert_failed_in_washout(run, words, status):
-    """Check that a run ended with one line; its bag is readable and shows stop and status."""
+    """Check that a run ended with one line and left a readable bag that shows stop and status."""
     assert run.wait() == 1
     assert re.fullmatch(f"entrain run: .*{words}.*; the bag .*\n", run.text)
     topics = ["/experiment/state", "/perturbator/state", "/perturbation/torque_profile"]
@@ -324,7 +324,7 @@ def test_stop_in_the_washout_fails_the_run(tmp_path):
         assert_failed_in_washout(run, words, AnkleRobotState.STOPPED)
 
 
-def test_fault_of_the_device_in_the_washout_fails_the_run(tmp_path):
+def test_device_fault_in_the_washout_fails_the_run(tmp_path):
     with emulated_motor(tmp_path, "--error=2", "--error-after=2.5") as (driver, _):
         options = (f"--driver={driver}", *ARMED, *WASHED_OUT)
         with entrain_run(tmp_path / "bag", *options) as run:
@@ -408,7 +408,7 @@ sys.exit(perturbator.main())
 """
 
 
-def test_driver_that_cannot_stop_ends_the_process_and_no_stop_is_confirmed(tmp_path):
+def test_driver_that_cannot_stop_ends_the_process_without_confirming_a_stop(tmp_path):
     script = tmp_path / "unstoppable.py"
     script.write_text(UNSTOPPABLE_NODE)
     with claimed_domain() as domain, probe(domain) as listener:

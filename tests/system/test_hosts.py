@@ -21,7 +21,7 @@ from gait_entrainment_bags import BagReader
 WHY_NOT = obstacle()
 pytestmark = pytest.mark.skipif(bool(WHY_NOT), reason=WHY_NOT)
 
-# From which topics the walker's host alone can have it.
+# Topics that only the walker's host publishes.
 WALKERS = ("/joint_states", "/gait_events", "/ankle_torque", "/ground_reaction/left")
 WALKER_HOST, ROBOT_HOST = 0, 1
 
@@ -38,7 +38,7 @@ def environment(**more: str) -> dict[str, str]:
 
 @contextmanager
 def started(command: Sequence[str], variables: dict[str, str]) -> Iterator[Any]:
-    """Start a process; see that nothing of it stays."""
+    """Start a process; terminate it at the end."""
     process = subprocess.Popen(command, env=variables, text=True, stdout=subprocess.PIPE)
     try:
         yield process
@@ -51,7 +51,7 @@ def run_command(bag: Path, *options: str) -> list[str]:
     return ["entrain", "run", "--elsewhere=walker_sim", "--no-figures", f"--out={bag}", *options]
 
 
-def test_lock_step_is_the_simulation_to_the_nanosecond(link, tmp_path):
+def test_lock_step_matches_the_simulation_to_the_nanosecond(link, tmp_path):
     bag, options = tmp_path / "bag", ("--baseline=3", "--pulses=5", "--washout=1")
     before, lost = link.octets[WALKER_HOST], sum(link.lost)
     subnet = environment(ROS_AUTOMATIC_DISCOVERY_RANGE="SUBNET")
@@ -66,7 +66,7 @@ def test_lock_step_is_the_simulation_to_the_nanosecond(link, tmp_path):
     ):
         text, _ = run.communicate(timeout=PATIENCE)
         assert run.returncode == 0
-        # Who keeps to its own host finds nobody elsewhere.
+        # A process limited to its own host finds no node elsewhere.
         assert (friend.wait(PATIENCE), stranger.wait(PATIENCE)) == (0, 1)
     assert json.loads(text)["lost"] == 0
     events = events_since_start(bag)
@@ -78,10 +78,10 @@ def test_lock_step_is_the_simulation_to_the_nanosecond(link, tmp_path):
     assert sum(link.lost) > lost
 
 
-def test_real_time_counts_what_a_slow_network_makes_late(link, tmp_path, monkeypatch):
+def test_real_time_counts_the_stretches_that_a_slow_network_delays(link, tmp_path, monkeypatch):
     bag = tmp_path / "bag"
     options = (*QUICK, "--real-time", "--baseline=2", "--pulses=5", "--washout=1")
-    # Heard by this host and the one named, by nobody else.
+    # Heard only by this host and the named peer.
     here, there = (environment(ROS_STATIC_PEERS=peer) for peer in link.addresses)
     with (
         started(link.on(WALKER_HOST, ["entrain", "node", "walker_sim", *options]), there),
@@ -91,7 +91,7 @@ def test_real_time_counts_what_a_slow_network_makes_late(link, tmp_path, monkeyp
         while link.carried[WALKER_HOST] < until:
             assert run.poll() is None, run.stdout.read()
             time.sleep(0.02)
-        # There and back it is longer than the promises lead, to the end of the run.
+        # From here to the end of the run, a round trip takes longer than the lead time.
         monkeypatch.setattr(link, "delay", 0.25)
         text, _ = run.communicate(timeout=PATIENCE)
     assert run.returncode == 0, text

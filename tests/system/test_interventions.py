@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Stops, cancellations and refusals in mid-run, and several runs of the same processes."""
+"""Stops, cancellations and refusals during a run, and several runs of the same processes."""
 
 import math
 
@@ -27,12 +27,12 @@ from gait_entrainment_nodes.messaging.topics import (
     WALKER_PROGRESS,
 )
 
-# Pulses that are on nearly all the time, and last longer than any test.
+# Pulses that are on nearly all the time and outlast any test.
 BROAD = (*QUICK, "--pulses=1000", "--width=0.4", "--baseline=2", "--washout=0")
 
 
 class Conducted:
-    """A session whose runs are conducted, disturbed and looked at one after the other."""
+    """A session whose runs are conducted, disturbed and examined one after another."""
 
     def __init__(self, nodes):
         self.nodes, self.probe = nodes, nodes.probe
@@ -54,11 +54,11 @@ class Conducted:
         return self.probe.call(ChangeState, "perturbator/change_state", request).success
 
     def assert_torque_ended(self, handle, run, reason):
-        """Check that a run failed for a reason, its torque at zero from a stop on."""
+        """Check that a run ended for this reason, with zero torque from its stop on."""
         answer = self.probe.result(handle)
         assert answer.result.run == run
         assert reason in answer.result.message
-        # The end is told to the walker, which says its last word.
+        # The walker is notified of the end and publishes its final progress.
         self.probe.until(
             lambda: self.progress[-1].run == run and self.progress[-1].state != 0, "the end"
         )
@@ -81,7 +81,7 @@ class Conducted:
 def conducted(tmp_path_factory):
     with session(tmp_path_factory.mktemp("runs"), *BROAD) as nodes:
         yield Conducted(nodes)
-    # Runs 2, 4 and 5 were refused. All are in one bag; torque was on only before its run's stop.
+    # Runs 2, 4 and 5 were refused. All runs are in one bag, with torque only before their stops.
     with BagReader(nodes.bag) as reader:
         recorded = list(reader.decoded(["/walker/progress", "/ankle_torque"]))
         profiles = list(reader.decoded(["/perturbation/torque_profile"]))
@@ -93,7 +93,7 @@ def conducted(tmp_path_factory):
     torques = [(r.publish_time, m.delivered[side]) for r, m in recorded if "torque" in r.topic]
     assert max(torque for _, torque in torques) > 10
     for run, stop in stops.items():
-        # By reception, with time for a message that was on its way.
+        # By time of reception, with a margin for messages that were on their way.
         after = [
             torque
             for received, torque in torques
@@ -103,7 +103,7 @@ def conducted(tmp_path_factory):
         assert set(after) == {0.0}
 
 
-def test_second_protocol_second_train_and_reset_are_refused_in_mid_run(conducted):
+def test_second_protocol_second_train_and_reset_are_refused_during_a_run(conducted):
     handle = conducted.start()
     assert not conducted.nodes.conduct().accepted
     pulse = Pulse((2**31 - 1) * 10**9, 5.0, 0.1)
@@ -112,7 +112,7 @@ def test_second_protocol_second_train_and_reset_are_refused_in_mid_run(conducted
         DeliverPulseTrain, "perturbator/deliver_pulse_train", train
     )
     assert not refused.accepted
-    train.side = 7  # which there is not: whoever asks for it must not end the run
+    train.side = 7  # no such side: a request for it must not end the run
     assert not conducted.probe.send_goal(
         DeliverPulseTrain, "perturbator/deliver_pulse_train", train
     ).accepted
@@ -120,7 +120,7 @@ def test_second_protocol_second_train_and_reset_are_refused_in_mid_run(conducted
     assert not answer.success
     assert "run 1 is in progress" in answer.message
     strays = []
-    for topic, stray in (  # messages that cannot be: none of them ends the run either
+    for topic, stray in (  # impossible messages: none of them ends the run either
         (TORQUE_PROFILE, TorqueProfile(run=1, side=Side.RIGHT)),
         (GAIT_EVENTS, GaitEvent(run=1, kind=7)),
         (PUBLISHED_COUNTS, PublishedCounts(run=1, topics=["/a"])),
@@ -134,7 +134,7 @@ def test_second_protocol_second_train_and_reset_are_refused_in_mid_run(conducted
     conducted.probe.until(future.done, "an answer to the cancellation")
     result = conducted.assert_torque_ended(handle, 1, "cancelled by the client")
     assert result.outcome == RunProtocol.Result.CANCELLED
-    for publisher in strays:  # with them there would be no other run
+    for publisher in strays:  # with them there could be no other run
         conducted.probe.node.destroy_publisher(publisher)
 
 
@@ -162,7 +162,7 @@ def test_latched_stop_ends_the_run_and_lasts_until_clean_up(conducted):
     assert conducted.transition(Transition.TRANSITION_CLEANUP)
 
 
-def test_stop_before_there_is_a_robot_keeps_the_next_run_from_configuring_it(conducted):
+def test_stop_before_there_is_a_robot_prevents_its_configuration_in_the_next_run(conducted):
     assert conducted.probe.call(Trigger, "perturbator/stop").success
     refused = conducted.probe.result(conducted.nodes.conduct())
     assert "refused to be configured: the stop service was called" in refused.result.message
@@ -176,7 +176,7 @@ def test_deactivation_ends_the_run(conducted):
     conducted.assert_torque_ended(handle, run, "the perturbator was deactivated")
 
 
-def test_walker_that_counts_events_which_nobody_receives_ends_the_run(tmp_path):
+def test_walker_that_counts_events_which_never_arrive_ends_the_run(tmp_path):
     names = ("perturbator", "gait_analyzer", "experiment")
     with session(tmp_path, *QUICK, nodes=names, participants=["walker_sim", *names[:2]]) as nodes:
         probe = nodes.probe

@@ -29,7 +29,7 @@ from gait_entrainment_nodes.messaging.player_services import srv
 from gait_entrainment_nodes.messaging.topics import GAIT_EVENTS, STRIDES, Topic
 
 pytestmark = pytest.mark.skipif(
-    find_spec("ros2launch") is None, reason="needs ros2 launch, which the wheels do not bring"
+    find_spec("ros2launch") is None, reason="needs ros2 launch, which the wheels do not include"
 )
 
 FILES = Path(get_package_share_directory("gait_entrainment_bringup")) / "launch"
@@ -54,7 +54,7 @@ class Launch(Started):
 
 @contextmanager
 def launched(file, out, domain, *arguments, **environment):
-    """Start a launch file, and see that nothing of it stays."""
+    """Start a launch file; leave no process behind."""
     launch = Launch(FILES / file, out, domain, *arguments, **environment)
     try:
         yield launch
@@ -69,7 +69,7 @@ def short_protocol(folder, name, pulses):
 
 
 def recorded_events(bag):
-    """Return the topics of a bag, and its events as instants since the start."""
+    """Return a bag's topics, its events since the start and the simulated events."""
     with BagReader(bag) as reader:
         topic = next(name for name in reader.topics if name.endswith("/gait_events"))
         events = [message for _, message in reader.decoded([topic])]
@@ -115,7 +115,7 @@ def test_experiment_ends_the_launch_with_success(tmp_path):
 
 
 @pytest.mark.parametrize("walker", ["sensed", "person"])
-def test_a_walker_seen_through_sensors(walker, tmp_path):
+def test_a_walker_can_be_seen_through_sensors(walker, tmp_path):
     bag = tmp_path / "bag"
     arguments = [
         *(f"protocol:={short_protocol(tmp_path, walker, 3)}", f"bag:={bag}", f"walker:={walker}"),
@@ -138,7 +138,7 @@ def test_a_walker_seen_through_sensors(walker, tmp_path):
     assert {event.detector for event in events} == {"vertical_force"}
 
 
-def test_somebody_else_may_record_a_run_that_begins_later(tmp_path):
+def test_another_recorder_may_record_a_run_that_starts_later(tmp_path):
     file = short_protocol(tmp_path, "theirs", 4)
     arguments = (f"protocol:={file}", "recorder:=none", "start_delay:=3")
     others = [name for name in NODES if name != "bag_recorder"]
@@ -157,8 +157,8 @@ def test_somebody_else_may_record_a_run_that_begins_later(tmp_path):
     assert events[0].step == 0
 
 
-def stand_in_for_rviz(prefix):
-    """Make a package rviz2 whose program writes down its arguments and waits; return the file."""
+def fake_rviz(prefix):
+    """Make a package rviz2 whose program writes its arguments to a file and waits; return it."""
     index = prefix / "share/ament_index/resource_index/packages"
     index.mkdir(parents=True)
     (index / "rviz2").touch()
@@ -171,7 +171,7 @@ def stand_in_for_rviz(prefix):
 
 def test_experiment_is_drawn_for_rviz(tmp_path):
     file, bag = short_protocol(tmp_path, "drawn", 6), tmp_path / "bag"
-    arguments = stand_in_for_rviz(tmp_path / "rviz")
+    arguments = fake_rviz(tmp_path / "rviz")
     prefixes = f"{tmp_path / 'rviz'}:{os.environ['AMENT_PREFIX_PATH']}"
     words = (f"protocol:={file}", f"bag:={bag}", "rviz:=true", "namespace:=lab")
     with (
@@ -195,7 +195,7 @@ def test_two_experiments_run_side_by_side(tmp_path):
     protocols = {
         name: short_protocol(tmp_path, name, n) for name, n in (("left", 5), ("right", 7))
     }
-    # One of them is included by a launch file of somebody else, who pushes a namespace and remaps.
+    # One is included by another launch file, which pushes a namespace and remaps.
     other = tmp_path / "other.launch.py"
     other.write_text(
         textwrap.dedent(
@@ -257,7 +257,7 @@ def test_death_of_a_node_fails_the_launch_and_ends_everything(node, tmp_path):
         assert sum(1 for _ in reader.messages()) == reader.message_count > 100
 
 
-def test_experiment_that_fails_fails_the_launch(tmp_path):
+def test_failed_experiment_fails_the_launch(tmp_path):
     file = tmp_path / "fall.yaml"
     file.write_text("{baseline: 2, pulses: {count: 20, torque: -30, width: 0.4, period: 0.9}}")
     bag = tmp_path / "bag"
@@ -272,7 +272,7 @@ def test_experiment_that_fails_fails_the_launch(tmp_path):
         assert "The walker fell" in launch.text
         assert f"the bag of the run so far is {bag}" in launch.text
         assert launch.survivors() == []
-    # Readable; launch stops all nodes at once, so the last messages may lack.
+    # Readable, but launch stops all nodes together, so the last messages may be missing.
     assert read_run(bag).messages > 1000
 
 
@@ -307,7 +307,7 @@ def test_replay_ends_once_everything_is_played_and_analyzed(tmp_path):
     assert [stride.period for stride in heard] == recorded
 
 
-def test_device_is_brought_up_and_its_end_ends_the_launch(tmp_path):
+def test_device_is_brought_up_and_an_interruption_ends_the_launch(tmp_path):
     with (
         claimed_domain() as domain,
         launched(

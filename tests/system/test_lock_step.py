@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is promised of a lock-step run: the simulated events, and the same bytes every time."""
+"""Lock-step runs give the events of the simulation, and the same bytes every time."""
 
 import os
 import random
@@ -32,7 +32,7 @@ from gait_entrainment_commands.outcome import outcome_of
 sys.path.insert(0, str(Path(__file__).parents[2] / "scripts"))
 import make_figures
 
-# Pulses later than the strides: the last of them are on, or still to come, when the run ends.
+# Pulses later than the strides: the last ones are on, or still to come, when the run ends.
 UNFINISHED = ("--side=left", "--period-offset=0.04", "--washout=0", "--initial-phase=0.9")
 
 
@@ -44,7 +44,7 @@ def paper_example(tmp_path_factory):
         return bag, run.outcome()
 
 
-def test_events_are_those_of_the_simulation_to_the_nanosecond(paper_example):
+def test_events_match_the_simulation_to_the_nanosecond(paper_example):
     bag, _ = paper_example
     events = events_since_start(bag)
     assert len(events) > 4 * 80
@@ -66,7 +66,7 @@ blocks:
 """
 
 
-def test_blocks_pulses_by_phase_and_shapes_are_those_of_the_simulation(tmp_path):
+def test_blocks_pulses_by_phase_and_shapes_match_the_simulation(tmp_path):
     (tmp_path / "blocks.yaml").write_text(BLOCKS)
     bag = tmp_path / "bag"
     with entrain_run(bag, str(tmp_path / "blocks.yaml"), "--json") as run:
@@ -78,28 +78,28 @@ def test_blocks_pulses_by_phase_and_shapes_are_those_of_the_simulation(tmp_path)
     found = [(side, timing.commanded - start) for side, timing in recorded.delivered]
     assert found == [(side, timing.commanded) for side, timing in simulation.delivered]
     assert recorded.differences == ()
-    told = outcome_of(simulation)["blocks"]
-    assert [{**a, **b} for a, b in zip(told, outcome["blocks"], strict=True)] == told
+    expected = outcome_of(simulation)["blocks"]
+    assert [{**a, **b} for a, b in zip(expected, outcome["blocks"], strict=True)] == expected
     with BagReader(bag) as reader:
         states = [m for _, m in reader.decoded(["/experiment/state"])]
         pulses = [m for _, m in reader.decoded(["/perturbation/pulses"])]
     shown = dict.fromkeys((m.block, m.block_name, m.phase) for m in states)
     assert (1, "sham", 6) in shown
-    assert [one for one in shown if 0 < one[2] < 4] == [
+    assert [state for state in shown if 0 < state[2] < 4] == [
         (number, name, phase)
         for number, name in enumerate(("sham", "assisted", "own shape", "in turn"), start=1)
         for phase in (1, 2, 3)
     ]
     by_ankle = [[pulse for pulse in pulses if pulse.side == side] for side in Side]
-    for of_ankle, torques in zip(
+    for ankle_pulses, torques in zip(
         by_ankle, ([6, 0] + [6] * 6, [0] * 4 + [2, 4] + [6] * 6), strict=True
     ):
-        assert [pulse.number for pulse in of_ankle] == list(range(1, len(torques) + 1))
-        assert [pulse.torque for pulse in of_ankle] == torques
-    assert [block["side"] for block in told] == ["right", "right", "left", "right"]
+        assert [pulse.number for pulse in ankle_pulses] == list(range(1, len(torques) + 1))
+        assert [pulse.torque for pulse in ankle_pulses] == torques
+    assert [block["side"] for block in expected] == ["right", "right", "left", "right"]
 
 
-def test_outcome_says_what_happened(paper_example):
+def test_outcome_describes_what_happened(paper_example):
     bag, outcome = paper_example
     assert outcome["verdict"] == "entrained"
     assert len(outcome["stride_period"]) == 80
@@ -113,7 +113,7 @@ def test_outcome_says_what_happened(paper_example):
     assert [f for f in check(bag) if f.severity.name == "ERROR"] == []
 
 
-def test_offline_analysis_repeats_what_the_analyzer_published(paper_example):
+def test_offline_analysis_reproduces_what_the_analyzer_published(paper_example):
     bag, _ = paper_example
     analysis = read_run(bag).analysis
     with BagReader(bag) as reader:
@@ -143,7 +143,7 @@ def test_offline_analysis_repeats_what_the_analyzer_published(paper_example):
     ]
 
 
-def test_no_message_of_the_promised_topics_lacks_a_stamp_as_log_time(paper_example):
+def test_log_times_are_the_stamps_of_the_messages(paper_example):
     bag, _ = paper_example
     with BagReader(bag) as reader:
         for raw, message in reader.decoded(["/joint_states", "/gait_events", "/gait/strides"]):
@@ -152,7 +152,7 @@ def test_no_message_of_the_promised_topics_lacks_a_stamp_as_log_time(paper_examp
         assert reader.counts["/joint_states"] > 200 * 80 * 1.8
 
 
-def test_picture_in_the_readme_is_what_is_drawn_of_it(paper_example, tmp_path):
+def test_picture_in_the_readme_is_up_to_date(paper_example, tmp_path):
     known = make_figures.DOCS / make_figures.RUN
     if not make_figures.drawn_by_this_matplotlib(known):
         pytest.skip("the picture was drawn by another version of matplotlib")

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A person in the walker's place: rehearsed through sensors, played from outside, gone wrong."""
+"""A person as the walker: rehearsed through sensors, played by another process, with faults."""
 
 import os
 import re
@@ -42,7 +42,7 @@ SENSED = ("--walker=sensed", "--detector=foot_switch", "--sample-rate=0", "--jso
 SECOND = 10**9
 
 
-def test_rehearsal_gives_the_verdict_of_exact_events_and_says_how_far_it_is_off(tmp_path):
+def test_rehearsal_gives_the_verdict_of_exact_events_and_reports_its_errors(tmp_path):
     with entrain_run(tmp_path / "bag", *SENSED, *LOCKING) as run:
         outcome = run.outcome()
     exact = outcome_of(simulate(protocol_of(*LOCKING)))
@@ -50,18 +50,18 @@ def test_rehearsal_gives_the_verdict_of_exact_events_and_says_how_far_it_is_off(
     assert outcome["lost"] == 0
     errors = outcome["detector_errors"]
     for kind in ("heel_strike", "toe_off"):
-        told = errors[kind]
-        assert told["events"] > 60
-        assert (told["missed"], told["false"]) == (0, 0)
-        assert abs(told["bias"]) < 0.005
-        assert 0 < told["deviation"] < 0.005
+        summary = errors[kind]
+        assert summary["events"] > 60
+        assert (summary["missed"], summary["false"]) == (0, 0)
+        assert abs(summary["bias"]) < 0.005
+        assert 0 < summary["deviation"] < 0.005
     assert abs(errors["phase_lag_shift"]) < 0.005
     assert abs(outcome["final_phase_lag"] - exact["final_phase_lag"]) < 0.005
     assert 0 < outcome["final_phase_lag_uncertainty"] < 0.01
     with BagReader(tmp_path / "bag") as bag:
         events = [m for _, m in bag.decoded(["/gait_events"])]
     assert {(e.source, e.detector) for e in events} == {("gait_detector", "foot_switch")}
-    # To the nanosecond what one process without ROS detects.
+    # The same, to the nanosecond, as one process detects without ROS.
     offline = rehearse(
         protocol_of(*LOCKING), Sensors("foot_switch", find_detector("foot_switch"), Side.RIGHT)
     )
@@ -70,7 +70,7 @@ def test_rehearsal_gives_the_verdict_of_exact_events_and_says_how_far_it_is_off(
     assert found == [(e.stamp, e.kind, e.side) for e in offline.events]
 
 
-def test_a_walker_that_varies_walks_as_the_simulation_does(tmp_path):
+def test_a_variable_walker_walks_as_in_the_simulation(tmp_path):
     options = ("--variation-coefficient=0.03", "--seed=4", *SHORT, "--sample-rate=0", "--json")
     with entrain_run(tmp_path / "bag", *options) as run:
         periods = run.outcome()["stride_period"]
@@ -98,10 +98,10 @@ def test_rehearsal_in_real_time_loses_nothing(tmp_path):
             if value.key == "late_events"
         ]
     assert samples > 12_000
-    assert late.isdigit()  # it is told; how many there are depends on what else is running
+    assert late.isdigit()  # it is reported; the number depends on what else is running
 
 
-def test_a_sensor_that_dies_ends_the_torque(tmp_path):
+def test_a_sensor_that_falls_silent_ends_the_torque(tmp_path):
     options = ("--real-time", "--walker=sensed", "--detector=foot_switch", "--baseline=2")
     with entrain_run(tmp_path / "bag", *options) as run:
         run.names = nodes_for("sensed")
@@ -115,8 +115,8 @@ def test_a_sensor_that_dies_ends_the_torque(tmp_path):
     assert profiles[-1].stop or not any(profiles[-1].torques)
 
 
-def test_a_walker_from_outside_plays_the_role(tmp_path, monkeypatch):
-    monkeypatch.setenv("ROS_DOMAIN_ID", "231")  # which no run takes by itself
+def test_another_process_can_play_the_walker(tmp_path, monkeypatch):
+    monkeypatch.setenv("ROS_DOMAIN_ID", "231")  # which no run chooses by itself
     outside = subprocess.Popen([sys.executable, EXAMPLE], stderr=subprocess.PIPE, text=True)
     try:
         options = ("--real-time", "--walker=person", "--elsewhere=walker", "--json")
@@ -124,14 +124,14 @@ def test_a_walker_from_outside_plays_the_role(tmp_path, monkeypatch):
             outcome = run.outcome()
     finally:
         outside.send_signal(signal.SIGINT)
-        said = outside.communicate()[1]
-    assert (outside.returncode, said) == (0, "")
+        stderr = outside.communicate()[1]
+    assert (outside.returncode, stderr) == (0, "")
     assert outcome["lost"] == 0
     assert outcome["stride_period"] == pytest.approx([0.8] * 7, abs=1e-9)
     assert outcome["final_phase_lag_uncertainty"] == 0.001
 
 
-def test_what_sensors_do_wrong_is_told_by_name(tmp_path):
+def test_sensor_faults_are_reported_by_name(tmp_path):
     detector = "vertical_force:longest_constant=0.3"
     nodes = ("gait_detector",)
     with session(tmp_path, nodes=nodes, walker="person", detector=detector) as nodes:
@@ -142,40 +142,40 @@ def test_what_sensors_do_wrong_is_told_by_name(tmp_path):
         def waits_for():
             return probe.call(Ready, "gait_detector/ready").waiting_for
 
-        def said(pattern):
+        def reported(pattern):
             texts = [status.message for array in heard for status in array.status]
             return [text for text in texts if re.search(pattern, text)]
 
         assert (
             "ground_reaction/left [geometry_msgs/msg/WrenchStamped]: not published" in waits_for()
         )
-        with other_probe(nodes.domain) as other:  # one process has one type for a topic
+        with other_probe(nodes.domain) as other:  # a process can use only one type per topic
             other.node.create_publisher(String, "ground_reaction/left", 10)
             probe.until(lambda: "published as std_msgs/msg/String" in waits_for(), "a wrong type")
             refused = probe.client.call(StartRun, "walker/start", StartRun.Request(run=1))
             assert not refused.success
             assert "gait_detector waits for ground_reaction/left" in refused.message
         feet = Feet(probe)
-        feet.ahead = -3 * SECOND  # clocks that nobody has synchronized
+        feet.ahead = -3 * SECOND  # clocks that are not synchronized
         feet.until(lambda: "stamps are 3 s behind" in waits_for(), "the wrong clock")
         feet.ahead = 0
         feet.until(lambda: not waits_for(), "readiness")
-        asked = probe.client.ask(StartRun, "walker/start", StartRun.Request(run=1), period=60.0)
-        assert feet.until(asked.answer, "the start").success
+        start = probe.client.ask(StartRun, "walker/start", StartRun.Request(run=1), period=60.0)
+        assert feet.until(start.answer, "the start").success
         feet.until(lambda: len(events) > 8, "events")
         assert {e.run for e in events} == {1}
         assert [e.step for e in events] == sorted(e.step for e in events)
-        for value, told in (
+        for value, message in (
             (float("nan"), "samples are not numbers"),
             (500.0, "times the signal did not change"),
             (8e4, "are impossible: the ground's force"),
         ):
             feet.value = value
-            feet.until(lambda told=told: said(told), f"what is told of {value}")
+            feet.until(lambda message=message: reported(message), f"the report of {value}")
         feet.value = None
         feet.silent = {Side.RIGHT}
         feet.until(
-            lambda: said(r"right vertical_force: no sample for \d"), "what is told of silence"
+            lambda: reported(r"right vertical_force: no sample for \d"), "the report of silence"
         )
         count = len(events)
         feet.silent = set()
@@ -183,4 +183,4 @@ def test_what_sensors_do_wrong_is_told_by_name(tmp_path):
         assert all(b.step >= a.step for a, b in pairwise(events))
         feet.ahead = -SECOND // 4
         jumped = "left: the sensor's clock jumped back.*right: the sensor's clock"
-        feet.until(lambda: said(jumped), "what is told of a clock that jumps")
+        feet.until(lambda: reported(jumped), "the report of a clock jump")

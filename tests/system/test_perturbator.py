@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The perturbator alone, the test in the place of the experiment: what it refuses and ends."""
+"""The perturbator alone, with the test as its experiment: what it refuses and ends."""
 
 import itertools
 import time
@@ -43,7 +43,7 @@ KEY = "the test's"
 
 
 class Conductor:
-    """Stands in for the experiment: horizons and goals by hand."""
+    """Acts as the experiment: sends horizons and goals by hand."""
 
     def __init__(self, nodes):
         self.nodes, self.probe = nodes, nodes.probe
@@ -59,7 +59,7 @@ class Conductor:
         return self.probe.call(ChangeState, "perturbator/change_state", request).success
 
     def promise(self, known, until, run=7):
-        """Send a horizon between two instants [s]; return the profile that answers it."""
+        """Send a horizon from one time to another [s]; return the profile that answers it."""
         begin, end = round(known * SECOND), round(until * SECOND)
         message = Horizon(run=run, until=to_time(end), seal=seal_of(KEY))
         message.header.stamp = to_time(begin)
@@ -69,13 +69,13 @@ class Conductor:
         return self.profiles[-1]
 
     def request(self, onset, key=KEY, run=7, **changes):
-        """Ask for a train from an instant [s] on; return the goal's handle."""
-        asked = {"period": 1.0, "count": 100, "torque": 5.0, "duration": 0.5} | changes
-        goal = goal_of(run, key, PulseTrain.periodic(Side.RIGHT, round(onset * SECOND), **asked))
+        """Request a train that starts at a time [s]; return the goal's handle."""
+        pulses = {"period": 1.0, "count": 100, "torque": 5.0, "duration": 0.5} | changes
+        goal = goal_of(run, key, PulseTrain.periodic(Side.RIGHT, round(onset * SECOND), **pulses))
         return self.probe.send_goal(DeliverPulseTrain, "perturbator/deliver_pulse_train", goal)
 
 
-def test_cancelling_the_train_alone_ends_the_torque_at_once(tmp_path):
+def test_cancelling_the_train_alone_ends_the_torque_immediately(tmp_path):
     with session(tmp_path, nodes=("perturbator",), strangers=True) as nodes:
         conductor, probe = Conductor(nodes), nodes.probe
         conductor.promise(0, 2)
@@ -85,7 +85,7 @@ def test_cancelling_the_train_alone_ends_the_torque_at_once(tmp_path):
         profiles = conductor.profiles
         count = len(profiles)
         future = goal.cancel_goal_async()
-        # No horizon comes any more: the stop does not wait for one.
+        # No further horizon comes, and the stop does not wait for one.
         probe.until(lambda: len(profiles) > count and profiles[-1].stop, "the stop")
         probe.until(future.done, "an answer to the cancellation")
         result = probe.result(goal).result
@@ -93,17 +93,17 @@ def test_cancelling_the_train_alone_ends_the_torque_at_once(tmp_path):
         assert result.delivered == 1
         assert list(conductor.promise(4, 6).torques) == [0.0]
         back = Horizon(run=7, until=to_time(5 * SECOND), seal=seal_of(KEY))
-        conductor.horizons.publish(back)  # takes back no promise
+        conductor.horizons.publish(back)  # does not take back a promise
         # Another train may follow.
         again = conductor.request(7)
         assert again.accepted
-        # A run that begins before it is over ends it.
+        # A run that begins before the train is over ends it.
         assert conductor.promise(7, 9, run=8).stop
         result = probe.result(again).result
         assert result.outcome == DeliverPulseTrain.Result.STOPPED
 
 
-def test_a_stranger_gets_no_pulses_that_are_not_of_the_protocol(tmp_path):
+def test_a_stranger_gets_no_pulses_beyond_the_protocol(tmp_path):
     pulses = ("--torque=5", "--width=0.2", "--pulses=10")
     with session(tmp_path, *pulses, nodes=("perturbator",)) as nodes:
         conductor = Conductor(nodes)
@@ -117,29 +117,29 @@ def test_a_stranger_gets_no_pulses_that_are_not_of_the_protocol(tmp_path):
             ({"key": "a stranger's"}, "key: not that of the run"),
         ):
             begin, count = time.monotonic(), len(conductor.troubles)
-            asked = {"duration": 0.2, "count": 10} | changes
-            assert not conductor.request(3, **asked).accepted
+            requested = {"duration": 0.2, "count": 10} | changes
+            assert not conductor.request(3, **requested).accepted
             heard = conductor.troubles
             nodes.probe.until(lambda h=heard, c=count: len(h) > c, "a reason")
             assert words in heard[-1].message
             assert time.monotonic() - begin < 5.0
         assert conductor.request(3, duration=0.2, count=5).accepted
-        # Of the height, width and number that the protocol has left: the same client, another one.
+        # Height, width and number are within what the protocol has left, but the key is wrong.
         count = len(conductor.troubles)
         for onset in (2.5, 3.5, 20):
             assert not conductor.request(onset, "", duration=0.2, count=1).accepted
-        # Nor may a stranger move the horizon on.
+        # A stranger may not advance the horizon either.
         conductor.horizons.publish(Horizon(run=7, until=to_time(50 * SECOND), seal="a stranger's"))
         nodes.probe.until(lambda: len(conductor.troubles) == count + 4, "four reasons")
         assert "not from the experiment that conducts" in conductor.troubles[-1].message
         assert conductor.request(10, duration=0.2, count=5).accepted
-        assert not conductor.request(16, "", duration=0.2, count=1).accepted  # after the last part
+        assert not conductor.request(16, "", duration=0.2, count=1).accepted  # all are taken
         onsets = [nanoseconds_of(onset) / SECOND for onset in conductor.promise(2, 20).onsets]
         assert onsets == [3, 4, 5, 6, 7, 10, 11, 12, 13, 14]
 
 
 @pytest.mark.parametrize("driver", ["ideal", "emulated"])
-def test_deactivating_and_activating_in_a_run_breaks_no_promise(tmp_path, driver):
+def test_deactivating_and_activating_during_a_run_breaks_no_promise(tmp_path, driver):
     options = (f"--driver={driver}",)
     with session(tmp_path, *options, nodes=("perturbator",), strangers=True) as nodes:
         conductor = Conductor(nodes)
@@ -152,22 +152,22 @@ def test_deactivating_and_activating_in_a_run_breaks_no_promise(tmp_path, driver
         conductor.promise(5, 6)
         assert conductor.request(7, count=1).accepted
         assert max(conductor.promise(6, 9).torques) == pytest.approx(5.0, rel=0.1)
-        told = [profile for profile in conductor.profiles if not profile.stop]
+        promises = [profile for profile in conductor.profiles if not profile.stop]
         assert [profile.stop for profile in conductor.profiles].count(True) == 1
         assert [profile.revision for profile in conductor.profiles] == list(
             range(len(conductor.profiles))
         )
-        for before, after in itertools.pairwise(told):
+        for before, after in itertools.pairwise(promises):
             assert stamp_of(after.header) == nanoseconds_of(before.valid_until)
-        off = [p for p in told if 4 * SECOND <= stamp_of(p.header) < 6 * SECOND]
+        off = [p for p in promises if 4 * SECOND <= stamp_of(p.header) < 6 * SECOND]
         assert not any(torque for profile in off for torque in profile.torques)
 
 
 @contextmanager
 def with_motor(tmp_path, *parameters):
-    """Start the perturbator with an emulated motor, armed, and the test as its conductor."""
+    """Start the perturbator with an emulated motor, armed; yield its conductor."""
     with emulated_motor(tmp_path) as (driver, _), claimed_domain() as domain:
-        # The test speaks beside other tests: what is not tested may be silent for longer.
+        # Other tests run alongside: a silence that is not tested here may be longer.
         driver = driver.replace("host_silence=1", "host_silence=5")
         nodes = Session(tmp_path, domain, [f"--driver={driver}"], real_time=True, strangers=True)
         for parameter in ("unproved:=true", *parameters):
@@ -182,7 +182,7 @@ def with_motor(tmp_path, *parameters):
             nodes.supervisor.stop(STOP_ORDER)
 
 
-def test_who_interrupts_a_run_gets_no_torque_until_a_real_robot_is_armed_again(tmp_path):
+def test_a_real_robot_must_be_armed_again_after_a_run_is_interrupted(tmp_path):
     with with_motor(tmp_path, "operator_timeout:=0.0") as conductor:
         now = time.time()
         conductor.promise(now, now + 0.2)
@@ -194,7 +194,7 @@ def test_who_interrupts_a_run_gets_no_torque_until_a_real_robot_is_armed_again(t
 
 
 @pytest.mark.parametrize("silent", ["the emergency stop", "entrain_run", "operator_page"])
-def test_torque_ends_if_one_who_must_be_heard_falls_silent(tmp_path, silent):
+def test_torque_ends_if_a_required_sender_falls_silent(tmp_path, silent):
     operators = "operators:=[entrain_run, operator_page]"
     timeouts = "deadman_timeout:=2.0", "operator_timeout:=2.0"
     with with_motor(tmp_path, operators, *timeouts) as conductor:
@@ -206,7 +206,7 @@ def test_torque_ends_if_one_who_must_be_heard_falls_silent(tmp_path, silent):
         alive = ["the emergency stop", "entrain_run", "operator_page"]
 
         def live():
-            """Send horizons, hold the button and beat: those who are not silent."""
+            """Send horizons, the button's state and heartbeats, without those of the silent sender."""
             conductor.horizons.publish(horizon_from(time.time()))
             for name in alive:
                 if name == "the emergency stop":
@@ -224,14 +224,14 @@ def test_torque_ends_if_one_who_must_be_heard_falls_silent(tmp_path, silent):
         alive.remove(silent)
         probe.until(lambda: conductor.troubles, "the fault")
         assert f": {silent} silent for 2 s" in conductor.troubles[0].message
-        told = stamp_of(conductor.troubles[0].header)
-        # A pulse a second was asked for; the one that was felt is over half a second later.
-        probe.until(lambda: stamp_of(states[-1].header) > told + 2 * SECOND, "time")
-        after = [s for s in states if stamp_of(s.header) > told + SECOND // 2]
+        reported_at = stamp_of(conductor.troubles[0].header)
+        # A pulse per second was requested; the one that was felt is over half a second later.
+        probe.until(lambda: stamp_of(states[-1].header) > reported_at + 2 * SECOND, "time")
+        after = [s for s in states if stamp_of(s.header) > reported_at + SECOND // 2]
         assert max(abs(state.measured_torque) for state in after) < 0.5
 
 
-def test_torque_ends_if_a_button_for_the_emergency_stop_goes_away(tmp_path):
+def test_torque_ends_if_an_emergency_stop_button_disappears(tmp_path):
     with with_motor(tmp_path, "operator_timeout:=0.0") as conductor:
         probe = conductor.probe
         topic = EMERGENCY_STOP
@@ -251,13 +251,13 @@ def test_torque_ends_if_a_button_for_the_emergency_stop_goes_away(tmp_path):
 
 
 def horizon_from(now):
-    """Return a horizon from an instant [s] on."""
+    """Return a horizon that starts at a time [s]."""
     message = Horizon(run=7, until=to_time(round((now + 0.2) * SECOND)), seal=seal_of(KEY))
     message.header.stamp = to_time(round(now * SECOND))
     return message
 
 
-def test_an_emergency_stop_is_heard_whatever_its_quality_and_holds_while_it_is_pressed(tmp_path):
+def test_an_emergency_stop_is_heard_with_any_qos_and_holds_while_it_is_pressed(tmp_path):
     with session(tmp_path, nodes=("perturbator",)) as nodes:
         conductor, probe = Conductor(nodes), nodes.probe
         for qos in (EMERGENCY_STOP.qos, quality(10), quality(1, reliable=False)):
@@ -282,19 +282,19 @@ def test_an_emergency_stop_is_heard_whatever_its_quality_and_holds_while_it_is_p
 
 
 def test_a_stop_while_the_robot_is_being_connected_is_not_forgotten(monkeypatch):
-    def stopped_meanwhile(*what):
-        made._stop_at_once()
-        do_with_all(*what)
+    def stopped_meanwhile(*arguments):
+        node._stop_at_once()
+        do_with_all(*arguments)
 
     rclpy.init()
-    made = perturbator.Perturbator()
+    node = perturbator.Perturbator()
     try:
         monkeypatch.setattr(perturbator, "do_with_all", stopped_meanwhile)
-        assert made.trigger_configure() == TransitionCallbackReturn.SUCCESS
+        assert node.trigger_configure() == TransitionCallbackReturn.SUCCESS
         monkeypatch.setattr(perturbator, "do_with_all", do_with_all)
-        assert made.trigger_activate() == TransitionCallbackReturn.FAILURE
-        assert [fault.name for fault in made._faults] == ["stopped"]
+        assert node.trigger_activate() == TransitionCallbackReturn.FAILURE
+        assert [fault.name for fault in node._faults] == ["stopped"]
     finally:
-        made.on_stop()
-        made.destroy_node()
+        node.on_stop()
+        node.destroy_node()
         rclpy.shutdown()

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The checklist before a session, with an emulated motor: what passes, fails, is remembered."""
+"""The checklist before a session, with an emulated motor: what passes, fails and is stored."""
 
 import json
 import subprocess
@@ -22,7 +22,7 @@ def state(tmp_path, monkeypatch):
 
 
 @pytest.mark.usefixtures("state")
-def test_a_robot_that_is_fit_for_a_session_is_armed_and_its_bag_says_so(tmp_path):
+def test_a_robot_fit_for_a_session_can_be_armed_and_its_bag_records_the_check(tmp_path):
     with emulated_motor(tmp_path) as (driver, _):
         keep_proof(driver, 0.1)
         words = ["entrain", "preflight", f"--driver={driver}", "--arm", "--json"]
@@ -32,9 +32,9 @@ def test_a_robot_that_is_fit_for_a_session_is_armed_and_its_bag_says_so(tmp_path
         assert "press the stop" in checklist.stderr.readline()
         code, out, _ = entrain(None, "stop")
         assert code == 0, out
-        told, problems = checklist.communicate(timeout=30)
-        assert (checklist.returncode, problems) == (0, "")
-        found = json.loads(told)
+        out, err = checklist.communicate(timeout=30)
+        assert (checklist.returncode, err) == (0, "")
+        found = json.loads(out)
         assert found["passed"]
         names = [point["name"] for point in found["points"]]
         assert names == ["limits", "watchdog", "record", "device", "loop", "stop"]
@@ -49,7 +49,7 @@ def test_a_robot_that_is_fit_for_a_session_is_armed_and_its_bag_says_so(tmp_path
 
 
 @pytest.mark.usefixtures("state")
-def test_what_is_not_proved_or_not_pressed_fails_by_name(tmp_path):
+def test_an_unproved_watchdog_and_a_missing_stop_fail_by_name(tmp_path):
     with emulated_motor(tmp_path) as (driver, _):
         options = (f"--driver={driver}", "--arm", "--timeout=0.5")
         code, out, _ = entrain(None, "preflight", *options)
@@ -60,7 +60,7 @@ def test_what_is_not_proved_or_not_pressed_fails_by_name(tmp_path):
 
 
 @pytest.mark.usefixtures("state")
-def test_a_robot_that_is_not_there_fails():
+def test_a_robot_that_does_not_answer_fails():
     options = ("--driver=ak_mit_can:interface=virtual,channel=nobody", "--arm")
     code, out, _ = entrain(None, "preflight", *options)
     assert code == 1

@@ -31,22 +31,22 @@ def real_time_run(tmp_path_factory):
 
 
 def permitted_policy():
-    """Return the policy by which a process may be scheduled that asks for more than others."""
+    """Return the scheduling policy of a process that requests a real-time priority."""
     policy = multiprocessing.get_context("fork").Value("i", os.SCHED_OTHER)
 
-    def ask():
+    def request():
         with contextlib.suppress(PermissionError):
             os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(10))
         policy.value = os.sched_getscheduler(0)
 
-    child = multiprocessing.get_context("fork").Process(target=ask)
+    child = multiprocessing.get_context("fork").Process(target=request)
     child.start()
     child.join()
     return policy.value
 
 
 def timing_of(bag):
-    """Return what the walker said of its timing."""
+    """Return the timing that the walker reported."""
     with BagReader(bag) as reader:
         ((_, timing),) = reader.decoded(["/walker_sim/timing"])
     return timing
@@ -57,7 +57,7 @@ def test_verdict_and_locked_lag_agree_with_the_simulation(real_time_run):
     simulation = simulate(protocol_of(*OPTIONS))
     expected = outcome_of(simulation)
     assert expected["verdict"] == outcome["verdict"] == "entrained"
-    # What came late or not at all is the timing error that the run itself states.
+    # Late and starved time is the timing error that the run itself reports.
     timing = timing_of(bag)
     error = timing.late + timing.starved
     assert outcome["final_phase_lag"] == pytest.approx(
@@ -72,7 +72,7 @@ def test_verdict_and_locked_lag_agree_with_the_simulation(real_time_run):
         assert walked[:both] == [event.stamp for event in simulation.events][:both]
 
 
-def test_every_sample_is_there_with_its_exact_stamp(real_time_run):
+def test_every_sample_is_recorded_with_its_exact_stamp(real_time_run):
     bag, outcome = real_time_run
     assert outcome["lost"] == 0
     with BagReader(bag) as reader:

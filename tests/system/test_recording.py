@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The recorder as a process: what it keeps when it is killed, when the disk is full, and how."""
+"""The recorder as a process: what it keeps, and how, even if it is killed or the disk is full."""
 
 import json
 import os
@@ -58,17 +58,17 @@ SECOND = 10**9
 RECORDER = (
     "import sys; from gait_entrainment_nodes.nodes.bag_recorder import main; sys.exit(main())"
 )
-# A disk that is full once so many bytes are written; what was put aside is there all the same.
+# A disk that is full after this many bytes, although the reserved space is still there.
 FULL_DISK = """
 import errno
 from gait_entrainment_bags import writer
 
 class File:
     def __init__(self, path):
-        self.file, self.told = path.open("xb", buffering=0), False
+        self.file, self.reported = path.open("xb", buffering=0), False
     def write(self, data):
-        if self.file.tell() > 20_000 and not self.told:
-            self.told = True
+        if self.file.tell() > 20_000 and not self.reported:
+            self.reported = True
             raise OSError(errno.ENOSPC, "No space left on device")
         return self.file.write(data)
     def fileno(self):
@@ -101,13 +101,13 @@ class Recorder:
         return self.process.wait(PATIENCE)
 
     def finish(self, listener: Probe, **counts: int) -> int:
-        """Tell the recorder what was published; it ends once it has written all of that."""
+        """Send the recorder the final counts; it ends once it has written all those messages."""
         made = listener.node.create_publisher(
             PUBLISHED_COUNTS.type, PUBLISHED_COUNTS.name, PUBLISHED_COUNTS.qos
         )
         listener.until(made.get_subscription_count, "the recorder")
         topics = [f"/{topic}" for topic in counts]
-        made.publish(PublishedCounts(node="/walker_sim", topics=topics))  # of which some lack
+        made.publish(PublishedCounts(node="/walker_sim", topics=topics))  # invalid: no counts
         made.publish(
             PublishedCounts(node="/walker_sim", topics=topics, counts=list(counts.values()))
         )
@@ -156,7 +156,7 @@ def test_a_killed_recorder_loses_less_than_a_second(tmp_path: Path) -> None:
             end = begin + round(draw.uniform(0.2, 2.2) * SECOND)
             sent: list[int] = []  # steady time of each message
             while (now := time.monotonic_ns()) < end:
-                # A thousand a second, by absolute deadlines.
+                # 1000 per second, by absolute deadlines.
                 while len(sent) < (now - begin) // 1_000_000:
                     for each in publishers:
                         each.publish(joints(len(sent), SECOND + len(sent)))
@@ -178,7 +178,7 @@ def test_a_killed_recorder_loses_less_than_a_second(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("required", [False, True])
-def test_a_full_disk_ends_the_recording_and_the_run_only_if_told_to(
+def test_a_full_disk_ends_the_recording_and_the_run_only_if_required(
     tmp_path: Path, required: bool
 ) -> None:
     with recorder(tmp_path, f"required:={required}".lower(), before=FULL_DISK) as (
@@ -206,7 +206,7 @@ def test_a_full_disk_ends_the_recording_and_the_run_only_if_told_to(
         if required:
             assert process.wait() == 1
         else:
-            # Whoever waits for the recorder goes on; the end of the run is its end, and a failure.
+            # Nodes that wait for the recorder go on. It fails when the run ends.
             progress.publish(Progress(header=header(SECOND), grant=7, samples=10**6))
             listener.until(lambda: acknowledged, "an acknowledgement")
             assert acknowledged[0].grant == 7
@@ -220,7 +220,7 @@ def test_a_full_disk_ends_the_recording_and_the_run_only_if_told_to(
     assert numbers(process.bag, "/joint_states") == list(range(bag.counts["/joint_states"]))
 
 
-def test_topics_are_chosen_found_late_and_described_as_offered(tmp_path: Path) -> None:
+def test_topics_are_selected_discovered_late_and_described_as_offered(tmp_path: Path) -> None:
     best_effort = QoSProfile(
         history=HistoryPolicy.KEEP_LAST, depth=5, reliability=ReliabilityPolicy.BEST_EFFORT
     )
@@ -232,14 +232,14 @@ def test_topics_are_chosen_found_late_and_described_as_offered(tmp_path: Path) -
             unwanted.publish(joints(number, SECOND))
         late = publisher(listener, "late", best_effort)
         late.publish(joints(0, 5 * SECOND))
-        # Overtaken by less than a minute, it stays behind the one that came before it.
+        # Stamped less than a minute before the previous message, it is logged at that one's time.
         left.publish(joints(3, 2 * SECOND))
         assert process.finish(listener, left=4, late=1) == 0
         assert "4 messages of /left" in process.text
     assert check(process.bag) == []
     assert numbers(process.bag, "/left") == [0, 1, 2, 3]
     with BagReader(process.bag) as bag:
-        # The counts that end a recording are always heard, and what is heard is recorded.
+        # The counts that end a recording are always received, and so they are recorded.
         assert set(bag.topics) == {"/left", "/late", "/published_counts"}
         times = [message.log_time // SECOND for message in bag.messages(["/left"])]
         assert times == [1, 2, 3, 3]
@@ -268,7 +268,7 @@ def test_a_recording_is_split(tmp_path: Path, split: str) -> None:
     assert numbers(process.bag, "/left") == list(range(40))
 
 
-def test_what_comes_before_ros_time_begins_is_logged_at_its_beginning(tmp_path: Path) -> None:
+def test_messages_before_ros_time_starts_are_logged_at_its_start(tmp_path: Path) -> None:
     with recorder(tmp_path, "use_sim_time:=true") as (process, listener):
         empty = listener.node.create_publisher(Empty, "empty", EVERY_MESSAGE)
         clock = listener.node.create_publisher(CLOCK.type, CLOCK.name, CLOCK.qos)
@@ -277,16 +277,16 @@ def test_what_comes_before_ros_time_begins_is_logged_at_its_beginning(tmp_path: 
         for made in (empty, clock, event):
             listener.until(made.get_subscription_count, "the recorder")
         empty.publish(Empty())
-        # As rclpy stamps those of a node that is being made.
+        # As rclpy stamps the events of a node under construction.
         event.publish(ParameterEvent(stamp=to_time(time.time_ns())))
-        left.publish(joints(0, 0))  # a stamp of zero is none
+        left.publish(joints(0, 0))  # a stamp of zero means no stamp
         left.publish(joints(1, 77 * SECOND))
         clock.publish(CLOCK.type(clock=to_time(78 * SECOND)))
         empty.publish(Empty())
         size = size_of(process.bag)
         listener.until(lambda: size_of(process.bag) > size, "data in the file")
         left.publish(joints(2, 78 * SECOND + 3600 * SECOND))  # an hour ahead of ROS time
-        for tick in (3600 * SECOND, -2 * SECOND, 78 * SECOND):  # two that cannot be
+        for tick in (3600 * SECOND, -2 * SECOND, 78 * SECOND):  # the first two are impossible
             clock.publish(CLOCK.type(clock=to_time(tick)))
         assert process.finish(listener, left=3, clock=4, empty=2, event=1) == 0
     assert check(process.bag) == []
@@ -297,7 +297,7 @@ def test_what_comes_before_ros_time_begins_is_logged_at_its_beginning(tmp_path: 
     assert numbers(process.bag, "/left") == [0, 1, 2]
 
 
-def test_a_folder_that_is_there_is_not_touched(tmp_path: Path) -> None:
+def test_an_existing_folder_is_not_touched(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "bag", ros_distro="jazzy"):
         pass
     before = {file: file.read_bytes() for file in (tmp_path / "bag").iterdir()}
@@ -307,7 +307,7 @@ def test_a_folder_that_is_there_is_not_touched(tmp_path: Path) -> None:
     assert {file: file.read_bytes() for file in (tmp_path / "bag").iterdir()} == before
 
 
-@pytest.mark.parametrize("named", [False, True], ids=["by themselves", "all the same"])
+@pytest.mark.parametrize("named", [False, True], ids=["default names", "same name"])
 def test_runs_that_start_together_leave_each_others_bags_alone(
     tmp_path: Path, named: bool
 ) -> None:
@@ -319,20 +319,20 @@ def test_runs_that_start_together_leave_each_others_bags_alone(
         )
         for _ in range(3)
     ]
-    told = [run.communicate(timeout=PATIENCE) for run in runs]
+    outputs = [run.communicate(timeout=PATIENCE) for run in runs]
     codes = sorted(run.returncode for run in runs)
-    assert codes == ([0, 2, 2] if named else [0, 0, 0]), told
+    assert codes == ([0, 2, 2] if named else [0, 0, 0]), outputs
     bags = list(tmp_path.iterdir()) if named else list((tmp_path / "bags").iterdir())
     assert len(bags) == codes.count(0)
     for bag in bags:
         with BagReader(bag) as reader:
             assert reader.message_count == sum(1 for _ in reader.messages()) > 0
         assert check(bag) == []
-    refused = [problems for _, problems in told if problems]
+    refused = [err for _, err in outputs if err]
     assert all("already exists; a bag is never overwritten" in text for text in refused)
 
 
-def test_what_was_lost_is_counted_and_written_down(tmp_path: Path) -> None:
+def test_lost_messages_are_counted_and_recorded(tmp_path: Path) -> None:
     with recorder(tmp_path) as (process, listener):
         publisher(listener, "left").publish(joints(0, SECOND))
         assert process.finish(listener, left=3) == 1
@@ -392,7 +392,7 @@ def test_another_recorder_hears_a_whole_run_in_lock_step(tmp_path: Path) -> None
     assert [e.stamp - start for e in run.events] == [e.stamp for e in simulated]
 
 
-def test_another_recorder_is_told_of_every_topic_that_counts() -> None:
+def test_settings_for_another_recorder_list_every_topic_that_counts() -> None:
     file = shared_file("gait_entrainment_bringup", "config/ros2_bag_record.yaml")
     assert yaml.safe_load(file.read_text()) == {
         f"/{topic.name.lstrip('/')}": {

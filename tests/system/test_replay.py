@@ -62,7 +62,7 @@ def replay(*arguments: object) -> tuple[int, Any]:
 
 
 def offline(bag: Path) -> dict[str, list[bytes]]:
-    """Analyze without ROS; return what a node would have published of it."""
+    """Analyze a bag without ROS; return what a node would have published."""
     run = read_run(bag, torques=False)
     analyzed = Run(1, run.protocol.side, VerdictSettings(), measured=False)
     return {
@@ -77,11 +77,11 @@ def recorded(bag: Path) -> dict[str, list[bytes]]:
 
 def test_live_replayed_and_offline_are_the_same(live: Path, tmp_path: Path) -> None:
     again = tmp_path / "again"
-    code, told = replay(live, "--out", again)
-    assert (code, told["as_published_live"], told["differences"]) == (0, True, [])
+    code, outcome = replay(live, "--out", again)
+    assert (code, outcome["as_published_live"], outcome["differences"]) == (0, True, [])
     assert recorded(again) == recorded(live) == offline(live)
     assert all(recorded(live).values())
-    # What was replayed is a record like the first, and gives the same outcome.
+    # The replayed bag is a record like the first and gives the same outcome.
     first, second = (read_run(bag, torques=False) for bag in (live, again))
     assert first.differences == second.differences == ()
     # As text, which is exact: NaN does not equal itself.
@@ -91,12 +91,12 @@ def test_live_replayed_and_offline_are_the_same(live: Path, tmp_path: Path) -> N
 
 def test_the_rate_does_not_matter(live: Path) -> None:
     for rate in (30, 1000):
-        code, told = replay(live, "--rate", rate)
-        assert (code, told["as_published_live"]) == (0, True)
+        code, outcome = replay(live, "--rate", rate)
+        assert (code, outcome["as_published_live"]) == (0, True)
 
 
 def without(bag: Path, out: Path, drop: Callable[[int, str, Any], bool]) -> Path:
-    """Copy a bag without the messages that number on the topic, topic and content single out."""
+    """Copy a bag without the messages that ``drop`` selects by number, topic and content."""
     with BagReader(bag) as reader:
         data = {k: v for k, v in reader.custom_data.items() if k != "messages_lost"}
         with BagWriter(out, ros_distro="jazzy", custom_data=data) as writer:
@@ -123,15 +123,15 @@ def without(bag: Path, out: Path, drop: Callable[[int, str, Any], bool]) -> Path
         pytest.param(lambda _, topic, c: topic == "/walker/progress" and c.state, id="no end"),
     ],
 )
-def test_a_bag_that_lacks_messages_gives_the_same_replayed_and_offline(
+def test_a_bag_with_missing_messages_gives_the_same_replayed_and_offline(
     live: Path, tmp_path: Path, drop: Callable[[int, str, Any], bool]
 ) -> None:
     damaged = without(live, tmp_path / "damaged", drop)
     again = tmp_path / "again"
-    code, told = replay(damaged, "--out", again)
+    code, outcome = replay(damaged, "--out", again)
     lacks_events = offline(damaged) != offline(live)
     assert code == lacks_events
-    assert bool(told["differences"]) is lacks_events
+    assert bool(outcome["differences"]) is lacks_events
     assert recorded(again) == offline(damaged)
     assert (read_run(damaged, torques=False).differences != ()) is lacks_events
 
@@ -147,8 +147,8 @@ def test_a_run_in_a_namespace_is_replayed_and_recorded_there(live: Path, tmp_pat
                 writer.write(
                     f"/lab{message.topic}", message.data, message.log_time, message.publish_time
                 )
-    code, told = replay(moved, "--out", again)
-    assert (code, told["as_published_live"]) == (0, True)
+    code, outcome = replay(moved, "--out", again)
+    assert (code, outcome["as_published_live"]) == (0, True)
     results = payloads(again, [f"/lab{topic}" for topic in RESULTS])
     assert [[data for _, data in found] for found in results.values()] == [
         *recorded(live).values()
@@ -157,7 +157,7 @@ def test_a_run_in_a_namespace_is_replayed_and_recorded_there(live: Path, tmp_pat
 
 def test_an_analyzer_that_hangs_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(replay_client, "TIMEOUT", 3.0)
-    monkeypatch.setattr(supervisor, "METHOD", "spawn")  # other tests have left threads here
+    monkeypatch.setattr(supervisor, "METHOD", "spawn")  # earlier tests have left threads
     call = replay_client.ReplayClient.call
 
     def call_and_stall(client: Any, kind: Any, name: str, *arguments: Any, **options: Any) -> Any:
@@ -169,13 +169,13 @@ def test_an_analyzer_that_hangs_is_named(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(replay_client.ReplayClient, "call", call_and_stall)
     options = SimpleNamespace(bag=BAG, protocol=None, side=None, rate=1.0, out=None, json=True)
     with claimed_domain() as domain:
-        monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))  # undone, where replay sets it
+        monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))  # restored after replay has set it
         with pytest.raises(NodeError, match="gait_analyzer has been silent for 3 s"):
             replay_command.replay(options, domain)
 
 
 class Player:
-    """A player of a bag in the domain of a probe, paused at the start."""
+    """A player of a bag in a probe's domain, paused at the start."""
 
     def __init__(self, bag: Path, domain: int, folder: Path, *parameters: str) -> None:
         arguments = ["--ros-args", "-p", f"bag:={bag}", "-p", "start_paused:=true"]
@@ -206,7 +206,7 @@ def player(tmp_path: Path) -> Any:
             each.process.wait()
 
 
-def test_the_services_of_the_player(player: Any) -> None:
+def test_the_player_obeys_its_services(player: Any) -> None:
     process, listener = player(
         "topics:=[/gait_events]", "expect:=[/gait_events]", "stay:=true", "clock:=100.0"
     )
@@ -224,7 +224,7 @@ def test_the_services_of_the_player(player: Any) -> None:
     for _ in range(3):
         assert ask(srv.PlayNext, "bag_player/play_next").success
     listener.until(lambda: len(heard) == 4, "four events")
-    # Back to the start, and on from there to the end.
+    # Back to the start, then on to the end.
     start = events[0][0]
     assert not ask(
         srv.Seek, "bag_player/seek", srv.Seek.Request(time=to_time(start - 10**12))
@@ -237,7 +237,7 @@ def test_the_services_of_the_player(player: Any) -> None:
     ticks = [tick.clock.sec * 10**9 + tick.clock.nanosec for tick in clock]
     assert start in ticks
     assert {(tick - start) % 10_000_000 for tick in ticks} == {0}
-    # On from the middle to the end, paused in between.
+    # Paused, then on from the middle to the end.
     ask(srv.Pause, "bag_player/pause")
     assert ask(srv.IsPaused, "bag_player/is_paused").paused
     middle = to_time(events[10][0])
@@ -249,13 +249,13 @@ def test_the_services_of_the_player(player: Any) -> None:
     assert process.process.poll() is None
 
 
-def test_nothing_is_played_without_those_who_are_expected(player: Any) -> None:
+def test_nothing_is_played_without_the_expected_subscriptions(player: Any) -> None:
     process, _ = player("expect:=[/gait_events]", "expect_timeout:=0.5")
     assert process.process.wait(PATIENCE) == 1
     assert "no subscriptions of /gait_events within 0.5 s" in process.log.read_text()
 
 
-def test_a_player_whose_reader_hangs_says_so_and_obeys_a_signal(player: Any) -> None:
+def test_a_player_reports_a_hanging_reader_and_obeys_a_signal(player: Any) -> None:
     process, listener = player("topics:=[/gait_events]", "expect:=[/gait_events]", "rate:=0.0")
     domain = str(listener.node.context.get_domain_id())
     reader = subprocess.Popen(
@@ -266,11 +266,11 @@ def test_a_player_whose_reader_hangs_says_so_and_obeys_a_signal(player: Any) -> 
         listener.until(lambda: listener.call(Ready, "bag_player/ready").ready, "its subscription")
         reader.send_signal(signal.SIGSTOP)
         listener.call(srv.Resume, "bag_player/resume")
-        listener.until(lambda: "does not keep up" in process.log.read_text(), "a word")
-        told = time.monotonic()
+        listener.until(lambda: "does not keep up" in process.log.read_text(), "a warning")
+        terminated_at = time.monotonic()
         process.process.terminate()
         assert process.process.wait(PATIENCE) == 0
-        assert time.monotonic() - told < 5
+        assert time.monotonic() - terminated_at < 5
     finally:
         reader.kill()
         reader.wait()
@@ -309,7 +309,7 @@ def test_topics_are_remapped_and_played_in_a_loop(player: Any) -> None:
         ("expect:=[/nothing]", "/nothing is not played"),
     ],
 )
-def test_a_wrong_parameter_is_one_line(player: Any, parameter: str, words: str) -> None:
+def test_a_wrong_parameter_gives_one_line(player: Any, parameter: str, words: str) -> None:
     process, _ = player(parameter)
     assert process.process.wait(PATIENCE) == 2
     text = process.log.read_text()

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The driver of ros2_control robots against an emulated effort controller, in a process."""
+"""The driver of ros2_control robots with an emulated effort controller in another process."""
 
 import json
 import os
@@ -27,9 +27,9 @@ from gait_entrainment_nodes.messaging.domain import claimed_domain
 EMULATED = Path(__file__).with_name("emulated_controller.py")
 MANAGED = pytest.mark.skipif(
     find_spec("controller_manager_msgs") is None,
-    reason="controller_manager is asked by types of its own: install controller_manager_msgs",
+    reason="controller_manager has its own service types: install controller_manager_msgs",
 )
-# A machine that others share wakes processes up late: the limits have their own tests.
+# A shared machine wakes processes up late; the limits have their own tests.
 PATIENT = Tolerances(
     onset=0.25, zero_within=1.0, watchdog=1.6, call=0.1, slowest_call=2.0, impulse=0.6
 )
@@ -37,7 +37,7 @@ PATIENT = Tolerances(
 
 @contextmanager
 def controller(*options, **driver):
-    """Run an emulated controller in a domain of its own; gives the driver's text."""
+    """Run an emulated controller in its own domain; yield the driver's text."""
     with claimed_domain() as domain:
         process = subprocess.Popen(
             [sys.executable, str(EMULATED), str(domain), *options],
@@ -59,7 +59,7 @@ def robot_on(text):
 
 
 def pushed(robot, torque):
-    """Push, and return the states up to where the torque has been reached."""
+    """Push; return the states until the torque is reached."""
     robot.configure()
     robot.activate()
     robot.arm()
@@ -75,7 +75,7 @@ def pushed(robot, torque):
     return states
 
 
-# What this driver itself answers for; the guard and the loop are asked with the other drivers.
+# Checks of what this driver itself does; guard and loop are checked with the other drivers.
 OF_THE_DRIVER = {
     "lifecycle",
     "pulses",
@@ -97,7 +97,7 @@ def test_a_controller_that_times_out_keeps_every_promise():
     assert [result for result in results if not result.kept] == []
 
 
-def test_a_controller_that_holds_its_last_command_is_found_out(capsys, tmp_path, monkeypatch):
+def test_a_controller_that_holds_its_last_command_is_caught(capsys, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     with controller() as text:
         assert main(["driver", "prove", text, "--arm", "--json"]) == 1
@@ -109,7 +109,7 @@ def test_a_controller_that_holds_its_last_command_is_found_out(capsys, tmp_path,
     assert proof_of(text) is None
 
 
-def test_torque_and_angle_are_the_ankles():
+def test_torque_and_angle_are_those_of_the_ankle():
     with controller(ratio=-2.0) as text, robot_on(text) as robot:
         state = pushed(robot, 6.0)[-1]
         assert state.measured == pytest.approx(6.0, rel=0.06)
@@ -117,7 +117,7 @@ def test_torque_and_angle_are_the_ankles():
         assert not robot.faults
 
 
-def test_a_robot_in_the_domain_of_the_run_needs_names_of_its_own(monkeypatch):
+def test_a_robot_in_the_domain_of_the_run_needs_its_own_names(monkeypatch):
     with controller("--namespace=exo", "--joint-states=exo_states", "--timeout=0.2") as text:
         domain = re.search(r"domain=(\d+)", text)[1]
         monkeypatch.setenv("ROS_DOMAIN_ID", domain)
@@ -140,7 +140,7 @@ def test_a_robot_in_the_domain_of_the_run_needs_names_of_its_own(monkeypatch):
         (["--behind=2"], {}, r"joint_states are 2\S* s old on arrival: synchronize"),
     ],
 )
-def test_what_is_missing_is_told_in_one_line(options, driver, words, monkeypatch):
+def test_what_is_missing_is_reported_in_one_line(options, driver, words, monkeypatch):
     monkeypatch.setattr(ros2_control, "_DISCOVERY_TIMEOUT", 2.0)
     with controller(*options, **driver) as text:
         device = ros2_control.EffortJoint(find_driver(text).options)
@@ -152,7 +152,7 @@ def test_what_is_missing_is_told_in_one_line(options, driver, words, monkeypatch
 
 @MANAGED
 @pytest.mark.parametrize("state", ["inactive", "active"])
-def test_controller_manager_activates_the_controller_and_deactivates_it(state, tmp_path):
+def test_controller_manager_activates_and_deactivates_the_controller(state, tmp_path):
     trace = tmp_path / "trace"
     options = (f"--manager=effort_controller={state}", f"--trace={trace}")
     with controller("--timeout=0.2", *options) as text, robot_on(text) as robot:
@@ -182,7 +182,7 @@ def test_controller_manager_activates_the_controller_and_deactivates_it(state, t
         ),
     ],
 )
-def test_what_controller_manager_refuses_is_told_in_one_line(options, words):
+def test_what_controller_manager_refuses_is_reported_in_one_line(options, words):
     with controller("--timeout=0.2", *options) as text, robot_on(text) as robot:
         robot.configure()
         with pytest.raises(DeviceError, match=words) as error:
@@ -190,7 +190,7 @@ def test_what_controller_manager_refuses_is_told_in_one_line(options, words):
     assert "\n" not in str(error.value)
 
 
-def test_a_second_master_is_a_fault_by_name():
+def test_a_second_master_is_a_named_fault():
     with controller("--timeout=0.2") as text, robot_on(text) as robot:
         pushed(robot, 6.0)
         domain = re.search(r"domain=(\d+)", text)[1]
@@ -222,7 +222,7 @@ rclpy.spin(node)
 """
 
 
-def test_a_controller_has_one_master_of_ours():
+def test_only_one_of_our_drivers_may_command_a_controller():
     with controller("--timeout=0.2") as text, robot_on(text) as first:
         pushed(first, 6.0)
         with pytest.raises(DeviceError, match=r"effort_controller in ROS domain \d+ is in use by"):
@@ -236,6 +236,6 @@ def test_a_controller_has_one_master_of_ours():
         ("joint_index=1", r"joint_index: 1; allowed: below joint_count \(1\)"),
     ],
 )
-def test_a_wrong_option_is_told_in_one_line(options, words):
+def test_a_wrong_option_is_reported(options, words):
     with pytest.raises(LimitError, match=words):
         find_driver(f"ros2_control:{options}")

@@ -31,12 +31,12 @@ from gait_entrainment_nodes.messaging.topics import (
 )
 
 BAG = Path(__file__).parents[2] / "bags/paper_example"
-# rclpy's own, which it describes itself or not.
+# rclpy's own, which may lack a description.
 OF_RCLPY = ("use_sim_time", "start_type_description_service")
 
 
 class Parameters:
-    """What a node's parameter services say."""
+    """The parameter services of a node."""
 
     def __init__(self, listener, node):
         self.probe, self.node = listener, node
@@ -53,7 +53,7 @@ class Parameters:
         return {d.name: (d, value) for d, value in zip(descriptors, values, strict=True)}
 
     def put(self, **values):
-        """Set parameters, one by one; return why each was refused, or empty texts."""
+        """Set parameters, one by one; return why each was refused, or an empty text."""
         messages = [
             Parameter(n.replace("__", "."), value=v).to_parameter_msg() for n, v in values.items()
         ]
@@ -67,9 +67,9 @@ class Parameters:
 
 def assert_in_order(parameters):
     """
-    Check that all is described, and that what must not be set is refused with a reason.
+    Check that all parameters are described and that wrong values are refused with a reason.
 
-    To set everything as it is, as `ros2 param dump` and `load` do, is refused nowhere.
+    Setting each to its present value, as `ros2 param dump` and `load` do, is never refused.
     """
     described = parameters.described()
     assert described
@@ -118,27 +118,27 @@ def assert_in_order(parameters):
 
 
 def states(heard):
-    """Return the latest state of each node, of the diagnostics that were heard."""
+    """Return the latest state of each node in the diagnostics received."""
     statuses = [status for array in heard for status in array.status]
     return {s.name: s for s in statuses if s.name.endswith(": state")}
 
 
-def test_nodes_of_an_experiment_are_as_ros_users_expect(tmp_path):
+def test_nodes_of_an_experiment_behave_as_ros_users_expect(tmp_path):
     options = (*QUICK, "--baseline=1000000")
     with session(tmp_path, *options, real_time=False) as nodes:
         listener = nodes.probe
-        of = {node: Parameters(listener, node) for node in NODES}
-        for parameters in of.values():
+        params = {node: Parameters(listener, node) for node in NODES}
+        for parameters in params.values():
             assert_in_order(parameters)
 
-        # Before a run what may change changes, and the run goes by it.
-        assert of["walker_sim"].put(sample_rate=50.0) == [""]
-        (reason,) = of["walker_sim"].put(ankle_stiffness=40.0)
-        assert "ankle_stiffness" in reason  # within its range, and no walker
-        assert of["experiment"].put(longest_lookahead=0.25) == [""]
-        assert of["gait_analyzer"].put(side="left", verdict__window=10) == ["", ""]
-        assert of["perturbator"].put(side="left") == [""]
-        (reason,) = of["perturbator"].put(driver="magic")
+        # Before a run, parameters that may change do, and the run uses them.
+        assert params["walker_sim"].put(sample_rate=50.0) == [""]
+        (reason,) = params["walker_sim"].put(ankle_stiffness=40.0)
+        assert "ankle_stiffness" in reason  # within its range, but no walker has it
+        assert params["experiment"].put(longest_lookahead=0.25) == [""]
+        assert params["gait_analyzer"].put(side="left", verdict__window=10) == ["", ""]
+        assert params["perturbator"].put(side="left") == [""]
+        (reason,) = params["perturbator"].put(driver="magic")
         assert "ideal" in reason
         heard = listener.listen(DIAGNOSTICS)
         listener.until(lambda: len(states(heard)) == len(NODES), "a state of each node")
@@ -157,24 +157,24 @@ def test_nodes_of_an_experiment_are_as_ros_users_expect(tmp_path):
         assert max(lead(horizon) for horizon in horizons) <= 0.25
         assert spacing(joints) == pytest.approx(0.02, abs=1e-9)
 
-        # During a run it is refused, unless it may change.
+        # During a run a change is refused, except for parameters that may change.
         for node, values in {
             "walker_sim": {"mass": 6.0},
             "experiment": {"longest_lookahead": 0.3},
             "gait_analyzer": {"verdict__window": 12},
         }.items():
-            (reason,) = of[node].put(**values)
+            (reason,) = params[node].put(**values)
             assert "run 1 is in progress" in reason
-        (reason,) = of["perturbator"].put(limits__torque=5.0)
+        (reason,) = params["perturbator"].put(limits__torque=5.0)
         assert "configured" in reason
-        assert of["experiment"].put(silence_timeout=2.5) == [""]
+        assert params["experiment"].put(silence_timeout=2.5) == [""]
         listener.until(
             lambda: "run 1" in states(heard)["experiment: state"].message, "the state of the run"
         )
         handle.cancel_goal_async()
         assert listener.result(handle).result.outcome == RunProtocol.Result.CANCELLED
-        listener.until(lambda: of["experiment"].put(longest_lookahead=0.3) == [""], "the end")
-        # A goal is a text, if only of one line, and names no file of the host.
+        listener.until(lambda: params["experiment"].put(longest_lookahead=0.3) == [""], "the end")
+        # A goal is YAML text, even if it is a single line, and never names a file on the host.
         for goal, reason in {
             "{baseline: 0}": "baseline: 0; allowed",
             str(BAG / "protocol.yaml"): "must be a mapping",
@@ -194,13 +194,13 @@ def lead(horizon):
 
 
 def spacing(samples):
-    """Return the most frequent interval [s] between samples: at gait events there are more."""
+    """Return the most frequent interval [s] between samples; gait events add samples."""
     stamps = [s.header.stamp.sec * 10**9 + s.header.stamp.nanosec for s in samples]
     gaps = [b - a for a, b in pairwise(stamps)]
     return max(set(gaps), key=gaps.count) / 1e9
 
 
-def test_rate_of_the_player_is_one_with_its_service(tmp_path):
+def test_rate_parameter_of_the_player_agrees_with_its_service(tmp_path):
     with claimed_domain() as domain, probe(domain) as listener:
         supervisor = Supervisor(tmp_path, {**os.environ, "ROS_DOMAIN_ID": str(domain)})
         given = ["-p", f"bag:={BAG}", "-p", "start_paused:=true"]

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A session through the nodes: killed, resumed, valid as BIDS, unblinded."""
+"""A session run by nodes: killed, resumed, valid as BIDS, unblinded."""
 
 import json
 import re
@@ -19,7 +19,7 @@ FOLDER = "sub-P03/ses-1"
 
 
 def shortened(folder):
-    """Write the blinded example with few strides into a folder; return its path."""
+    """Write the blinded example, with few strides, into a folder; return its path."""
     text = EXAMPLE.read_text().replace("count: 50", "count: 4").replace("side: left", "washout: 1")
     path = folder / "session.yaml"
     path.write_text(re.sub("washout: 1", "washout: 1\n  baseline: 3", text))
@@ -53,24 +53,24 @@ def conducted(tmp_path_factory):
     return SessionFolder(study / FOLDER)
 
 
-def test_a_session_that_was_killed_is_resumed_at_its_block(conducted):
-    what = [(entry.what, entry.block) for entry in conducted.ledger]
-    assert what == [("begun", "1"), ("begun", "1"), ("done", "1"), ("begun", "2"), ("done", "2")]
+def test_a_killed_session_is_resumed_at_its_block(conducted):
+    steps = [(entry.what, entry.block) for entry in conducted.ledger]
+    assert steps == [("begun", "1"), ("begun", "1"), ("done", "1"), ("begun", "2"), ("done", "2")]
     assert list(conducted.runs()) == [1, 2]
 
 
-def test_bags_name_the_key_and_no_block(conducted):
+def test_bags_name_the_session_key_and_not_the_block(conducted):
     for number, bag in conducted.runs().items():
         with BagReader(bag) as reader:
-            told = reader.custom_data
-        assert (told["person"], told["block_name"]) == ("P03", f"block {number}")
-        assert told["session_key"] == conducted.plan["key"]
+            data = reader.custom_data
+        assert (data["person"], data["block_name"]) == ("P03", f"block {number}")
+        assert data["session_key"] == conducted.plan["key"]
         assert not re.search(
-            "sham|name: pulses", " ".join(told.values()).replace("blinded_sham", "")
+            "sham|name: pulses", " ".join(data.values()).replace("blinded_sham", "")
         )
 
 
-def test_the_folder_is_a_valid_bids_data_set(conducted):
+def test_the_folder_is_a_valid_bids_dataset(conducted):
     command = ["bids-validator-deno", "--format", "json", str(conducted.path.parents[1])]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE)
     issues = json.loads(done.stdout)["issues"]["issues"]
@@ -79,7 +79,7 @@ def test_the_folder_is_a_valid_bids_data_set(conducted):
     assert len(list(conducted.path.glob("motion/*_motion.tsv"))) == 2
 
 
-def test_a_sealed_session_is_unblinded_once_it_is_asked_for(conducted):
+def test_a_sealed_session_is_unblinded_on_request(conducted):
     assert "block 2" in (conducted.path / "strides.tsv").read_text()
     for name in ("pulses", "blocks"):  # lags and verdicts
         assert len((conducted.path / f"{name}.tsv").read_text().splitlines()) == 1
@@ -91,7 +91,7 @@ def test_a_sealed_session_is_unblinded_once_it_is_asked_for(conducted):
     assert [row.split("\t")[3] for row in rows] == names
 
 
-def test_tables_are_exported_over_all_of_a_study(conducted, tmp_path):
+def test_tables_of_a_whole_study_are_exported(conducted, tmp_path):
     words = ("session", "export", conducted.path.parents[1], "--out", tmp_path)
     code, out, err = ended(entrain(*words, "--format", "parquet"))
     assert (code, err) == (0, "")

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The stop of a session: it reaches every robot of this machine, so nothing runs beside it."""
+"""Stopping a session also stops every robot on this machine, so nothing runs alongside."""
 
 import os
 import pty
@@ -18,11 +18,11 @@ def test_the_space_bar_stops_a_block(tmp_path):
     ours, theirs = pty.openpty()
     short, study = shortened(tmp_path), tmp_path / "stopped"
     process = entrain("session", short, "--out", study, "--real-time", stdin=theirs)
-    os.write(ours, b"\n")  # the answer to what is next
+    os.write(ours, b"\n")  # the answer to the prompt for what is next
     while not process.stdout.readline().endswith("block 1\n"):
         pass
     deadline = time.monotonic() + PATIENCE
-    while termios.tcgetattr(theirs)[3] & termios.ICANON:  # until keys are taken at once
+    while termios.tcgetattr(theirs)[3] & termios.ICANON:  # until keys are read without Enter
         assert time.monotonic() < deadline
         time.sleep(0.02)
     os.write(ours, b" ")

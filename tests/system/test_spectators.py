@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Who only looks on and hangs delays nobody in real time, and is named in lock-step."""
+"""A hanging spectator delays no process in real time, and is named in lock-step."""
 
 import os
 import signal
@@ -14,15 +14,15 @@ from pathlib import Path
 import pytest
 from harness import LONG, QUICK, entrain_run
 
-# After so long a suspended reader of shared memory held up its writers for seconds [s].
+# After this long, a suspended reader of shared memory used to hold up its writers for seconds [s].
 HUNG_FOR = 12.0
 SILENCE_TIMEOUT = 3.0
 
 
 @pytest.fixture
 def suspend(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], int]]:
-    """Start a reader of every topic of the next run; give what suspends it, once it hears."""
-    monkeypatch.setenv("ROS_DOMAIN_ID", "230")  # which no run takes by itself
+    """Start a reader of every topic of the next run; yield what suspends it, once it hears."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", "230")  # which no run chooses by itself
     program = Path(__file__).with_name("spectator.py")
     spectator = subprocess.Popen([sys.executable, program], stdout=subprocess.PIPE, text=True)
     assert spectator.stdout is not None
@@ -34,15 +34,15 @@ def suspend(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], int]]:
         return spectator.pid
 
     try:
-        assert next(words) == "listens\n"  # so a short run is not over before
+        assert next(words) == "listens\n"  # so that a short run is not over first
         yield suspend
     finally:
         spectator.kill()
         spectator.wait()
 
 
-def test_in_real_time_a_suspended_reader_delays_nobody(tmp_path, suspend):
-    # It is over before the spectator's participant is given up for dead (20 s).
+def test_in_real_time_a_suspended_reader_delays_no_other_process(tmp_path, suspend):
+    # The run ends before the spectator's participant is considered lost (20 s).
     options = (*QUICK, "--baseline=2", "--pulses=24", "--washout=2", "--sample-rate=1000")
     with entrain_run(tmp_path / "bag", *options, "--real-time", "--json") as run:
         suspend()
@@ -50,12 +50,12 @@ def test_in_real_time_a_suspended_reader_delays_nobody(tmp_path, suspend):
         outcome = run.outcome()
         assert run.ended_at - begin > HUNG_FOR
     assert outcome["lost"] == 0
-    # A stretch that comes late is one that a publisher was held up for.
+    # A late stretch would mean that a publisher was held up.
     assert outcome["promises"]["late_stretches"] == 0
     assert outcome["promises"]["starved_stretches"] == 0
 
 
-def test_in_real_time_a_run_with_a_suspended_reader_is_stopped_as_any(tmp_path, suspend):
+def test_in_real_time_a_run_with_a_suspended_reader_stops_like_any_other(tmp_path, suspend):
     with entrain_run(tmp_path / "bag", *LONG, "--real-time", "--sample-rate=1000") as run:
         suspend()
         run.wait_for_stride(12)
@@ -73,5 +73,5 @@ def test_in_lock_step_a_suspended_reader_is_named(tmp_path, suspend):
         begin = time.monotonic()
         assert run.wait() == 1
         assert f"held up by process {spectator} " in run.text.splitlines()[0]
-        # It takes all that the queues hold before anybody is held up.
+        # No process is held up before the queues are full.
         assert run.ended_at - begin < SILENCE_TIMEOUT + 10

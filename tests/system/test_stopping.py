@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Nodes that are told to stop, and torque that ends with them."""
+"""Nodes stop when signalled, and torque ends with them."""
 
 import signal
 import time
@@ -16,7 +16,7 @@ from gait_entrainment_msgs.action import RunProtocol
 from gait_entrainment_nodes.messaging.topics import ANKLE_TORQUE, PULSES, TORQUE_PROFILE
 
 EACH = (*NODES, DISPLAY)
-# From the signal to the end of the process [s], on a machine that does other things too.
+# From the signal to the end of the process [s], on a shared machine.
 PROMPTLY = 5.0
 # Pulses that are on nearly all the time.
 BROAD = (*QUICK, "--pulses=2000", "--width=0.4", "--baseline=2")
@@ -30,12 +30,12 @@ def assert_idle(nodes):
     waited = time.monotonic() - begin
     used = {n: (cpu_seconds(nodes.pid(n)) - before[n]) / waited for n in EACH}
     print({node: f"{share:.1%}" for node, share in used.items()})
-    # A loop without a wait would use all of a core, or what the others leave of it.
+    # A busy loop would use a whole core, or what the others leave of it.
     assert max(used.values()) < 0.15, used
 
 
 @pytest.mark.parametrize("first", [0, 3])
-def test_each_idle_node_hardly_works_and_stops_cleanly(first, tmp_path):
+def test_each_idle_node_uses_little_cpu_and_stops_cleanly(first, tmp_path):
     with session(tmp_path, nodes=EACH) as nodes:
         listeners = nodes.probe.node.get_subscriptions_info_by_topic
         nodes.probe.until(
@@ -46,10 +46,10 @@ def test_each_idle_node_hardly_works_and_stops_cleanly(first, tmp_path):
             assert_idle(nodes)
         for place, node in enumerate(EACH):
             number = STOPPING[(first + place) % len(STOPPING)]
-            told = time.monotonic()
+            signalled_at = time.monotonic()
             nodes.signal(node, number)
             assert nodes.supervisor.wait(node, 10) == 0, nodes.supervisor.last_lines(node)
-            assert time.monotonic() - told < PROMPTLY
+            assert time.monotonic() - signalled_at < PROMPTLY
             assert "Traceback" not in nodes.supervisor.last_lines(node)
             assert "[ERROR]" not in nodes.supervisor.last_lines(node)
     with BagReader(nodes.bag) as reader:
@@ -65,7 +65,7 @@ def test_torque_ends_with_the_perturbator(tmp_path):
         nodes.signal("perturbator", signal.SIGTERM)
         assert nodes.supervisor.wait("perturbator", 10) == 0
         nodes.probe.until(lambda: profiles[-1].stop, "the stop")
-        # The walker goes on, without torque, until the experiment misses the perturbator.
+        # The walker goes on without torque until the experiment notices the missing perturbator.
         count = len(torques)
         nodes.probe.until(lambda: len(torques) > count + 200, "a walk without torque")
         answer = nodes.probe.result(handle)
@@ -82,8 +82,8 @@ def test_torque_ends_with_the_perturbator(tmp_path):
         if raw.topic == "/ankle_torque"
     }
     assert any(value > 0 for _, value in torque.values())
-    # A sample that is received later than the stop by more than the way of a message is walked
-    # behind it.
+    # A sample received after the stop by more than a message's travel time was walked after the
+    # stop.
     after = [v for received, v in torque.values() if received > stops[0].publish_time + 10**8]
     assert len(after) > 100
     assert set(after) == {0.0}
