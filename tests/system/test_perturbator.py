@@ -206,7 +206,7 @@ def test_torque_ends_if_a_required_sender_falls_silent(tmp_path, silent):
         alive = ["the emergency stop", "entrain_run", "operator_page"]
 
         def live():
-            """Send horizons, the button's state and heartbeats, without those of the silent sender."""
+            """Send horizons, the button's state and heartbeats, but none of the silent sender's."""
             conductor.horizons.publish(horizon_from(time.time()))
             for name in alive:
                 if name == "the emergency stop":
