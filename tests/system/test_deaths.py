@@ -58,7 +58,7 @@ def test_death_ends_the_run(node, tmp_path):
 )
 def test_stalled_process_ends_the_run(mode, stalled, tmp_path):
     # Several at once, because most of the time is spent waiting. Their duration then says nothing
-    # about a single run, so the strict limit is only for a run alone.
+    # about a single run, so the strict limit applies only to a lone run.
     limit = SILENCE_TIMEOUT + 2 * END_WITHIN if len(stalled) == 1 else PATIENCE
     runs = {}
     try:

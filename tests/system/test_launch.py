@@ -158,7 +158,7 @@ def test_another_recorder_may_record_a_run_that_starts_later(tmp_path):
 
 
 def fake_rviz(prefix):
-    """Make a package rviz2 whose program writes its arguments to a file and waits; return it."""
+    """Make a package rviz2 that saves its arguments to a file and then waits; return the file."""
     index = prefix / "share/ament_index/resource_index/packages"
     index.mkdir(parents=True)
     (index / "rviz2").touch()

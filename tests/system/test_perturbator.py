@@ -167,7 +167,7 @@ def test_deactivating_and_activating_during_a_run_breaks_no_promise(tmp_path, dr
 def with_motor(tmp_path, *parameters):
     """Start the perturbator with an emulated motor, armed; yield its conductor."""
     with emulated_motor(tmp_path) as (driver, _), claimed_domain() as domain:
-        # Other tests run alongside: a silence that is not tested here may be longer.
+        # Host silence is not under test here, and may be longer on a shared machine.
         driver = driver.replace("host_silence=1", "host_silence=5")
         nodes = Session(tmp_path, domain, [f"--driver={driver}"], real_time=True, strangers=True)
         for parameter in ("unproved:=true", *parameters):
@@ -206,7 +206,7 @@ def test_torque_ends_if_a_required_sender_falls_silent(tmp_path, silent):
         alive = ["the emergency stop", "entrain_run", "operator_page"]
 
         def live():
-            """Send horizons, the button's state and heartbeats, but none of the silent sender's."""
+            """Send horizons, button states and heartbeats, but nothing from the silent sender."""
             conductor.horizons.publish(horizon_from(time.time()))
             for name in alive:
                 if name == "the emergency stop":
