@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The driver with the emulated robot: every promise, frames, and faults of a line."""
+"""The driver with the emulated robot: every promise, frames, and faults of the line."""
 
 import subprocess
 import sys
@@ -24,7 +24,7 @@ PATIENT = Tolerances(
 
 @contextmanager
 def emulated(*options):
-    """Run the emulator; yield the text that names the driver for it."""
+    """Run the emulator; yield the text that selects the driver for it."""
     process = subprocess.Popen(
         [sys.executable, "-m", "serial_ankle_robot.emulator", *options],
         stdout=subprocess.PIPE,
@@ -47,7 +47,7 @@ def test_a_robot_with_a_watchdog_keeps_every_promise(check):
     assert result.kept, result.broken
 
 
-def test_a_robot_without_one_holds_its_last_command():
+def test_a_robot_without_a_watchdog_holds_its_last_command():
     with emulated() as text:
         result = run_check(silent_host, DriverBench(find_driver(text)))
     assert result.broken.startswith("holds its last command when the host is silent: 8")
@@ -62,7 +62,7 @@ def push(robot):
     robot.schedule(PulseTrain.periodic(Side.RIGHT, onset, 1.0, 1, 8.0, 0.4))
 
 
-def test_a_fault_of_the_robot_is_named():
+def test_a_robot_fault_is_named():
     with emulated("--fault-after=0.1") as text, find_driver(text).make(Side.RIGHT) as robot:
         push(robot)
         give_up = time.monotonic() + 5
@@ -74,7 +74,7 @@ def test_a_fault_of_the_robot_is_named():
         assert [fault.name for fault in robot.faults] == ["power_stage_failed"]
 
 
-def test_a_line_that_is_not_there_is_told_in_one_line():
+def test_a_missing_line_gives_a_one_line_error():
     robot = find_driver("serial:port=/dev/no_such_line").make(Side.RIGHT)
     with pytest.raises(
         DeviceError, match=r"/dev/no_such_line: the line cannot be opened"
@@ -89,7 +89,7 @@ def test_the_frame_of_8_newton_metres():
     assert Command.unpack(take_frame(bytearray(frame), Command)) == Command(7, TORQUE, 8.0)
 
 
-def test_noise_and_half_frames_are_passed_over():
+def test_noise_and_half_frames_are_skipped():
     replies = [Reply(1, 1, 0.25, -0.5, 1.5, 30), Reply(2, 1, -0.25)]
     broken = bytearray(replies[0].pack())
     broken[4] ^= 1

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Drivers that each break one promise of the contract, made from those that keep them all."""
+"""Drivers that each break one promise of the contract, derived from ones that keep them all."""
 
 import math
 import time
@@ -18,7 +18,7 @@ class OptionsWithoutMeaning:
 
 
 def changed(train, changes):
-    """The train with other pulses: ``changes`` gives what becomes of each."""
+    """Return the train with each pulse changed: ``changes`` gives its new values."""
     return PulseTrain(
         train.side, tuple(replace(pulse, **changes(pulse)) for pulse in train.pulses)
     )
@@ -58,7 +58,7 @@ class PushesWithoutTrain(IdealAnkleRobot):
         return replace(profile, torques=tuple(torque + 0.6 for torque in profile.torques))
 
 
-class FaultWhileAllIsWell(IdealAnkleRobot):
+class FaultWithoutReason(IdealAnkleRobot):
     def read(self):
         return [replace(s, faults=(Fault("odd", "Nothing is wrong."),)) for s in super().read()]
 
@@ -68,13 +68,13 @@ class SwallowsAPulse(IdealAnkleRobot):
         super().schedule(PulseTrain(train.side, train.pulses[:-1] or train.pulses))
 
 
-class ForgetsTheTrainBefore(IdealAnkleRobot):
+class ForgetsThePreviousTrain(IdealAnkleRobot):
     def schedule(self, train):
         self._train = None
         super().schedule(train)
 
 
-class KnowsOnlySquares(IdealAnkleRobot):
+class KnowsOnlySquarePulses(IdealAnkleRobot):
     def schedule(self, train):
         super().schedule(changed(train, lambda _: {"shape": Shape.SQUARE}))
 
@@ -84,7 +84,7 @@ class WrongSign(IdealAnkleRobot):
         super().schedule(changed(train, lambda pulse: {"torque": -pulse.torque}))
 
 
-class OnsetsNotTold(IdealAnkleRobot):
+class OnsetsNotReported(IdealAnkleRobot):
     def promise(self, until):
         return replace(super().promise(until), onsets=())
 
@@ -95,7 +95,7 @@ class HalfTheImpulse(IdealAnkleRobot):
 
 
 class DependsOnTheCuts(EmulatedAnkleRobot):
-    """Lets its torque follow once more at the end of each promise."""
+    """Reduces its torque once more at the end of each promise."""
 
     def promise(self, until):
         profile = super().promise(until)
@@ -115,7 +115,7 @@ class Saturates(IdealAnkleRobot):
 
 
 class CannotRefuse(IdealAnkleRobot):
-    """Claims any train before the guard has a say: only the kit can tell."""
+    """Pushes even if the guard has refused every train: only the kit can notice."""
 
     def begin(self, start):
         super().begin(start)
@@ -170,7 +170,7 @@ class StopBlocks(IdealAnkleRobot):
         time.sleep(1.2)
 
 
-class TakesTrainsAfterAStop(IdealAnkleRobot):
+class AcceptsTrainsAfterAStop(IdealAnkleRobot):
     def stop(self):
         self._train = None
 
@@ -200,13 +200,13 @@ class DoesNotAdjoin(IdealAnkleRobot):
         return replace(profile, times=(profile.times[0] + 1, *profile.times[1:]))
 
 
-class TellsNan(IdealAnkleRobot):
+class PromisesNan(IdealAnkleRobot):
     def promise(self, until):
         profile = super().promise(until)
         return replace(profile, torques=tuple(math.nan for _ in profile.torques))
 
 
-class StatesGoBack(EmulatedAnkleRobot):
+class StatesGoBackwards(EmulatedAnkleRobot):
     def read(self):
         return list(super().read())[::-1]
 
@@ -227,17 +227,17 @@ class StatesWithoutMeasurement(EmulatedAnkleRobot):
         return [replace(state, measured=math.nan) for state in super().read()]
 
 
-class CommandsNotTold(EmulatedAnkleRobot):
+class CommandsNotReported(EmulatedAnkleRobot):
     def read(self):
         return [replace(state, commanded=0.0) for state in super().read()]
 
 
-class ComesLate(IdealAnkleRobot):
+class PushesLate(IdealAnkleRobot):
     def schedule(self, train):
         super().schedule(train.shifted(80_000_000))
 
 
-class ComesEarly(IdealAnkleRobot):
+class PushesEarly(IdealAnkleRobot):
     def schedule(self, train):
         super().schedule(train.shifted(-5_000_000))
 
@@ -258,7 +258,7 @@ class Hangs(IdealAnkleRobot):
         return super().promise(until)
 
 
-# Each with the checks that must catch it, and a word of the sentence.
+# Each with a check that must catch it, and a pattern of the sentence.
 BROKEN = [
     (NoPeakTorque, "construction", "peak_torque: 0"),
     (UnexplainedOptions, "construction", "rate does not state its meaning"),
@@ -267,14 +267,14 @@ BROKEN = [
     (FailsToDeactivate, "lifecycle", "Deactivating failed: driver_failed"),
     (PushesWithoutTrain, "idle", "0.6 N m without a train"),
     (PushesWithoutTrain, "order", "without a train"),
-    (FaultWhileAllIsWell, "idle", "fault: odd"),
-    (FaultWhileAllIsWell, "states", "reports odd|latched"),
+    (FaultWithoutReason, "idle", "fault: odd"),
+    (FaultWithoutReason, "states", "reports odd|latched"),
     (SwallowsAPulse, "pulses", "Onsets"),
     (SwallowsAPulse, "in_turn", "were scheduled"),
-    (ForgetsTheTrainBefore, "in_turn", "were scheduled"),
-    (KnowsOnlySquares, "shapes", "A pulse of 1.02 N m s had 1.6 N m s"),
+    (ForgetsThePreviousTrain, "in_turn", "were scheduled"),
+    (KnowsOnlySquarePulses, "shapes", "A pulse of 1.02 N m s had 1.6 N m s"),
     (WrongSign, "pulses", "had -"),
-    (OnsetsNotTold, "pulses", "Onsets"),
+    (OnsetsNotReported, "pulses", "Onsets"),
     (HalfTheImpulse, "pulses", "had 0.6 N m s"),
     (DependsOnTheCuts, "cuts", "promised in pieces"),
     (Overshoots, "at_limits", "torque_exceeded"),
@@ -286,19 +286,19 @@ BROKEN = [
     (StopBlocks, "stopping_in_mid_pulse", "did not return"),
     (StopRaises, "stopping_in_every_state", "raised OSError"),
     (CloseRaises, "stopping_in_every_state", "raised OSError"),
-    (TakesTrainsAfterAStop, "stopping_in_every_state", "delivered a train"),
+    (AcceptsTrainsAfterAStop, "stopping_in_every_state", "delivered a train"),
     (GoesOnAfterDeactivating, "deactivating", "after deactivating"),
     (RemembersItsTrain, "new_run", "run before"),
     (RemembersItsTrain, "reconnecting", "after reconnecting"),
     (DoesNotAdjoin, "idle", "does not adjoin"),
-    (TellsNan, "idle", "not all finite"),
-    (StatesGoBack, "states", "RobotState.* after"),
+    (PromisesNan, "idle", "not all finite"),
+    (StatesGoBackwards, "states", "RobotState.* after"),
     (StatesAreRare, "states", "States came at 2.. Hz"),
     (StatesWithoutMeasurement, "states", "measured=nan"),
     (RateInKilohertz, "states", "States came at 5.* Hz; promised: 0.5 Hz"),
-    (CommandsNotTold, "states", "No state shows"),
-    (ComesLate, "timing", r"\+80.0 ms"),
-    (ComesEarly, "timing", "do not appear in the states"),
+    (CommandsNotReported, "states", "No state shows"),
+    (PushesLate, "timing", r"\+80.0 ms"),
+    (PushesEarly, "timing", "do not appear in the states"),
     (Dawdles, "prompt_calls", "Nine in ten calls"),
     (Hangs, "prompt_calls", "slowest 2"),
 ]  # fmt: skip

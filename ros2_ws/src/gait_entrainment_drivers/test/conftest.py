@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The device of these tests runs in the torque loop's process, which must find its module too."""
+"""Make the module of the test device importable, also in the process of the torque loop."""
 
 import os
 import sys

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The motor emulator as a process of its own, on a bus of its own."""
+"""The motor emulator in its own process, on its own bus."""
 
 import contextlib
 import socket
@@ -14,8 +14,8 @@ CHANNEL = "239.74.163.2"
 
 @contextlib.contextmanager
 def emulator(*arguments, trace=None, program="ak_motor_emulator", driver="ak_mit_can"):
-    """Run an emulator; yields the text that names the driver for it."""
-    # A port of its own keeps a test apart from others that run at the same time.
+    """Run an emulator; yield the text that selects the driver for it."""
+    # A separate port keeps tests that run at the same time apart.
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind(("", 0))
         port = free.getsockname()[1]
@@ -26,7 +26,7 @@ def emulator(*arguments, trace=None, program="ak_motor_emulator", driver="ak_mit
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
         assert "ready" in process.stdout.readline()
-        # Patience for a machine that others share; the limits themselves are tested one by one.
+        # Generous limits for a shared machine; each limit has its own test.
         generous = "rate=250,silence=0.3,lateness=0.5,host_silence=3"
         yield f"{driver}:interface=udp_multicast,channel={CHANNEL},port={port},{generous}"
     finally:
@@ -36,14 +36,14 @@ def emulator(*arguments, trace=None, program="ak_motor_emulator", driver="ak_mit
 
 
 def read_trace(path):
-    """Time [ns], command and torque [N m] of each complete line."""
+    """Return time [ns], command and torque [N m] of each complete line."""
     lines = path.read_text().splitlines(keepends=True)
     rows = [line.split() for line in lines if line.endswith("\n")]
     return [(int(time_ns), float(command), float(torque)) for time_ns, command, torque in rows]
 
 
 def until(condition, timeout=10.0):
-    """Wait for a condition, with an end."""
+    """Wait until a condition holds, at most for a timeout [s]."""
     give_up = time.monotonic() + timeout
     while not condition():
         assert time.monotonic() < give_up, "it did not happen in time"

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A device without hardware that misbehaves as it is told to, and traces its commands."""
+"""A device without hardware that misbehaves on request and traces its commands."""
 
 import math
 import time
@@ -20,15 +20,15 @@ OVERHEATED = Fault("overheated", "The motor is too hot.")
 
 @dataclass(frozen=True)
 class MisbehavingOptions(LoopOptions):
-    """What goes wrong, from when on, and where commands are noted."""
+    """What goes wrong, when it starts, and the file that commands are written to."""
 
     does: str = setting("nothing", "what goes wrong")
-    after: float = setting(0.0, "since the first torque that was asked for", "s", (0.0, 100.0))
+    after: float = setting(0.0, "since the first command of torque", "s", (0.0, 100.0))
     trace: str = setting("", "file for time [ns] and commanded torque [N m]")
 
 
 class MisbehavingDevice(TorqueDevice):
-    """Follows its command by a lag of 30 Hz, until it does not."""
+    """Follows its command with a lag of 30 Hz until it misbehaves."""
 
     name = "bench device"
 
@@ -49,17 +49,17 @@ class MisbehavingDevice(TorqueDevice):
         """Nothing to enable."""
 
     def forget(self) -> None:
-        """No answer is ever waiting."""
+        """No answer is ever left over."""
 
     def disable(self) -> None:
-        """Note it."""
+        """Write it to the trace, as NaN."""
         self._note(math.nan)
 
     def shut(self) -> None:
         """Nothing to release."""
 
     def exchange(self, torque: float, timeout: float) -> Reading | None:
-        """Follow the command, or do what goes wrong."""
+        """Follow the command, or misbehave."""
         now = time.monotonic()
         if torque and math.isinf(self._first):
             self._first = now
@@ -73,7 +73,7 @@ class MisbehavingDevice(TorqueDevice):
         if does == "stutter":
             time.sleep(0.1)
         reading = Reading(self._follow(torque, now), 0.1, 0.0, 30.0)
-        if does == "answer no more":
+        if does == "stop answering":
             time.sleep(timeout)
             return None
         return {

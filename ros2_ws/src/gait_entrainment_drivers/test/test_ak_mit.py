@@ -32,7 +32,7 @@ def test_golden_frame():
     assert data.hex(" ").upper() == "7F FF 7F F0 00 00 0B 32"
 
 
-def test_zero_torque_is_sent_as_the_code_below_zero():
+def test_zero_torque_is_sent_as_the_code_just_below_zero():
     torque = unpack_command(pack_command(Command(), MOTORS["AK70-10"]), MOTORS["AK70-10"]).torque
     assert torque == pytest.approx(-0.0061, abs=1e-4)
     assert abs(torque) < resolution(MOTORS["AK70-10"])
@@ -91,7 +91,7 @@ def test_any_command_arrives_clamped_and_within_one_step(name, position, velocit
         step = (high - low) / (2**bits - 1)
         assert low <= got <= high
         assert -1e-6 * step <= min(max(value, low), high) - got <= step
-    # What was decoded is a code of its own: it packs to itself.
+    # A decoded value has its own code: it packs to the same bytes.
     assert pack_command(back, motor) == data
 
 
@@ -112,7 +112,7 @@ def test_replies_of_both_lengths(name, motor_id, position, velocity, torque, len
 
 
 @pytest.mark.parametrize("length", [0, 1, 5, 7])
-def test_other_lengths_are_no_reply(length):
+def test_other_lengths_are_not_a_reply(length):
     assert unpack_reply(bytes(length), MOTORS["AK80-9"]) is None
 
 

@@ -46,7 +46,7 @@ def pulses(robot, count=2, torque=8.0, duration=0.15, after=0.1):
 
 
 def follow(robot, seconds):
-    """Promise and read until a time is over; return profiles and states."""
+    """Promise and read for a time [s]; return profiles and states."""
     profiles, states = [], []
     end = time.monotonic() + seconds
     while time.monotonic() < end:
@@ -80,7 +80,7 @@ def test_pulses_arrive_and_are_measured(reply_bytes, tmp_path):
         )
     ]
     impulse = sum((end - begin) / 1e9 * torque for begin, end, torque in pieces)
-    # Two pulses of 8 N m and 0.15 s, up to the ticks of the loop and frames that were lost.
+    # Two pulses of 8 N m and 0.15 s, give or take the loop's ticks and lost frames.
     assert impulse == pytest.approx(2 * 8 * 0.15, rel=0.15)
     measured = MeasuredOnsets()
     measured.add_promise(onsets, states[-1].stamp)
@@ -91,16 +91,16 @@ def test_pulses_arrive_and_are_measured(reply_bytes, tmp_path):
     measured.finish()
     for timing in measured.timings:
         assert timing.commanded <= timing.sent
-        # Interpolated between two states: a motor that answers within the tick in which it was
-        # told is placed up to a tick earlier.
+        # Interpolated between two states: a motor that answers within the tick of its
+        # command is placed up to a tick earlier.
         before = max(state.stamp for state in states if state.stamp < timing.sent)
         assert before <= timing.measured
     rows = read_trace(trace)
-    assert rows[-1][1] == pytest.approx(0.0, abs=0.01)  # zero before the end
+    assert rows[-1][1] == pytest.approx(0.0, abs=0.01)  # zero is commanded before the end
     assert max(row[2] for row in rows) == pytest.approx(8.0, abs=0.05)
 
 
-def test_it_is_refused_without_arming():
+def test_pulses_are_refused_without_arming():
     with emulator() as driver, robot_on(driver) as robot:
         robot.configure()
         robot.activate()
@@ -109,7 +109,7 @@ def test_it_is_refused_without_arming():
             pulses(robot)
 
 
-def test_a_pulse_that_is_over_already_is_refused_without_a_fault():
+def test_a_pulse_in_the_past_is_refused_without_a_fault():
     with emulator() as driver, robot_on(driver) as robot:
         enabled(robot)
         robot.promised_until = 0
@@ -128,7 +128,7 @@ def test_a_silent_motor_is_a_fault_and_ends_the_train():
         assert states[-1].commanded == 0.0 or robot.read()[-1].commanded == 0.0
 
 
-def test_an_error_of_the_motor_is_a_fault_with_its_name():
+def test_a_motor_error_is_a_named_fault():
     with emulator("--error", "2", "--error-after", "0.05") as driver, robot_on(driver) as robot:
         enabled(robot)
         pulses(robot, duration=0.3)
@@ -136,7 +136,7 @@ def test_an_error_of_the_motor_is_a_fault_with_its_name():
         assert [fault.name for fault in robot.faults] == ["over_current"]
         with pytest.raises(DeviceError, match="latched"):
             pulses(robot)
-        # Recovery is an explicit step, and is refused while the error is there.
+        # Recovery is an explicit step, and is refused while the error persists.
         robot.close()
         with pytest.raises(DeviceError, match=r"over-current\. Remove the cause"):
             robot.configure()
@@ -173,13 +173,13 @@ def test_a_motor_has_one_master_at_a_time():
         assert not first.faults
         first.close()
         enabled(second)
-        # Its death, in whatever way, lets others in too.
+        # However its process ends, the motor is free again.
         os.kill(second._robot._process.pid, signal.SIGKILL)
         second._robot._process.wait()
         enabled(first)
 
 
-def test_other_motors_on_the_bus_are_not_held(tmp_path):
+def test_other_motors_on_the_bus_are_not_locked(tmp_path):
     with emulator(trace=tmp_path / "trace") as driver, robot_on(driver) as robot:
         enabled(robot)
         with pytest.raises(DeviceError, match="motor 2 does not answer"):
@@ -210,7 +210,7 @@ def torque_of(trace):
 
 
 def kill(host, *, with_its_loop):
-    """Kill a host; its torque loop is a process of its own."""
+    """Kill a host; its torque loop is a separate process."""
     children = Path(f"/proc/{host.pid}/task/{host.pid}/children").read_text().split()
     if with_its_loop:
         for child in children:
@@ -224,7 +224,7 @@ def kill(host, *, with_its_loop):
     [
         (True, "0", 8.0),  # the hazard that no software on the host can remove
         (True, "0.05", 0.0),
-        (False, "0", 0.0),  # the loop sees that its host is gone
+        (False, "0", 0.0),  # the loop notices that its host is gone
     ],
 )
 def test_what_a_killed_host_leaves_behind(with_its_loop, timeout, torque, tmp_path):
@@ -238,7 +238,7 @@ def test_what_a_killed_host_leaves_behind(with_its_loop, timeout, torque, tmp_pa
     assert read_trace(trace)[-1][2] == pytest.approx(torque, abs=0.1)
 
 
-def test_a_loop_that_was_frozen_goes_on_to_zero_when_its_host_is_killed(tmp_path):
+def test_a_loop_that_was_frozen_commands_zero_once_its_host_is_killed(tmp_path):
     trace = tmp_path / "trace"
     freeze = "time.sleep(0.3); frozen = robot._robot.frozen(); frozen.__enter__(); print('frozen')"
     with emulator(trace=trace) as driver:
@@ -261,7 +261,7 @@ def test_a_loop_that_was_frozen_goes_on_to_zero_when_its_host_is_killed(tmp_path
         "time.sleep(0.3)\nwith robot: raise ValueError",
     ],
 )
-def test_a_host_that_ends_by_itself_leaves_zero_torque(end, tmp_path):
+def test_a_host_that_exits_leaves_zero_torque(end, tmp_path):
     trace = tmp_path / "trace"
     with emulator(trace=trace) as driver:
         host = host_that(end, driver)
@@ -280,7 +280,7 @@ def test_a_host_that_ends_by_itself_leaves_zero_torque(end, tmp_path):
         ("rate=5000", "rate: '5000'"),
     ],
 )
-def test_a_wrong_option_is_told_in_one_line(options, words):
+def test_a_wrong_option_gives_a_one_line_error(options, words):
     with pytest.raises(LimitError, match=words) as error:
         find_driver(f"ak_mit_can:{options}")
     assert "\n" not in str(error.value)
@@ -297,7 +297,7 @@ def test_a_wrong_option_is_told_in_one_line(options, words):
         ),
     ],
 )
-def test_a_missing_bus_or_motor_is_told_in_one_line(options, words):
+def test_a_missing_bus_or_motor_gives_a_one_line_error(options, words):
     robot = find_driver(f"ak_mit_can:{options}").make(Side.RIGHT)
     with pytest.raises(DeviceError, match=words) as error:
         robot.configure()
@@ -305,7 +305,7 @@ def test_a_missing_bus_or_motor_is_told_in_one_line(options, words):
     assert not robot.enabled
 
 
-def test_another_motors_id_is_named():
+def test_a_motor_with_another_id_does_not_answer():
     with (
         emulator("--motor-id", "5") as driver,
         pytest.raises(DeviceError, match="motor 1 does not answer"),
@@ -321,20 +321,20 @@ def test_the_emulated_motor_holds_its_command_across_modes_as_the_real_one_does(
     assert motor.torque == 0.0  # not enabled
     motor.receive(ENTER, 1.0)
     motor.advance(100.0)
-    assert motor.torque == pytest.approx(10.0, abs=0.01)  # the command from before, for ever
+    assert motor.torque == pytest.approx(10.0, abs=0.01)  # the earlier command, indefinitely
     motor.receive(EXIT, 100.0)
     motor.advance(101.0)
     assert motor.torque == pytest.approx(0.0, abs=1e-9)
 
 
-def test_a_bus_on_which_answers_never_end_does_not_hold_the_loop_up():
+def test_a_bus_with_endless_answers_does_not_hold_up_the_loop():
     class Babbling:
         def recv(self, timeout):
             assert timeout >= 0
-            assert time.monotonic() < begun + 1.0, "the loop reads on and on"
+            assert time.monotonic() < start + 1.0, "the loop never stops reading"
             return can.Message(arbitration_id=1, is_extended_id=False)
 
-    begun = time.monotonic()
+    start = time.monotonic()
     motor = AkMotorOnCan(AkMitCanOptions())
     motor._bus = Babbling()
-    assert motor._answer(lambda _: 5.0, begun + 0.02) == 5.0
+    assert motor._answer(lambda _: 5.0, start + 0.02) == 5.0

@@ -26,7 +26,7 @@ from gait_entrainment_drivers.proof import keep_proof, proof_of
 from .broken_robots import BROKEN
 from .emulator_process import emulator
 
-# A machine that others share wakes a process up late: the kit's own limits are for a quiet one.
+# A shared machine wakes processes up late; the kit's own limits are for a quiet one.
 PATIENT = Tolerances(
     onset=0.25, zero_within=1.0, watchdog=1.6, call=0.1, slowest_call=2.0, impulse=0.6
 )
@@ -34,7 +34,7 @@ PATIENT = Tolerances(
 
 @pytest.fixture
 def state(tmp_path, monkeypatch):
-    """Keep what is proved in a folder of the test's own."""
+    """Keep proofs in a temporary folder."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
 
 
@@ -73,11 +73,11 @@ def test_a_broken_driver_is_caught(broken, check, words):
 
 def test_every_check_can_fail():
     caught = {check for _, check, _ in BROKEN}
-    # Those that need real time, or a fault in the guard itself, are caught below.
+    # These two need real time or a faulty guard, and are made to fail below.
     assert {check.__name__ for check in CHECKS} - caught == {"stale_commands", "silent_host"}
 
 
-def test_silence_that_nobody_notices_is_caught(monkeypatch):
+def test_a_guard_that_misses_silence_is_caught(monkeypatch):
     from gait_entrainment.robot.guard import GuardedRobot
 
     monkeypatch.setattr(GuardedRobot, "_watch", lambda _: None)
@@ -94,7 +94,7 @@ HOLDS = (
 
 @pytest.mark.usefixtures("state")
 @pytest.mark.parametrize(("program", "name"), MOTORS)
-def test_a_motor_whose_watchdog_is_on_is_proved_and_remembered(program, name, capsys):
+def test_a_motor_with_a_watchdog_is_proved_and_its_proof_is_kept(program, name, capsys):
     with emulator("--timeout", "0.02", program=program, driver=name) as text:
         text = text.replace("rate=250", "rate=500")
         assert main(["driver", "prove", text, "--arm", "--json"]) == 0
@@ -107,9 +107,7 @@ def test_a_motor_whose_watchdog_is_on_is_proved_and_remembered(program, name, ca
 
 @pytest.mark.usefixtures("state")
 @pytest.mark.parametrize(("program", "name"), MOTORS)
-def test_a_motor_that_holds_its_last_command_is_caught_and_its_proof_taken_back(
-    program, name, capsys
-):
+def test_a_motor_that_holds_its_last_command_is_caught_and_loses_its_proof(program, name, capsys):
     with emulator(program=program, driver=name) as text:
         keep_proof(text, 0.05)
         assert main(["driver", "prove", text, "--arm"]) == 1
@@ -117,7 +115,7 @@ def test_a_motor_that_holds_its_last_command_is_caught_and_its_proof_taken_back(
         assert proof_of(text) is None
 
 
-def test_a_driver_that_cannot_fall_silent_proves_nothing():
+def test_a_driver_that_cannot_silence_its_host_is_not_provable():
     class Unprovable(MisbehavingRobot):
         frozen = AnkleRobot.frozen
 
@@ -141,9 +139,9 @@ def test_the_command_prints_a_sentence_for_each_promise(capsys):
     assert {check["check"] for check in report["checks"]} == {c.__name__ for c in CHECKS}
 
 
-def test_a_broken_promise_is_exit_code_1(capsys, monkeypatch):
+def test_a_broken_promise_gives_exit_code_1(capsys, monkeypatch):
     monkeypatch.setitem(OWN_DRIVERS, "late", "late:Late")
-    late = next(b for b, check, _ in BROKEN if b.__name__ == "ComesLate")
+    late = next(b for b, check, _ in BROKEN if b.__name__ == "PushesLate")
     monkeypatch.setitem(sys.modules, "late", SimpleNamespace(Late=late))
     assert main(["driver", "check", "late"]) == 1
     out, err = capsys.readouterr()
@@ -164,7 +162,7 @@ def test_a_broken_promise_is_exit_code_1(capsys, monkeypatch):
         (["ak_mit_can:interface=virtual,channel=x", "--arm"], "motor 1 does not answer"),
     ],
 )
-def test_a_mistake_gives_one_line(capsys, arguments, words):
+def test_a_mistake_gives_a_one_line_error(capsys, arguments, words):
     assert main(["driver", "check", *arguments]) in (1, 2)  # failed, or wrong usage
     out, err = capsys.readouterr()
     assert out == ""
@@ -172,7 +170,7 @@ def test_a_mistake_gives_one_line(capsys, arguments, words):
     assert re.search(words, err)
 
 
-def test_the_list_tells_every_driver_and_option(capsys):
+def test_the_list_has_every_driver_and_option(capsys):
     assert main(["driver", "list"]) == 0
     out = capsys.readouterr().out
     for words in ("ideal: ", "emulated: ", "ak_mit_can: ", "motor=AK80-9", "AK60-6, AK70-10"):
@@ -189,7 +187,7 @@ def run_plugin(folder, *options):
     )
     command = [sys.executable, "-m", "pytest", "-q", "--disable-plugin-autoload", "-p"]
     command += ["gait_entrainment_drivers.pytest_plugin", "-p", "no:cacheprovider", *options]
-    # What colcon test asks of the outer pytest is not for this one.
+    # Options that colcon test gives the outer pytest are not for this one.
     environment = {k: v for k, v in os.environ.items() if k != "PYTEST_ADDOPTS"}
     return subprocess.run(
         [*command, "--rootdir", str(folder), str(folder)],
@@ -197,21 +195,21 @@ def run_plugin(folder, *options):
     )  # fmt: skip
 
 
-def test_the_plugin_makes_one_test_of_each_check(tmp_path):
+def test_the_plugin_turns_each_check_into_a_test(tmp_path):
     (tmp_path / "pytest.ini").write_text("[pytest]\nankle_robots = ideal\n")
     done = run_plugin(tmp_path, "--ankle-robot", "emulated:delay=0.08")
-    # Late by more than the kit allows: the one promise that is broken.
+    # Later than the kit allows: the only broken promise.
     assert done.returncode == 1
     assert f"1 failed, {2 * len(CHECKS) - 1} passed" in done.stdout
     assert "allowed: -2.0 to +60.0 ms" in done.stdout
 
 
-def test_the_plugin_leaves_real_torque_alone(tmp_path):
+def test_the_plugin_skips_drivers_that_apply_real_torque(tmp_path):
     done = run_plugin(tmp_path, "--ankle-robot", "ak_mit_can")
     assert f"{len(CHECKS)} skipped" in done.stdout
 
 
-def test_tolerances_are_the_labs_own():
+def test_a_lab_can_set_its_own_tolerances():
     strict = replace(Tolerances(), onset=0.001)
     result = run_check(checks.timing, DriverBench(find_driver("emulated"), strict))
     assert "allowed: -2.0 to +1.0 ms" in result.broken

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The emulated robot: closed forms of its flaws, one at a time, and the same whatever the cuts."""
+"""The emulated robot: closed forms of each flaw, and the same results however it is cut."""
 
 import itertools
 import math
@@ -31,7 +31,7 @@ def train(count=1, period=0.5, torque=10.0, duration=0.2):
 
 
 def pieces(profiles):
-    """Torque on each millisecond, from profiles that adjoin."""
+    """Return the torque in each millisecond of adjoining profiles."""
     torques = []
     for profile in profiles:
         ends = [*profile.times[1:], profile.valid_until]
@@ -79,7 +79,7 @@ def test_resolution_is_the_step_of_the_command():
     assert torques[-1] == 0.0
 
 
-def test_noise_and_bias_are_those_of_the_measurement_alone():
+def test_noise_and_bias_affect_only_the_measurement():
     _, states = delivered("noise=0.3,bias=-0.5,state_rate=1000", until=20_000)
     quiet = [state.measured for state in states if state.stamp > 1000 * MS]
     # Mean and deviation of n samples lie within 5 standard errors.
@@ -87,7 +87,7 @@ def test_noise_and_bias_are_those_of_the_measurement_alone():
     assert statistics.stdev(quiet) == pytest.approx(0.3, abs=5 * 0.3 / (2 * len(quiet)) ** 0.5)
 
 
-def test_jitter_comes_late_within_its_bound_and_is_not_the_same_for_every_pulse():
+def test_jitter_delays_pulses_within_its_bound_and_differs_between_them():
     torques, _ = delivered(EXACT.replace("jitter=0", "jitter=0.02"), train(40, 0.4), 17_000)
     onsets = [k for k in range(1, len(torques)) if torques[k] and not torques[k - 1]]
     late = [onset - 100 - 400 * n for n, onset in enumerate(onsets)]
@@ -113,7 +113,7 @@ def test_a_lost_command_leaves_the_last_one_in_force():
     seed=st.integers(0, 2**32),
     duration=st.floats(0.001, 0.25),
 )
-def test_however_it_is_cut_the_same_torque_and_states(cuts, seed, duration):
+def test_torque_and_states_do_not_depend_on_the_cuts(cuts, seed, duration):
     options = "jitter=0.01,loss=0.2,noise=0.5,state_rate=250"
     pulses = train(4, 0.26, duration=duration)
     whole, cut = robot(options, seed), robot(options, seed)
@@ -132,14 +132,14 @@ def test_however_it_is_cut_the_same_torque_and_states(cuts, seed, duration):
     assert list(cut.read()) == list(whole.read())
 
 
-def test_another_seed_gives_other_numbers_and_the_same_seed_the_same():
+def test_only_the_same_seed_gives_the_same_numbers():
     first, second, other = (delivered("", seed=seed)[1] for seed in (1, 1, 2))
     assert first == second
     assert first != other
     assert len(first) == 500
 
 
-def test_cancelling_ends_the_torque_at_once():
+def test_cancelling_ends_the_torque_immediately():
     made = robot("")
     made.schedule(train())
     assert made.promise(200 * MS).torques[-1] > 5

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The CAN drivers frame by frame: transmission, foreign frames, order of what is sent."""
+"""The CAN drivers frame by frame: transmission, foreign frames, order of commands."""
 
 import math
 
@@ -50,15 +50,15 @@ RATIOS = [-9.0, -0.5, 1.0, 3.0]
 
 
 class Wire:
-    """A bus with one motor on it; a second passes with each frame, so that torque settles."""
+    """A bus with one motor; a second passes with each frame, which lets torque settle."""
 
     def __init__(self, motor):
         self.motor = motor
         self.sent = []
-        self.strongest = 0.0  # torque that the motor ever showed [N m]
+        self.strongest = 0.0  # largest torque so far [N m]
         self.waiting = []
-        self.lost = set()  # ids of frames that get lost on the way to the motor
-        self.echo = False  # the adapter returns what was sent
+        self.lost = set()  # ids of frames lost on the way to the motor
+        self.echo = False  # whether the adapter returns sent frames
         self.now = 0.0
 
     def send(self, message):
@@ -113,18 +113,18 @@ def test_torque_goes_through_the_transmission_and_back(make, ratio):
         reading = robot.exchange(torque, 1.0)
         assert reading.torque == pytest.approx(torque, abs=2 * step * abs(ratio))
     robot.exchange(0.0, 1.0)
-    if make is ak:  # zero has no code of its own
+    if make is ak:  # zero itself has no code
         assert robot.exchange(0.0, 1.0).torque == 0.0
 
 
 @pytest.mark.parametrize("ratio", RATIOS)
-def test_angle_and_torque_are_the_ankles(ratio):
+def test_angle_and_torque_are_those_of_the_ankle(ratio):
     robot, wire = ak(ratio)
-    wire.motor = Telling([(0, pack_reply(Reply(1, 1.5, 0.0, 0.0), AK, 8))])
+    wire.motor = SameAnswer([(0, pack_reply(Reply(1, 1.5, 0.0, 0.0), AK, 8))])
     assert robot.exchange(0.0, 1.0).angle == pytest.approx(1.5 / ratio, abs=1e-3 / abs(ratio))
     robot, wire = odrive(ratio)
     estimates = PAIR.pack(0.25, 0.0)  # a quarter of a turn
-    wire.motor = Telling(
+    wire.motor = SameAnswer(
         [(frame_id(0, ENCODER), estimates), (frame_id(0, TORQUES), PAIR.pack(7.0, 2.0))]
     )
     reading = robot.exchange(7.0, 1.0)
@@ -132,7 +132,7 @@ def test_angle_and_torque_are_the_ankles(ratio):
     assert reading.torque == pytest.approx(2.0 * ratio)  # the estimate, not the target
 
 
-def test_an_odrive_whose_heartbeat_is_switched_off_is_asked_for_it(monkeypatch):
+def test_an_odrive_with_its_heartbeat_switched_off_is_polled_for_it(monkeypatch):
     monkeypatch.setattr(odrive_can, "HEARTBEAT_PERIOD", 0.0)
     robot, wire = odrive()  # this bus carries answers only
     robot.enable()
@@ -142,11 +142,11 @@ def test_an_odrive_whose_heartbeat_is_switched_off_is_asked_for_it(monkeypatch):
 
 
 def faults_of(robot):
-    """Return the faults of the second of two readings: by then everything has been asked for."""
+    """Return the faults of the second of two readings: by then everything has been polled."""
     return [robot.exchange(0.0, 1.0), robot.exchange(0.0, 1.0)][1].faults
 
 
-def test_an_odrive_whose_heartbeat_stays_away_is_a_fault_by_name(monkeypatch):
+def test_a_missing_odrive_heartbeat_is_a_named_fault(monkeypatch):
     robot, wire = odrive()
     robot.enable()
     assert faults_of(robot) == ()
@@ -155,7 +155,7 @@ def test_an_odrive_whose_heartbeat_stays_away_is_a_fault_by_name(monkeypatch):
     assert faults_of(robot) == (odrive_can.NO_HEARTBEAT,)
 
 
-def test_an_odrive_that_tells_its_angle_no_longer_does_not_stay_at_it(monkeypatch):
+def test_the_angle_of_an_odrive_that_stops_reporting_it_becomes_nan(monkeypatch):
     robot, wire = odrive()
     robot.enable()
     assert [robot.exchange(0.0, 1.0), robot.exchange(0.0, 1.0)][1].angle == 0.0
@@ -166,7 +166,7 @@ def test_an_odrive_that_tells_its_angle_no_longer_does_not_stay_at_it(monkeypatc
 
 @pytest.mark.parametrize("make", [ak, odrive])
 @pytest.mark.parametrize("echo", [False, True])
-def test_who_sends_the_very_same_commands_is_a_second_master_an_echo_is_none(make, echo):
+def test_a_sender_of_identical_commands_is_a_second_master_but_an_echo_is_not(make, echo):
     robot, wire = make()
     robot.enable()
     for tick in range(150):
@@ -177,18 +177,18 @@ def test_who_sends_the_very_same_commands_is_a_second_master_an_echo_is_none(mak
 
 
 @pytest.mark.parametrize("error", [HOT, 0])
-def test_an_odrive_says_why_it_disarmed_before_its_heartbeat_does(error):
+def test_why_an_odrive_disarmed_is_known_before_its_heartbeat_arrives(error):
     robot, wire = odrive()
     robot.enable()
     assert faults_of(robot) == ()
     wire.lost.add(frame_id(0, HEARTBEAT))
     wire.motor.error = HOT
     wire.motor.advance(wire.now)
-    wire.motor.error = error  # it may be over by now
+    wire.motor.error = error  # it may have cleared by now
     assert [fault.name for fault in faults_of(robot)] == ["motor_too_hot"]
 
 
-def test_why_an_odrive_disarmed_before_it_was_enabled_is_no_fault():
+def test_a_disarm_reason_from_before_enabling_is_not_a_fault():
     robot, wire = odrive()
     wire.lost.add(frame_id(0, CLEAR_ERRORS))
     wire.motor._reason = HOT
@@ -196,7 +196,7 @@ def test_why_an_odrive_disarmed_before_it_was_enabled_is_no_fault():
     assert faults_of(robot) == ()
 
 
-class Telling:
+class SameAnswer:
     """A motor that answers each frame in the same way."""
 
     torque = 0.0
@@ -212,22 +212,22 @@ class Telling:
 
 
 @pytest.mark.parametrize("make", [ak, odrive])
-def test_a_command_that_the_motor_still_holds_is_never_delivered(make):
+def test_a_command_left_in_the_motor_is_never_delivered(make):
     robot, wire = make()
     motor = wire.motor
     if make is odrive:
         motor._mode = TORQUE_MODE
-    motor.command = 10.0  # of a host that was killed
+    motor.command = 10.0  # left by a killed host
     robot.enable()
     assert motor.enabled
     assert wire.strongest < 0.01
     robot.exchange(10.0, 1.0)
     robot.shut()
     assert not motor.enabled
-    assert abs(motor.command) < 0.01  # motors hold it across modes
+    assert abs(motor.command) < 0.01  # motors keep it across modes
 
 
-def test_ak_motors_get_zero_before_each_change_of_mode():
+def test_ak_motors_get_zero_before_each_mode_change():
     robot, wire = ak()
     zero = pack_command(Command(), AK)
     robot.enable()
@@ -236,15 +236,15 @@ def test_ak_motors_get_zero_before_each_change_of_mode():
         assert wire.sent[wire.sent.index(change) - 1] == zero
 
 
-def test_an_ak_motor_that_missed_the_change_of_mode_is_told_again(monkeypatch):
+def test_a_mode_change_that_an_ak_motor_missed_is_repeated(monkeypatch):
     robot, wire = ak()
-    tell, missed = robot._tell, []
+    send, missed = robot._tell, []
 
     def lose_the_first(data):
         if data == ENTER and not missed:
             missed.append(data)
         else:
-            tell(data)
+            send(data)
 
     monkeypatch.setattr(robot, "_tell", lose_the_first)
     robot.enable()
@@ -252,7 +252,7 @@ def test_an_ak_motor_that_missed_the_change_of_mode_is_told_again(monkeypatch):
     assert wire.motor.enabled
 
 
-def test_an_odrive_that_missed_its_mode_is_told_again(monkeypatch):
+def test_a_mode_command_that_an_odrive_missed_is_repeated(monkeypatch):
     robot, wire = odrive()
     command, missed = robot._command, []
 
@@ -270,9 +270,9 @@ def test_an_odrive_that_missed_its_mode_is_told_again(monkeypatch):
 
 
 @pytest.mark.parametrize("make", [ak, odrive])
-def test_frames_that_are_no_data_frames_of_the_motor_are_no_answer(make):
+def test_frames_other_than_the_motors_data_frames_are_ignored(make):
     robot, wire = make()
-    wire.motor = Telling([])
+    wire.motor = SameAnswer([])
     answer = pack_reply(Reply(1, 0.0, 0.0, 9.0), AK, 8)
     identifier = 0
     if make is odrive:
@@ -291,7 +291,7 @@ def test_frames_that_are_no_data_frames_of_the_motor_are_no_answer(make):
 
 @pytest.mark.parametrize("make", [ak, odrive])
 @pytest.mark.parametrize("torque", [-2.0, 2.0])
-def test_a_motor_with_torque_at_zero_command_is_refused_and_named(make, torque, monkeypatch):
+def test_a_motor_with_torque_at_zero_command_is_refused_with_a_hint(make, torque, monkeypatch):
     monkeypatch.setattr("gait_entrainment_drivers.can_motor.ANSWER_TIMEOUT", 0.05)
     robot, wire = make()
     if make is ak:
@@ -299,14 +299,14 @@ def test_a_motor_with_torque_at_zero_command_is_refused_and_named(make, torque, 
     else:
         closed = pack_heartbeat(Heartbeat(0, CLOSED_LOOP))
         frames = [(frame_id(0, HEARTBEAT), closed), (frame_id(0, TORQUES), PAIR.pack(0.0, torque))]
-    wire.motor = Telling(frames)
+    wire.motor = SameAnswer(frames)
     with pytest.raises(DeviceError, match=r"at zero command: is it (AK80-9|calibrated)\?"):
         robot.enable()
     robot.shut()
     assert wire.sent[-1] == (EXIT if make is ak else STATE.pack(IDLE))
 
 
-def test_what_the_manual_says():
+def test_constants_match_the_manual():
     assert EXIT.hex() == "fffffffffffffffd"
     assert {
         "AK60-6": AkMotor(45.0, 15.0),

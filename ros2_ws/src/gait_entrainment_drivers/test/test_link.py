@@ -19,14 +19,14 @@ COUNT = 3000
 def ends():
     ours, theirs = map(Link, socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET))
     interval = sys.getswitchinterval()
-    sys.setswitchinterval(1e-6)  # threads take turns at every chance
+    sys.setswitchinterval(1e-6)  # threads take turns as often as possible
     yield ours, theirs
     sys.setswitchinterval(interval)
     ours.close()
     theirs.close()
 
 
-def test_what_several_threads_send_comes_once_and_in_their_order(ends):
+def test_messages_from_several_threads_arrive_once_and_in_order(ends):
     ours, theirs = ends
 
     def send(name):
@@ -39,14 +39,14 @@ def test_what_several_threads_send_comes_once_and_in_their_order(ends):
     received, give_up = [], time.monotonic() + 30
     while len(received) < 3 * COUNT and time.monotonic() < give_up:
         received += theirs.received()
-        ours.send_samples([])  # nothing new: only what waits
+        ours.send_samples([])  # nothing new, only what is still waiting
     for thread in threads:
         thread.join()
     for name in ("alive", "stop", "cancel"):
         assert [number for kind, number in received if kind == name] == list(range(COUNT))
 
 
-def test_a_message_longer_than_the_sockets_buffer_comes_whole_and_a_stop_behind_it(ends):
+def test_a_message_longer_than_the_socket_buffer_arrives_complete_before_a_later_stop(ends):
     ours, theirs = ends
     train = "x" * 1_000_000
     ours.send("train", train)

@@ -71,12 +71,12 @@ def test_any_value_arrives(first, second, error, state):
 
 
 @pytest.mark.parametrize("length", [0, 3, 4, 7])
-def test_frames_of_other_lengths_are_not_taken(length):
+def test_frames_that_are_too_short_are_rejected(length):
     assert unpack(PAIR, bytes(length)) is None
     assert (unpack_heartbeat(bytes(length)) is None) is (length < 5)
 
 
-def test_errors_are_faults_by_name():
+def test_errors_are_named_faults():
     assert faults_of(0) == ()
     assert [fault.name for fault in faults_of(0x03000000)] == ["motor_watchdog", "emergency_stop"]
     assert [fault.name for fault in faults_of(0x80000000)] == ["motor_error_0x80000000"]

@@ -40,7 +40,7 @@ NODE = 3
 
 @contextlib.contextmanager
 def axis(*options, trace=None):
-    """Run an emulated axis; yields the text that names the driver for it."""
+    """Run an emulated axis; yield the text that selects the driver for it."""
     arguments = ("--node-id", str(NODE), *options)
     with emulator(
         *arguments, trace=trace, program="odrive_emulator", driver="odrive_can"
@@ -53,7 +53,7 @@ def robot_on(driver):
 
 
 @pytest.mark.parametrize("name", ["pulses", "stopping_in_mid_pulse", "reconnecting"])
-def test_the_kit_finds_the_promises_kept(name):
+def test_the_driver_keeps_its_promises(name):
     check = next(check for check in CHECKS if check.__name__ == name)
     with axis("--timeout", "0.9", "--loss", "0.01") as driver:
         result = run_check(check, DriverBench(find_driver(driver), PATIENT))
@@ -65,7 +65,7 @@ def test_an_error_disarms_and_is_a_fault_that_only_an_explicit_step_clears():
         enabled(robot)
         pulses(robot, duration=0.4)
         _, states = follow(robot, 5.0)
-        # It stops following at once, its heartbeat comes up to 0.1 s later: it was asked why.
+        # It stops following up to 0.1 s before its heartbeat arrives, so it was asked why.
         assert [fault.name for fault in robot.faults] == ["motor_too_hot"]
         assert max(state.measured for state in states) > 7
         robot.close()
@@ -74,14 +74,14 @@ def test_an_error_disarms_and_is_a_fault_that_only_an_explicit_step_clears():
             enabled(robot)
 
 
-def test_the_axis_says_which_firmware_it_runs():
+def test_the_axis_reports_its_firmware():
     with axis() as driver, robot_on(driver) as robot:
         assert robot.identity == ""
         robot.configure()
         assert robot.identity == "ODrive 5.2.0, firmware 0.6.11"
 
 
-def test_an_axis_that_is_not_there_is_told_with_those_that_are():
+def test_a_missing_axis_is_reported_with_those_that_are_present():
     with (
         axis() as driver,
         pytest.raises(DeviceError, match=r"ODrive 4 does not answer by CANSimple.*others do: 3"),
@@ -99,7 +99,7 @@ def test_a_silent_axis_is_a_fault(tmp_path):
         pulses(robot, duration=0.5)
         follow(robot, 5.0)
         assert [fault.name for fault in robot.faults] == ["device_silent"]
-        until(lambda: abs(read_trace(trace)[-1][2]) < 0.05)  # it still heard
+        until(lambda: abs(read_trace(trace)[-1][2]) < 0.05)  # it still receives commands
 
 
 class Axis(EmulatedOdrive):
@@ -108,7 +108,7 @@ class Axis(EmulatedOdrive):
     def __init__(self, timeout):
         super().__init__(NODE, bandwidth=1e3, timeout=timeout)
 
-    def tell(self, command, data, now):
+    def send(self, command, data, now):
         assert self.obey(frame_id(NODE, command), data, remote=False, now=now) == []
 
     def heartbeat(self, now):
@@ -117,9 +117,9 @@ class Axis(EmulatedOdrive):
         return unpack_heartbeat(data)
 
     def push(self, now):
-        self.tell(SET_MODE, TORQUE_MODE, now)
-        self.tell(SET_TORQUE, pack_torque(10.0, 18.0), now)
-        self.tell(SET_STATE, STATE.pack(CLOSED_LOOP), now)
+        self.send(SET_MODE, TORQUE_MODE, now)
+        self.send(SET_TORQUE, pack_torque(10.0, 18.0), now)
+        self.send(SET_STATE, STATE.pack(CLOSED_LOOP), now)
 
 
 def test_the_emulated_axis_holds_its_command_unless_its_watchdog_is_on():
@@ -128,23 +128,23 @@ def test_the_emulated_axis_holds_its_command_unless_its_watchdog_is_on():
         motor.push(1.0)
         motor.advance(1.09)
         assert motor.torque == pytest.approx(10.0)
-        motor.heartbeat(1.05)  # a question does not feed
+        motor.heartbeat(1.05)  # a request does not feed the watchdog
         motor.advance(100.0)
         motor.advance(100.1)
     assert held.torque == pytest.approx(10.0)
     assert guarded.torque == pytest.approx(0.0)
     assert guarded.heartbeat(101.0) == Heartbeat(WATCHDOG_EXPIRED, IDLE)
-    guarded.tell(SET_STATE, STATE.pack(CLOSED_LOOP), 101.0)
+    guarded.send(SET_STATE, STATE.pack(CLOSED_LOOP), 101.0)
     assert guarded.heartbeat(101.0).state == IDLE  # refused until errors are cleared
-    guarded.tell(CLEAR_ERRORS, bytes(1), 101.0)
+    guarded.send(CLEAR_ERRORS, bytes(1), 101.0)
     guarded.push(101.0)
     assert guarded.heartbeat(101.0) == Heartbeat(0, CLOSED_LOOP)
 
 
-def test_the_emulated_axis_obeys_a_stop_and_no_other_node():
+def test_the_emulated_axis_obeys_a_stop_unless_it_is_for_another_node():
     motor = Axis(timeout=0.0)
     motor.push(0.0)
     assert motor.obey(frame_id(NODE + 1, STOP), b"", remote=False, now=0.1) == []
     assert motor.heartbeat(0.1).state == CLOSED_LOOP
-    motor.tell(STOP, b"", 0.2)
+    motor.send(STOP, b"", 0.2)
     assert motor.heartbeat(0.3) == Heartbeat(STOP_REQUESTED, IDLE)

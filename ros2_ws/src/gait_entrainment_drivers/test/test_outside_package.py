@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Drivers of other packages, built apart by colcon, take the place of ours: nothing changes."""
+"""Drivers of other packages, built separately by colcon, replace ours without other changes."""
 
 import json
 import shutil
@@ -12,12 +12,12 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[4]
 EXAMPLES = ROOT / "examples"
-pytestmark = pytest.mark.skipif(not EXAMPLES.exists(), reason="the repository is not here")
+pytestmark = pytest.mark.skipif(not EXAMPLES.exists(), reason="needs the repository")
 
 
 @pytest.fixture(scope="module")
 def outside(tmp_path_factory):
-    """Build the examples in a workspace of their own; return what runs a command in it."""
+    """Build the examples in their own workspace; return a function that runs a command in it."""
     workspace = tmp_path_factory.mktemp("outside")
     shutil.copytree(EXAMPLES, workspace / "src")
 
@@ -46,12 +46,12 @@ def test_the_experiment_runs_with_it_and_entrains(outside):
     assert outcome["entrained"] is True
     assert outcome["parameters"]["driver"] == "pneumatic"
     ideal = json.loads(outside("entrain simulate --json").stdout)
-    # A torque that comes 10 ms later, by half of it on average, is locked so much earlier.
+    # Torque that takes 10 ms to rise and fall is 5 ms late on average; the lag drops by that.
     shift = outcome["final_phase_lag"] - ideal["final_phase_lag"]
     assert -0.010 < shift < -0.002
 
 
-def test_its_own_test_is_the_kit(outside):
+def test_the_packages_own_test_is_the_kit(outside):
     done = outside(
         "cd src/pneumatic_ankle_robot && python -m pytest -q --disable-plugin-autoload"
         " -p gait_entrainment_drivers.pytest_plugin -p no:cacheprovider"

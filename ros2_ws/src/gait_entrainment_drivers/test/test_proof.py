@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What was proved of a robot is remembered for exactly its options, and never makes a fuss."""
+"""Proofs: valid only for exactly the same options; an unreadable file proves nothing."""
 
 import json
 import socket
@@ -13,7 +13,7 @@ import pytest
 from gait_entrainment.robot import DeviceError
 from gait_entrainment_drivers.proof import keep_proof, proof_of, require_proof
 
-KEY = f"{socket.gethostname()}/x:"  # of the driver x
+KEY = f"{socket.gethostname()}/x:"  # for the driver x
 ROBOT = r"ak_mit_can:channel=can0,note=a\,b"
 
 
@@ -23,7 +23,7 @@ def state(tmp_path, monkeypatch):
     return tmp_path / "gait_entrainment" / "proofs.json"
 
 
-def test_a_proof_is_kept_and_can_be_taken_back(state):
+def test_a_proof_is_kept_and_can_be_withdrawn(state):
     assert proof_of(ROBOT) is None
     keep_proof(ROBOT, 0.05)
     keep_proof("other", 0.1)
@@ -36,14 +36,14 @@ def test_a_proof_is_kept_and_can_be_taken_back(state):
 
 
 @pytest.mark.usefixtures("state")
-def test_only_the_same_options_are_the_same_robot():
+def test_a_proof_is_valid_only_for_the_same_options():
     keep_proof(ROBOT, 0.05)
     assert proof_of(r"ak_mit_can:note=a\,b,channel=can0")
     for other in ("ak_mit_can", "ak_mit_can:channel=can1", r"odrive_can:channel=can0,note=a\,b"):
         assert proof_of(other) is None
 
 
-def test_what_was_proved_on_another_computer_with_the_same_home_proves_nothing(state, monkeypatch):
+def test_a_proof_from_another_computer_with_the_same_home_is_not_valid(state, monkeypatch):
     keep_proof(ROBOT, 0.05)
     monkeypatch.setattr("socket.gethostname", lambda: "another")
     assert state.exists()
@@ -56,7 +56,7 @@ TYPES = '{"KEY": {"within": "1", "at": 2, "version": "VERSION"}}'
 @pytest.mark.parametrize(
     "text", ["", "{", "[]", "3", '{"KEY": 3}', '{"KEY": {"within": 1}}', TYPES, "\0"]
 )
-def test_a_file_that_cannot_be_read_proves_nothing_and_is_replaced(state, text):
+def test_an_unreadable_file_proves_nothing_and_is_replaced(state, text):
     state.parent.mkdir()
     state.write_text(text.replace("KEY", KEY).replace("VERSION", version("gait_entrainment")))
     assert proof_of("x") is None
@@ -64,20 +64,20 @@ def test_a_file_that_cannot_be_read_proves_nothing_and_is_replaced(state, text):
     assert proof_of("x").within == 0.05
 
 
-def test_what_another_version_proved_is_to_be_proved_again(state):
+def test_a_proof_by_another_version_must_be_repeated(state):
     keep_proof("x", 0.05)
     state.write_text(state.read_text().replace(version("gait_entrainment"), "0.0.1"))
     with pytest.raises(DeviceError, match="not proved on this computer by this version"):
         require_proof("x", unproved=False)
 
 
-def test_bytes_that_are_no_text_prove_nothing(state):
+def test_a_file_that_is_not_text_proves_nothing(state):
     state.parent.mkdir()
     state.write_bytes(b"\xff\xfe")
     assert proof_of("x") is None
 
 
-def test_without_a_home_nothing_is_proved_and_keeping_says_why(monkeypatch):
+def test_without_a_home_nothing_is_proved_and_keeping_a_proof_fails(monkeypatch):
     def no_home():
         raise RuntimeError("Could not determine home directory.")
 
@@ -88,7 +88,7 @@ def test_without_a_home_nothing_is_proved_and_keeping_says_why(monkeypatch):
         keep_proof("x", 0.05)
 
 
-def test_without_a_state_folder_it_is_in_the_home(tmp_path, monkeypatch):
+def test_without_a_state_folder_proofs_are_kept_in_the_home(tmp_path, monkeypatch):
     monkeypatch.delenv("XDG_STATE_HOME", raising=False)
     monkeypatch.setenv("HOME", str(tmp_path))
     keep_proof("x", 0.05)

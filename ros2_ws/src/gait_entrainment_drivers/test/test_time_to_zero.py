@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-How long torque lasts after each thing that ends it: the figures in docs/safety.md.
+How long torque lasts after each way to end it: the figures in docs/safety.md.
 
-    pytest -s -m benchmark ros2_ws/src/gait_entrainment/test/device
+    pytest -s -m benchmark ros2_ws/src/gait_entrainment_drivers/test
 
 The motor is emulated in another process (30 Hz torque bandwidth, AK80-9, multicast bus), the host
-loop runs at 500 Hz. Torque counts as gone where the motor's own trace is below 5 % of the pulse.
+loop runs at 500 Hz. Torque counts as gone once the motor's own trace is below 5 % of the pulse.
 """
 
 import statistics
@@ -26,7 +26,7 @@ TRIALS = 10
 SILENCE = 0.1
 
 
-def pushed_into(driver, limits=None):
+def pushing_robot(driver, limits=None):
     robot = find_driver(driver.replace("rate=250", "rate=500")).make(Side.RIGHT, limits)
     robot.configure()
     robot.activate()
@@ -42,7 +42,7 @@ def under_torque(trace):
 
 
 def gone_after(trace, since):
-    """Time [ms] from an instant to the end of the command, and to the end of the torque."""
+    """Return the times [ms] from ``since`` to the end of the command and to that of the torque."""
     until(lambda: abs(read_trace(trace)[-1][2]) < 0.05 * HEIGHT)
     rows = [row for row in read_trace(trace) if row[0] >= since]
     command = next(t for t, command, _ in rows if abs(command) < 0.05 * HEIGHT)
@@ -52,7 +52,7 @@ def gone_after(trace, since):
 
 def by_call(name):
     def end(trace, driver):
-        with pushed_into(driver) as robot:
+        with pushing_robot(driver) as robot:
             until(lambda: under_torque(trace))
             since = time.time_ns()
             getattr(robot, name)()
@@ -62,7 +62,7 @@ def by_call(name):
 
 
 def by_silent_experiment(trace, driver):
-    with pushed_into(driver, DeviceLimits(silence=SILENCE)) as robot:
+    with pushing_robot(driver, DeviceLimits(silence=SILENCE)) as robot:
         while not under_torque(trace):
             robot.heard()
             time.sleep(0.001)
@@ -71,15 +71,15 @@ def by_silent_experiment(trace, driver):
 
 
 def by_silent_motor(trace, driver):
-    with pushed_into(driver):
+    with pushing_robot(driver):
         until(lambda: under_torque(trace))
-        # It answers no more from 0.1 s after the first torque on.
+        # It stops answering 0.1 s after the first torque.
         began = next(t for t, command, _ in read_trace(trace) if command > 0.1)
         return gone_after(trace, began + 100_000_000)
 
 
 def by_exception(trace, driver):
-    with pytest.raises(ZeroDivisionError), pushed_into(driver):  # noqa: PT012
+    with pytest.raises(ZeroDivisionError), pushing_robot(driver):  # noqa: PT012
         until(lambda: under_torque(trace))
         since = time.time_ns()
         raise ZeroDivisionError

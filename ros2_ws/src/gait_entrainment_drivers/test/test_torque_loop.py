@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The torque loop: what is measured is reported once; whatever goes wrong ends in zero torque."""
+"""The torque loop: whatever goes wrong is a named fault and ends in zero torque."""
 
 import math
 import os
@@ -25,12 +25,12 @@ from .emulator_process import until
 
 SECOND = 1_000_000_000
 HEIGHT = 8.0
-# Limits that a loaded machine keeps; each limit has its own test.
+# Limits that a loaded machine can keep; each limit has its own test.
 PATIENT = {"lateness": 0.5, "silence": 0.5, "host_silence": 3.0, "rate": 250.0}
 
 
 class Bench:
-    """A robot with its trace of commands."""
+    """A robot and the trace of its commands."""
 
     def __init__(self, tmp_path, **options):
         self.trace = tmp_path / "trace"
@@ -78,8 +78,8 @@ def bench(tmp_path):
         return made[-1]
 
     yield make
-    for one in made:
-        one.robot.close()
+    for device in made:
+        device.robot.close()
 
 
 @pytest.mark.parametrize(
@@ -95,35 +95,35 @@ def bench(tmp_path):
         ("report an error", "overheated"),
         ("measure NaN", "reading_not_finite"),
         ("lose the angle", "reading_not_finite"),
-        ("answer no more", "device_silent"),
+        ("stop answering", "device_silent"),
         ("answer a number", "driver_failed"),
         ("measure None", "driver_failed"),
         ("report a text", "driver_failed"),
         ("raise", "driver_failed"),
     ],
 )
-def test_what_a_device_does_wrong_is_a_fault_by_name_and_ends_the_torque(bench, does, fault):
+def test_misbehaviour_of_a_device_is_a_named_fault_and_ends_the_torque(bench, does, fault):
     device = bench(does=does, after=0.0)
     device.push(count=12)
     device.until(device.faults)
     assert fault in device.faults()
-    asked = len(device.commands())
-    device.until(lambda: len(device.commands()) > asked + 20)
-    assert {torque for _, torque in device.commands()[asked:]} == {0.0}
+    earlier = len(device.commands())
+    device.until(lambda: len(device.commands()) > earlier + 20)
+    assert {torque for _, torque in device.commands()[earlier:]} == {0.0}
     with pytest.raises(DeviceError):
         device.push()
 
 
-def test_the_error_of_a_driver_is_kept_and_zero_is_sent_on_and_on(bench):
+def test_a_driver_error_is_reported_and_zero_is_sent_repeatedly(bench):
     device = bench(does="raise")
     device.push()
     device.until(lambda: device.robot.faults)
     assert "OSError: bus gone" in device.robot.faults[0].meaning
-    asked = len(device.commands())
-    device.until(lambda: len(device.commands()) > asked + 250)  # for longer than a second
+    earlier = len(device.commands())
+    device.until(lambda: len(device.commands()) > earlier + 250)  # for longer than a second
 
 
-def test_a_device_that_does_what_it_is_asked_raises_no_fault(bench):
+def test_a_device_that_follows_its_commands_raises_no_fault(bench):
     device = bench(rate=500.0)
     device.push(seconds=0.1, count=5)
     device.until(
@@ -156,17 +156,17 @@ def test_an_exchange_that_holds_up_the_loop_is_the_drivers_fault(bench):
     assert device.faults()[0] == "driver_slow"
 
 
-def test_a_parent_that_is_silent_ends_the_torque(bench):
+def test_a_silent_parent_ends_the_torque(bench):
     device = bench(host_silence=0.1)
     device.push(seconds=0.5, count=20)
     device.until(device.pushed)
     commands = len(device.commands())
-    until(lambda: len(device.commands()) > commands + 100)  # nobody reads meanwhile
+    until(lambda: len(device.commands()) > commands + 100)  # nothing is read meanwhile
     device.until(lambda: "host_silent" in device.faults())
     assert device.commands()[-1][1] == 0.0
 
 
-def test_a_loop_that_was_killed_is_told(bench):
+def test_a_killed_loop_is_reported(bench):
     device = bench()
     device.push()
     device.until(device.pushed)
@@ -175,7 +175,7 @@ def test_a_loop_that_was_killed_is_told(bench):
     assert math.isnan(device.look()[-1].measured if device.look() else math.nan)
 
 
-def test_signals_of_a_terminal_do_not_end_the_loop(bench):
+def test_terminal_signals_do_not_end_the_loop(bench):
     device = bench()
     for number in (signal.SIGINT, signal.SIGHUP, signal.SIGTSTP, signal.SIGQUIT):
         os.kill(device.driver._process.pid, number)
@@ -184,7 +184,7 @@ def test_signals_of_a_terminal_do_not_end_the_loop(bench):
     assert device.faults() == []
 
 
-def test_a_stop_needs_no_ros_and_answers_with_what_was_measured(bench):
+def test_a_stop_needs_no_ros_and_reports_the_measured_torque(bench):
     device = bench()
     device.push(seconds=0.5, count=20)
     device.until(device.pushed)
@@ -195,7 +195,7 @@ def test_a_stop_needs_no_ros_and_answers_with_what_was_measured(bench):
     assert device.commands()[-1][1] == 0.0
 
 
-def test_a_stop_of_a_motor_that_goes_on_pushing_says_to_cut_the_power(bench):
+def test_a_stop_of_a_motor_that_keeps_pushing_says_to_cut_the_power(bench):
     device = bench(does="push 12 N m", torque_band=1.0)
     device.push(seconds=0.5, count=20)
     device.until(device.pushed)
@@ -216,14 +216,14 @@ def test_a_frozen_loop_gives_no_answer_and_is_named(bench):
         assert device.faults() == ["torque_loop_silent"]
     finally:
         os.kill(pid, signal.SIGCONT)
-    asked = len(device.commands())
-    device.until(lambda: len(device.commands()) > asked + 20)
-    assert {torque for _, torque in device.commands()[asked:]} == {0.0}
+    earlier = len(device.commands())
+    device.until(lambda: len(device.commands()) > earlier + 20)
+    assert {torque for _, torque in device.commands()[earlier:]} == {0.0}
 
 
 @pytest.fixture
 def loop():
-    """A loop in this process, and the parent's end of its link."""
+    """Yield a loop in this process, and the parent's end of its link."""
     options = MisbehavingOptions(rate=1000.0)
     ours, theirs = map(Link, socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET))
     made = TorqueLoop(theirs, MisbehavingDevice(options), options)
@@ -237,7 +237,7 @@ def push(parent):
     parent.send("train", PulseTrain.periodic(Side.LEFT, now, 9.0, 1, HEIGHT, 9.0))
 
 
-def test_a_stop_that_comes_before_the_device_is_opened_is_not_forgotten(loop):
+def test_a_stop_before_the_device_is_opened_is_not_forgotten(loop):
     made, parent = loop
     stop_all(0.0)
     for step in ("open", "enable"):
@@ -249,7 +249,7 @@ def test_a_stop_that_comes_before_the_device_is_opened_is_not_forgotten(loop):
     assert sample.commanded == 0.0
 
 
-def test_who_asked_for_a_stop_is_answered_although_the_device_is_disabled_at_once(loop):
+def test_a_stop_request_is_answered_even_if_the_device_is_disabled_immediately(loop):
     made, parent = loop
     for step in ("open", "enable"):
         parent.send(step)
@@ -257,17 +257,17 @@ def test_who_asked_for_a_stop_is_answered_although_the_device_is_disabled_at_onc
     push(parent)
     while not made._measured > HEIGHT / 2:
         made._tick()
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as asker:
-        asker.bind("")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as client:
+        client.bind("")
         (name,) = (name for name in listening() if name.startswith("bench_device/"))
-        asker.sendto(b"stop", f"\0{PREFIX}{name}")
+        client.sendto(b"stop", f"\0{PREFIX}{name}")
         parent.send("disable")
         made._listen()
-        asker.settimeout(5.0)
-        assert b"torque is zero, latched" in asker.recv(1000)
+        client.settimeout(5.0)
+        assert b"torque is zero, latched" in client.recv(1000)
 
 
-def test_a_parent_that_is_frozen_for_hours_does_not_fill_the_memory(loop):
+def test_a_parent_frozen_for_hours_does_not_fill_the_memory(loop):
     made, parent = loop
     for step in ("open", "enable"):
         parent.send(step)
@@ -279,7 +279,7 @@ def test_a_parent_that_is_frozen_for_hours_does_not_fill_the_memory(loop):
     assert made._samples[-1].reading is not None
 
 
-def test_a_closed_robot_listens_no_more(bench):
+def test_a_closed_robot_stops_listening(bench):
     device = bench()
     name = f"bench_device/{device.driver._process.pid}"
     assert name in listening()
@@ -287,7 +287,7 @@ def test_a_closed_robot_listens_no_more(bench):
     assert name not in listening()
 
 
-def test_the_last_thing_before_disabling_is_zero(bench):
+def test_the_last_commands_before_disabling_are_zero(bench):
     device = bench()
     device.push()
     device.until(device.pushed)
@@ -297,12 +297,12 @@ def test_the_last_thing_before_disabling_is_zero(bench):
     assert commands[-5:] == [0.0] * 5
 
 
-def test_a_strong_motor_is_judged_by_what_a_person_is_to_feel():
+def test_a_strong_motor_is_judged_by_the_torque_that_people_may_feel():
     bands = [
         Monitor(MonitorSettings(), LoopOptions().capabilities(peak)).band for peak in (18.0, 390.0)
     ]
     assert bands == pytest.approx([0.12 * 18, 0.12 * 30])
 
 
-def test_peak_of_the_bench_device_is_above_what_is_asked_for():
+def test_peak_of_the_bench_device_is_above_the_requested_torque():
     assert HEIGHT < PEAK

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The client: questions repeated until the answer is acceptable, silence told by name."""
+"""The client: questions repeated until the answer is acceptable, silent nodes named."""
 
 import threading
 from itertools import count
@@ -21,8 +21,8 @@ def client():
 
 
 @pytest.fixture
-def asked(client):
-    """Serve ~/ready by a node that succeeds at the third request; return the requests so far."""
+def received(client):
+    """Serve ~/ready in a node that is ready from the third request on; yield the requests."""
     requests = []
     over = threading.Event()
 
@@ -43,36 +43,36 @@ def asked(client):
     thread.join()
 
 
-def test_is_asked_until_the_answer_is_acceptable(client, asked):
+def test_request_is_repeated_until_the_answer_is_acceptable(client, received):
     answer = client.call(Ready, "answers/ready", accept=lambda a: a.ready, period=0.05)
     assert answer.ready
-    # Others may be on their way: on a busy computer an answer takes longer than the period.
-    assert 2 < int(answer.waiting_for.removeprefix("answer ")) <= len(asked)
+    # More may be on their way: on a busy computer an answer takes longer than the period.
+    assert 2 < int(answer.waiting_for.removeprefix("answer ")) <= len(received)
 
 
-def test_a_question_keeps_the_latest_answer(client, asked):
+def test_a_question_keeps_the_latest_answer(client, received):
     question = client.ask(Ready, "answers/ready", accept=lambda _: False, period=0.05)
-    assert client.wait(lambda: question.answer() or len(asked) > 1, 10)
+    assert client.wait(lambda: question.answer() or len(received) > 1, 10)
     assert question.answer() is None
     assert question.latest.waiting_for.startswith("answer")
     assert question.answered_at > 0
 
 
-def test_waits_to_be_known_without_asking_for_more(client, asked):
+def test_waiting_to_be_known_leaves_no_further_requests(client, received):
     client.wait_to_be_known("answers", timeout=10)
-    before = len(asked)
+    before = len(received)
     assert client.call(Ready, "answers/ready", period=float("inf")).waiting_for
-    assert len(asked) == before + 1
+    assert len(received) == before + 1
 
 
-def test_silence_is_told_by_name(client):
+def test_a_silent_node_is_named(client):
     with pytest.raises(SilenceError, match=r"nobody/ready within 0\.1 s") as error:
         client.call(Ready, "nobody/ready", timeout=0.1)
     assert error.value.node == "nobody"
     assert error.value.exit_code == 1
 
 
-def test_each_round_can_end_the_waiting(client):
+def test_each_round_can_end_a_wait(client):
     rounds = count()
 
     def end():
@@ -84,6 +84,6 @@ def test_each_round_can_end_the_waiting(client):
         client.wait(lambda: False, 10)
 
 
-def test_waiting_returns_the_value_or_what_is_false(client):
+def test_wait_returns_the_last_value_even_if_it_is_false(client):
     assert client.wait(lambda: "there") == "there"
     assert client.wait(list, 0.01) == []

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Claims on ROS domains: exclusive among all processes, and gone with their holder."""
+"""Claims on ROS domains: exclusive among all processes, and released when their holder ends."""
 
 import os
 import subprocess
@@ -17,19 +17,19 @@ from gait_entrainment_nodes.messaging.domain import DomainError, claimed_domain
 
 @pytest.fixture(autouse=True)
 def own_domains(monkeypatch):
-    """Keep to domains that runs beside the tests do not claim by themselves."""
+    """Use domains that runs alongside the tests do not claim."""
     monkeypatch.setattr(module, "DOMAINS", range(210, 212))
     monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
 
 
 def test_claims_differ_and_end():
-    with claimed_domain() as one, claimed_domain() as other:
-        assert (one, other) == (210, 211)
+    with claimed_domain() as first, claimed_domain() as second:
+        assert (first, second) == (210, 211)
     with claimed_domain() as again:
         assert again == 210
 
 
-def test_claim_ends_where_its_holder_fails():
+def test_claim_ends_when_its_holder_fails():
     with pytest.raises(RuntimeError), claimed_domain():
         raise RuntimeError
     with claimed_domain() as free:
@@ -47,13 +47,13 @@ def test_chosen_domain_is_claimed_once(monkeypatch):
 
 
 @pytest.mark.parametrize("wanted", ["233", "-1", "", "nine", "1.5"])
-def test_what_is_no_domain_is_refused(wanted, monkeypatch):
+def test_an_invalid_domain_is_refused(wanted, monkeypatch):
     monkeypatch.setenv("ROS_DOMAIN_ID", wanted)
     with pytest.raises(DomainError, match="allowed: 0 to 232"), claimed_domain():
         pass
 
 
-def test_every_domain_taken_is_said():
+def test_it_is_reported_if_every_domain_is_taken():
     taken = pytest.raises(DomainError, match="every ROS domain from 210 to 211 is in use")
     with claimed_domain(), claimed_domain(), taken, claimed_domain():
         pass
@@ -77,7 +77,7 @@ def test_claim_ends_with_a_killed_process(monkeypatch):
         assert free == 213
 
 
-def test_stop_in_what_is_no_domain_stops_every_run(monkeypatch, capsys):
+def test_stop_in_an_invalid_domain_stops_every_run(monkeypatch, capsys):
     monkeypatch.setenv("ROS_DOMAIN_ID", "500")
     monkeypatch.setattr(stop_command, "domains_in_use", lambda: [7])
     monkeypatch.setattr(stop_command, "stop_all", lambda domain, _: {f"robot {domain}": "zero"})

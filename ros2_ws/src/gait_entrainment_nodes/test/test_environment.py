@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""An environment in which ROS cannot start is told in one line, before ROS is loaded."""
+"""An environment in which ROS cannot start is reported in one line, before ROS is loaded."""
 
 import os
 import tempfile
@@ -28,9 +28,9 @@ VARIABLES = (
 
 @pytest.fixture(autouse=True)
 def variables(monkeypatch, tmp_path):
-    """Give a usable environment; what is changed of it is undone."""
+    """Provide a usable environment; changes to it are undone."""
     for name in VARIABLES:
-        monkeypatch.setenv(name, "")  # what ROS takes for unset
+        monkeypatch.setenv(name, "")  # ROS treats it as unset
     monkeypatch.setenv("HOME", str(tmp_path))
     return monkeypatch
 
@@ -61,7 +61,7 @@ def test_logs_go_to_a_temporary_folder_without_a_home(home, variables):
         ("ROS_STATIC_PEERS", "127.0.0.1;no host", "'no host' is not a known host"),
     ],
 )
-def test_what_ros_cannot_start_with_is_named(variable, value, words, variables):
+def test_a_variable_with_which_ros_cannot_start_is_named(variable, value, words, variables):
     variables.setenv(variable, value)
     with pytest.raises(UnusableEnvironmentError) as caught:
         require_usable_environment()
@@ -79,11 +79,11 @@ def test_full_shared_memory_is_named(variables):
 
 @pytest.mark.parametrize("left_over", ["SYSTEM_DEFAULT", "LOCALHOST"])
 @pytest.mark.parametrize("workspace", ["this", "another"])
-def test_what_a_run_has_chosen_is_no_wish_of_the_next(left_over, workspace, variables):
+def test_what_a_run_has_set_is_not_the_users_choice_for_the_next(left_over, workspace, variables):
     first = dds_variables(real_time=False)
     paced = dds_variables(real_time=True)
     assert first != paced
-    if workspace == "another":  # of which env.bash was sourced before
+    if workspace == "another":  # whose env.bash was sourced earlier
         folder = "/another/share/gait_entrainment_nodes/config"
         variables.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", f"{folder}/fastdds.xml")
         assert dds_variables(real_time=False) == first

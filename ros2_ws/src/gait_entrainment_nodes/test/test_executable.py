@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the executable of a node does with signals and a closed output, from its start on."""
+"""How a node's executable handles signals and a closed output, right from its start."""
 
 import os
 import signal
@@ -19,10 +19,10 @@ class LeftError(BaseException):
 
 @pytest.fixture
 def run(monkeypatch):
-    """Return what runs ``main`` of a node in this process, and undo what that does to it."""
+    """Return a function that runs a node's ``main`` in this process; undo its changes later."""
     handlers = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)}
 
-    def of(main):
+    def run_main(main):
         module = ModuleType("nodes.some_node")
         module.main = main
         monkeypatch.setattr(sys, "argv", ["/lib/some_node"])
@@ -30,17 +30,17 @@ def run(monkeypatch):
         monkeypatch.setitem(sys.modules, "nodes.some_node", module)
         return executable.main("nodes")
 
-    yield of
+    yield run_main
     for number, handler in handlers.items():
         signal.signal(number, handler)
 
 
-def test_a_second_interrupt_does_not_break_into_the_end(run):
+def test_a_second_interrupt_does_not_disturb_the_shutdown(run):
     assert run(lambda: 1) == 1
     assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN
 
 
-def test_who_has_read_enough_of_the_help_is_told_nothing(run, capsys):
+def test_closing_the_output_of_the_help_is_not_reported(run, capsys):
     def main():
         raise BrokenPipeError
 
@@ -49,7 +49,7 @@ def test_who_has_read_enough_of_the_help_is_told_nothing(run, capsys):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_while_a_node_is_loaded_ends_it_at_once(run, number, monkeypatch, capsys):
+def test_a_signal_while_a_node_is_loaded_ends_it_immediately(run, number, monkeypatch, capsys):
     def leave(code):
         raise LeftError(code)
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One run of the experiment: its promises, and who is blamed for what; no node is needed."""
+"""One run of the experiment, without nodes: its promises, and which node is blamed for what."""
 
 import pytest
 
@@ -22,7 +22,7 @@ PROTOCOL = Protocol(baseline=2, pulses=PulsePlan(count=1), washout=1)
 
 
 class Bench:
-    """Walker and perturbator around a run, on a clock of their own."""
+    """Walker and perturbator around a run, on their own clock."""
 
     def __init__(self, **kind):
         self.now = 100.0
@@ -53,7 +53,7 @@ class Bench:
         self.run.take_event(event)
 
     def report(self, instant, events=None, state=Progress.WALKING, **values):
-        """Let the walker report progress up to an instant."""
+        """Let the walker report progress up to a time."""
         events = self.events if events is None else events
         message = Progress(header=header(instant), grant=self.grant, events=events, state=state)
         for name, value in values.items():
@@ -62,7 +62,7 @@ class Bench:
         self.run.take_progress(message)
 
     def promise(self, **values):
-        """Let the perturbator answer, up to the horizon if it is not said how far."""
+        """Let the perturbator answer, by default up to the horizon."""
         profile = TorqueProfile(
             run=7, side=Side.RIGHT, valid_until=to_time(self.run.promised_until)
         )
@@ -71,13 +71,13 @@ class Bench:
         self.run.take_profile(profile)
 
     def after(self, seconds):
-        """Let time pass, and see what becomes of the run."""
+        """Let time pass; return the failure of the run, if it has failed."""
         self.now += seconds
         self.run.check(TIMEOUT)
         return self.run.failure
 
     def walk_to_planning(self):
-        """Walk until the pulses have been requested; return the instant of the next strike."""
+        """Walk until the pulses have been requested; return the time of the next strike."""
         instant = 10 * SECOND
         while not self.trains:
             self.promise()
@@ -98,7 +98,7 @@ def blamed(failure):
     return str(failure), failure.node
 
 
-def test_each_progress_is_answered_once_all_that_it_covers_is_here(bench):
+def test_each_progress_is_answered_once_everything_that_it_covers_has_arrived(bench):
     (first,) = bench.horizons
     assert (first.run, first.last) == (7, False)
     assert first.seal == seal_of(bench.run.key)
@@ -138,7 +138,7 @@ def test_perturbator_that_does_not_answer_is_named(bench):
     assert blamed(bench.after(0.1)) == ("perturbator has been silent for 3 s", "perturbator")
 
 
-def test_a_profile_from_nowhere_hides_no_silence(bench):
+def test_a_profile_beyond_the_horizon_does_not_hide_silence(bench):
     bench.promise(valid_until=to_time(1000 * SECOND))
     assert bench.after(TIMEOUT - 0.1) is None
     bench.strike(10 * SECOND)
@@ -160,17 +160,17 @@ def test_walker_that_falls_silent_is_named(bench):
     assert blamed(bench.after(0.1)) == ("walker_sim has been silent for 3 s", "walker_sim")
 
 
-def test_walker_that_counts_events_which_nobody_receives_is_named(bench):
+def test_walker_that_counts_events_that_never_arrive_is_named(bench):
     bench.promise()
     bench.strike(10 * SECOND)
-    for _ in range(4):  # further reports do not pay the debt
+    for _ in range(4):  # further reports do not make up for them
         bench.report(10 * SECOND + HALF, events=3)
         bench.after(1.0)
     expected = "walker_sim: 2 of 3 gait events missing for 3 s"
     assert blamed(bench.after(0.1)) == (expected, "walker_sim")
 
 
-def test_recorder_is_named_if_it_is_what_the_walker_waits_for():
+def test_recorder_is_named_if_the_walker_waits_for_it():
     bench = Bench(recorded=True)
     bench.begin()
     bench.promise()
@@ -178,7 +178,7 @@ def test_recorder_is_named_if_it_is_what_the_walker_waits_for():
     bench.report(10 * SECOND + HALF)
     bench.promise()
     bench.after(2.0)
-    for recorded in (10 * SECOND + HALF, 1000 * SECOND):  # the latter is not of who records
+    for recorded in (10 * SECOND + HALF, 1000 * SECOND):  # the latter is not possible yet
         bench.run.take_recorder_progress(Progress(run=7, header=header(recorded)))
     bench.report(11 * SECOND)
     bench.promise()
@@ -186,10 +186,10 @@ def test_recorder_is_named_if_it_is_what_the_walker_waits_for():
     assert blamed(bench.after(0.1)) == ("bag_recorder has been silent for 3 s", "bag_recorder")
 
 
-def test_in_real_time_each_owes_what_it_does_by_itself():
+def test_in_real_time_silence_of_each_node_is_noticed_separately():
     bench = Bench(real_time=True)
     bench.begin()
-    # A robot tells its torque piece by piece, behind the horizon; the walker says nothing.
+    # A robot reports its torque piece by piece, behind the horizon; the walker is silent.
     for piece in range(1, 4):
         bench.promise(valid_until=to_time(10 * SECOND + piece * SECOND // 10))
         assert bench.after(1.0) is None
@@ -197,14 +197,14 @@ def test_in_real_time_each_owes_what_it_does_by_itself():
     bench = Bench(real_time=True)
     bench.begin()
     bench.promise(valid_until=to_time(10 * SECOND + 1))
-    for k in range(3):  # the walk goes on, and the robot tells no more
+    for k in range(3):  # the walk goes on, but the robot reports no more
         bench.report((10 + k) * SECOND)
         assert bench.after(1.0) is None
     assert blamed(bench.after(0.1)) == ("perturbator has been silent for 3 s", "perturbator")
 
 
 @pytest.mark.parametrize(("ahead", "believed"), [(0.09, True), (0.11, False), (3600.0, False)])
-def test_in_real_time_what_is_stamped_ahead_has_not_happened(monkeypatch, ahead, believed):
+def test_in_real_time_stamps_too_far_ahead_are_not_believed(monkeypatch, ahead, believed):
     monkeypatch.setattr("time.time_ns", lambda: 9 * SECOND)  # the walk begins later
     bench = Bench(real_time=True)
     bench.begin()
@@ -224,12 +224,12 @@ def test_in_real_time_what_is_stamped_ahead_has_not_happened(monkeypatch, ahead,
         assert blamed(bench.run.failure) == (expected, "walker_sim")
 
 
-def test_in_lock_step_nobody_walks_further_than_was_promised(bench):
+def test_in_lock_step_the_walk_goes_no_further_than_was_promised(bench):
     bench.promise()
     bench.strike(10 * SECOND)
     bench.report(10 * SECOND + HALF)
     promised = bench.run.promised_until
-    bench.report(9 * SECOND)  # nor back
+    bench.report(9 * SECOND)  # nor backwards
     assert (bench.run.known_until, bench.run.promised_until) == (10 * SECOND + HALF, promised)
     bench.report(3600 * SECOND)
     words, node = blamed(bench.run.failure)
@@ -237,7 +237,7 @@ def test_in_lock_step_nobody_walks_further_than_was_promised(bench):
     assert node == "walker_sim"
 
 
-def test_a_walker_that_ends_before_the_protocol_does_has_failed(bench):
+def test_a_walker_that_ends_before_the_protocol_has_failed(bench):
     bench.promise()
     bench.strike(10 * SECOND)
     bench.report(10 * SECOND + HALF, state=Progress.FINISHED)
@@ -246,7 +246,7 @@ def test_a_walker_that_ends_before_the_protocol_does_has_failed(bench):
 
 
 @pytest.mark.parametrize("pace", [1.0, 0.9, 0.0, -1.0])
-def test_a_walk_that_stands_still_or_lags_is_as_good_as_silent(monkeypatch, pace):
+def test_a_walk_that_stands_still_or_lags_counts_as_silent(monkeypatch, pace):
     monkeypatch.setattr("time.time_ns", lambda: 10 * SECOND)
     bench = Bench(real_time=True)
     bench.begin()
@@ -262,7 +262,7 @@ def test_a_walk_that_stands_still_or_lags_is_as_good_as_silent(monkeypatch, pace
         assert (1 - pace) * tick < 0.5 + TIMEOUT + 1.0 + 0.1
 
 
-def test_a_source_may_count_from_before_it_was_asked(monkeypatch):
+def test_a_source_may_count_from_before_the_run_was_requested(monkeypatch):
     monkeypatch.setattr("time.time_ns", lambda: 20 * SECOND)
     bench = Bench(real_time=True)
     bench.begin()
@@ -271,21 +271,21 @@ def test_a_source_may_count_from_before_it_was_asked(monkeypatch):
     assert bench.run.failure is None
 
 
-def test_silence_counts_anew_after_this_process_was_held_up(bench):
+def test_silence_starts_again_after_this_process_was_held_up(bench):
     bench.now += 10.0
     bench.run.forgive()
     assert bench.after(TIMEOUT) is None
     assert bench.after(0.1) is not None
 
 
-def test_fault_ends_the_run_in_the_words_of_the_perturbator(bench):
+def test_fault_ends_the_run_with_the_message_of_the_perturbator(bench):
     latched = Trouble(kind=Trouble.LATCHED, fault="stopped", message="latched: stopped: by hand")
     bench.run.take_trouble(latched)
     assert blamed(bench.run.failure) == ("perturbator: latched: stopped: by hand", "")
 
 
 @pytest.mark.parametrize("stop_first", [True, False])
-def test_reason_of_refused_pulses_comes_before_or_after_the_answer(bench, stop_first):
+def test_reason_for_refused_pulses_may_come_before_or_after_the_answer(bench, stop_first):
     bench.walk_to_planning()
     refused = Trouble(kind=Trouble.REFUSED, message="pulse train rejected: torque: too much")
     if stop_first:
@@ -299,7 +299,7 @@ def test_reason_of_refused_pulses_comes_before_or_after_the_answer(bench, stop_f
     assert blamed(bench.after(0.0)) == (expected, "")
 
 
-def test_refusal_of_somebody_elses_pulses_does_not_matter(bench):
+def test_refusal_of_another_clients_pulses_does_not_matter(bench):
     refused = Trouble(kind=Trouble.REFUSED, message="pulse train rejected: one at a time")
     bench.run.take_trouble(refused)
     assert bench.run.trouble == ""
@@ -309,7 +309,7 @@ def test_refusal_of_somebody_elses_pulses_does_not_matter(bench):
     bench.run.fail_if_troubled()
 
 
-def test_stop_without_a_reason_is_told_after_a_while(bench):
+def test_stop_without_a_reason_is_reported_after_a_while(bench):
     bench.promise(stop=True)
     assert bench.after(0.4) is None
     message, node = blamed(bench.after(0.2))
@@ -344,7 +344,7 @@ def test_closing_horizon_ends_where_the_promises_end(bench):
     bench.run.fail_if_troubled()
 
 
-def test_stop_after_the_walkers_last_word_fails_the_run(bench):
+def test_stop_after_the_walkers_last_report_fails_the_run(bench):
     bench.promise()
     bench.strike(10 * SECOND)
     bench.report(10 * SECOND + HALF, state=Progress.FELL)
@@ -372,7 +372,7 @@ def test_impossible_pulses_fail_the_run():
     assert "overlap" in str(bench.run.failure)
 
 
-def test_run_that_is_over_stays_as_it_ended(bench):
+def test_only_the_first_failure_of_a_run_is_kept(bench):
     bench.run.fail(ExperimentError("first"))
     bench.run.fail(ExperimentError("second"))
     assert str(bench.run.failure) == "first"

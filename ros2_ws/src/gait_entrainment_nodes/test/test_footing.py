@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The place that follows from the joint angles is that of the footholds, one step length apart."""
+"""The position derived from the joint angles fits the footholds, one step length apart."""
 
 import numpy as np
 import pytest
@@ -32,12 +32,12 @@ def test_mass_stands_over_the_footholds(parameters, period):
         walker.extend_torque(side, [0, *times], [0.0, *torques], 10 * SECOND)
     strikes = [e for e in walker.advance(10 * SECOND) if e.kind == EventKind.HEEL_STRIKE]
     assert len(strikes) > 8
-    instants = np.unique([*range(0, 10 * SECOND, period), *(e.stamp for e in strikes)])
-    samples = walker.sample(instants)
+    stamps = np.unique([*range(0, 10 * SECOND, period), *(e.stamp for e in strikes)])
+    samples = walker.sample(stamps)
     assert samples.unloaded.any()
-    steps = np.searchsorted([e.stamp for e in strikes], instants, side="right") - 1
+    steps = np.searchsorted([e.stamp for e in strikes], stamps, side="right") - 1
     heel = steps * 2 * parameters.leg_length * np.sin(parameters.leg_angle)
-    lean = samples.position[np.arange(instants.size), samples.leading]
+    lean = samples.position[np.arange(stamps.size), samples.leading]
     footing = Footing(parameters.leg_length, parameters.foot_length)
     places = np.array([footing.place(p[:2], p[2:]) for p in samples.position])
     assert places[:, 0] == pytest.approx(heel - parameters.leg_length * np.sin(lean), abs=1e-9)

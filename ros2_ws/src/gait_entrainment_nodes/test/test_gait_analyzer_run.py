@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One run of the analyzer: when it is complete, and what it says of doubtful events."""
+"""One run of the analyzer: when it is complete, and which doubts it reports."""
 
 import pytest
 
@@ -20,7 +20,7 @@ def run(measured=False):
 
 
 def gait(strides):
-    """Return the events of a gait whose steps take a second each, the right leg first."""
+    """Yield the events of a gait with steps of one second, the right leg first."""
     for step in range(2 * strides + 1):
         side = Side.LEFT if step % 2 else Side.RIGHT
         kind = EventKind.HEEL_STRIKE
@@ -40,7 +40,7 @@ def end(instant, events):
     return Progress(header=header(instant), events=events, state=Progress.FINISHED)
 
 
-def test_run_is_complete_once_events_and_onsets_are_here_whichever_comes_last():
+def test_run_is_complete_once_events_and_onsets_have_arrived_in_any_order():
     events = list(gait(4))
     for last in ("event", "promise", "end"):
         analyzed = run()
@@ -66,7 +66,7 @@ def test_run_is_complete_once_events_and_onsets_are_here_whichever_comes_last():
         assert (pulse.stride, pulse.phase) == (2, 0.5)
 
 
-def test_measured_onsets_are_complete_with_the_state_at_the_closing_instant():
+def test_measured_onsets_are_complete_with_the_state_at_the_closing_time():
     analyzed = run(measured=True)
     for event in gait(2):
         analyzed.add_event(event)
@@ -79,7 +79,7 @@ def test_measured_onsets_are_complete_with_the_state_at_the_closing_instant():
     assert analyzed.complete
 
 
-def test_doubts_are_told_once_each_time_that_there_are_more():
+def test_doubts_are_reported_once_each_time_their_number_grows():
     analyzed = run()
     events = list(gait(3))
     for event in events[:4]:
@@ -113,7 +113,7 @@ def test_stop_voids_what_was_promised():
     assert [r.onset for r in results if isinstance(r, PulsePhase)] == [3 * SECOND]
 
 
-def test_profiles_that_do_not_adjoin_are_a_hole_and_are_told():
+def test_profiles_that_do_not_adjoin_are_reported_as_a_hole():
     analyzed = run()
     analyzed.add_profile(promise(0, 2 * SECOND))
     analyzed.add_profile(promise(4 * SECOND, 6 * SECOND))
@@ -124,11 +124,11 @@ def test_profiles_that_do_not_adjoin_are_a_hole_and_are_told():
     assert analyzed.new_doubts() == {}
 
 
-def test_a_promise_that_was_not_so_silences_nothing_that_follows():
+def test_an_impossible_promise_does_not_hide_later_ones():
     analyzed = run()
-    told = promise(0, 2 * SECOND), promise(2 * SECOND, 10**15), promise(4 * SECOND, 9 * SECOND)
-    told[2].onsets = [to_time(5 * SECOND)]
-    for revision, profile in enumerate(told):
+    profiles = promise(0, 2 * SECOND), promise(2 * SECOND, 10**15), promise(4 * SECOND, 9 * SECOND)
+    profiles[2].onsets = [to_time(5 * SECOND)]
+    for revision, profile in enumerate(profiles):
         profile.revision = revision
         analyzed.add_profile(profile)
     results = [result for event in gait(4) for result in analyzed.add_event(event)]
@@ -153,7 +153,7 @@ def test_joining_late_is_a_hole():
     assert analyzed.new_doubts()["holes"] == 1
 
 
-def test_an_event_of_an_unknown_kind_or_side_is_an_error_of_one_line():
+def test_an_event_of_an_unknown_kind_or_side_is_a_one_line_error():
     for values in ({"kind": 7}, {"side": 2}):
         with pytest.raises(MessageError, match=f"^{next(iter(values))}: "):
             run().add_event(GaitEvent(header=header(0), **values))

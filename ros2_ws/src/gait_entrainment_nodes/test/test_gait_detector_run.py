@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One run of the gait detector: numbers, promises that hold, and ends."""
+"""One run of the gait detector: numbers of events, progress that stays true, and the end."""
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -15,11 +15,11 @@ from gait_entrainment_sensors import Detection
 SECOND = 10**9
 START = 1000 * SECOND
 LATENCY = 0.1
-NAMES = ("of the left", "of the right")
+NAMES = ("left detector", "right detector")
 
 
 def gait(strides, late):
-    """Yield what is detected of a gait with strides of 1 s, each event so late [s]."""
+    """Yield the detections of a gait with strides of 1 s; ``late`` is the delay of each [s]."""
     delays = iter(late)
     for step in range(2 * strides):
         for kind, side, at in (
@@ -35,7 +35,7 @@ def stamps(messages):
 
 @settings(max_examples=30, deadline=None)
 @given(st.lists(st.floats(0, 0.99 * LATENCY), min_size=40, max_size=40), st.integers(1, 400))
-def test_no_event_comes_behind_the_promise_however_it_is_cut(late, pieces):
+def test_no_event_comes_after_the_progress_that_covers_it(late, pieces):
     run, found = Run(3, START, LATENCY, START), list(gait(10, late))
     heard, covered = [], START
     for piece in range(1, pieces + 1):
@@ -53,14 +53,14 @@ def test_no_event_comes_behind_the_promise_however_it_is_cut(late, pieces):
     assert [e.detector for e in heard[:2]] == [NAMES[1], NAMES[0]]
     assert {(e.run, e.source, e.uncertainty) for e in heard} == {(3, "gait_detector", 0.004)}
     for event, delay in zip(sorted(heard, key=lambda e: stamps([e])), late, strict=True):
-        told = nanoseconds_of(event.detected_at) - stamps([event])[0]
-        assert abs(told - delay * SECOND) < 10
+        reported = nanoseconds_of(event.detected_at) - stamps([event])[0]
+        assert abs(reported - delay * SECOND) < 10
     # Heel strike n closes step n, and strides of a side are two steps apart.
     strikes = [e.step for e in heard if e.kind == EventKind.HEEL_STRIKE and e.side == Side.RIGHT]
     assert strikes == list(range(0, 20, 2))
 
 
-def test_what_was_promised_and_comes_late_is_counted():
+def test_an_event_that_comes_after_the_progress_that_covers_it_is_counted_as_late():
     run = Run(1, START, LATENCY, START)
     on_time = Detection(EventKind.HEEL_STRIKE, Side.RIGHT, 0.2, 0.3, 0.0)
     late = Detection(EventKind.TOE_OFF, Side.LEFT, 0.32, 0.9, 0.0)
@@ -70,14 +70,14 @@ def test_what_was_promised_and_comes_late_is_counted():
     assert run.late == 1
 
 
-def test_who_walks_before_the_start_is_not_yet_counted():
+def test_events_before_the_start_are_not_counted():
     run = Run(1, START + SECOND, LATENCY, START)
     assert not run.events_of([Detection(EventKind.HEEL_STRIKE, Side.RIGHT, 0.5, 0.6, 0.0)], NAMES)
     (first,) = run.events_of([Detection(EventKind.HEEL_STRIKE, Side.LEFT, 1.1, 1.2, 0.0)], NAMES)
     assert first.step == 0
 
 
-def test_it_ends_where_the_experiment_says_once_all_is_known_up_to_there():
+def test_it_ends_where_the_experiment_says_once_everything_up_to_there_is_known():
     run = Run(1, START, LATENCY, START)
     run.end = START + SECOND
     assert run.progress_at(START + SECOND).state == Progress.WALKING
@@ -85,7 +85,7 @@ def test_it_ends_where_the_experiment_says_once_all_is_known_up_to_there():
     assert (final.state, nanoseconds_of(final.header.stamp)) == (Progress.FINISHED, run.end)
 
 
-def test_of_a_simulated_walk_it_says_what_that_said():
+def test_the_outcome_of_a_simulated_walk_is_passed_on():
     run = Run(1, START, LATENCY, START)
     walking = run.progress_behind(Progress(), START + SECOND)
     assert nanoseconds_of(walking.header.stamp) == START + SECOND - SECOND // 10

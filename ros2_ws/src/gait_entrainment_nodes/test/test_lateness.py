@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The histogram of lateness against the sorted values themselves."""
+"""The lateness histogram, checked against the sorted values."""
 
 import math
 
@@ -26,7 +26,7 @@ def test_quantile_is_that_of_the_values_to_the_width_of_a_bin(values, fraction):
     assert exact * (1 - 1e-9) <= lateness.quantile(fraction) <= exact * width * (1 + 1e-9)
 
 
-def test_nothing_and_what_is_out_of_range():
+def test_no_values_and_values_out_of_range():
     lateness = Lateness()
     assert math.isnan(lateness.quantile(0.5))
     lateness.add(-1.0)

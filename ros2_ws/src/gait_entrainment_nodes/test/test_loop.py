@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One round of the loop of a node: what it survives, and what it does not."""
+"""One round of a node's loop: which errors it survives, and which it does not."""
 
 from types import SimpleNamespace
 
@@ -28,12 +28,12 @@ def executor_that_raises(error):
     return SimpleNamespace(spin_once=spin_once)
 
 
-def test_an_answer_that_nobody_waits_for_any_more_ends_no_node():
+def test_an_answer_to_a_client_that_has_gone_does_not_end_the_node():
     gone = "failed to send response (timeout): client will not receive response"
     _serve_once(executor_that_raises(RuntimeError(gone)), NODE)
 
 
-def test_a_clock_before_1970_ends_no_node_and_is_told():
+def test_a_clock_before_1970_is_reported_and_does_not_end_the_node():
     with pytest.raises(ValueError, match="negative") as refused:
         Time.from_msg(TimeMessage(sec=-5))  # as rclpy reads /clock
     _serve_once(executor_that_raises(refused.value), NODE)
@@ -41,6 +41,6 @@ def test_a_clock_before_1970_ends_no_node_and_is_told():
 
 
 @pytest.mark.parametrize("error", [RuntimeError("out of memory"), ValueError("no number")])
-def test_any_other_error_does(error):
+def test_any_other_error_ends_the_node(error):
     with pytest.raises(type(error)):
         _serve_once(executor_that_raises(error), NODE)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A message of before keeps all it had; one that had something else is not taken for one."""
+"""Older messages keep all their fields; a message with other fields is not converted."""
 
 from rclpy.serialization import deserialize_message
 
@@ -17,7 +17,7 @@ TYPE = "gait_entrainment_msgs/msg/GaitEvent"
 
 
 def topic(*lines, of_type=TYPE):
-    """Return a topic of events as they were before some fields came, and with other lines."""
+    """Return a topic of events as they were before some fields were added, plus other lines."""
     text = find_definition(TYPE).schema_text.splitlines()
     kept = [line for line in text if not any(f" {name} " in line for name in ADDED)]
     return TopicInfo(
@@ -28,7 +28,7 @@ def topic(*lines, of_type=TYPE):
     )
 
 
-def test_what_was_recorded_is_kept_and_what_has_come_since_is_empty():
+def test_recorded_fields_are_kept_and_fields_added_since_are_empty():
     event = GaitEvent(header=header(7 * 10**9 + 5), run=3, kind=1, side=1, step=12)
     event.source = "walker_sim"
     data = serialize(event)
@@ -38,12 +38,12 @@ def test_what_was_recorded_is_kept_and_what_has_come_since_is_empty():
     assert deserialize_message(convert(older), GaitEvent) == event
 
 
-def test_a_field_that_is_no_more_or_another_project_is_not_guessed_at():
+def test_a_removed_field_or_another_projects_type_is_not_converted():
     assert converter_of(topic("float64 forgotten")) is None
     assert converter_of(topic(of_type="theirs/msg/GaitEvent")) is None
 
 
-def test_the_definition_that_a_copy_was_given_is_not_the_recorded_one():
+def test_a_copy_with_the_installed_definition_is_not_converted():
     root, *others = find_definition(TYPE).schema_text.split(SEPARATOR)
     text = SEPARATOR.join([root.rstrip() + "\n", *reversed(others)])  # rosbag2 has another order
     assert converter_of(TopicInfo("/gait_events", TYPE, text, type_hash="older")) is None

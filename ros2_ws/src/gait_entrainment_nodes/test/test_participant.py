@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a user may say to any node as ROS has it: names, qualities of service, --help."""
+"""ROS arguments that every node accepts: names, qualities of service, parameters, --help."""
 
 import sys
 from contextlib import contextmanager
@@ -37,7 +37,7 @@ def node(make, *arguments):
 
 
 def names(made):
-    """Return the names of a node's topics, without those that every node has."""
+    """Return the names of the topics that a node publishes."""
     found = made.get_publisher_names_and_types_by_node(made.get_name(), made.get_namespace())
     return {name for name, _ in found}
 
@@ -48,24 +48,24 @@ def test_topics_under_a_nodes_name_follow_its_name():
         assert not any("experiment" in name for name in names(made))
 
 
-def test_who_else_publishes_what_a_run_takes_from_one_is_named():
+def test_other_publishers_of_a_topic_that_must_have_one_publisher_are_named():
     events = topics.GAIT_EVENTS
     with node(WalkerSim) as made:
         assert made.rivals(events) == ""
         other = rclpy.create_node("other_walker")
         other.create_publisher(events.type, events.name, events.qos)
-        told = "gait_events is published by other_walker and walker_sim; a run needs one publisher"
-        assert made.rivals(events) == told
+        text = "gait_events is published by other_walker and walker_sim; a run needs one publisher"
+        assert made.rivals(events) == text
         other.destroy_node()
 
 
-def test_a_quality_is_taken_where_a_run_allows_it():
+def test_a_quality_of_service_is_accepted_if_a_run_allows_it():
     chosen = "qos_overrides./diagnostics.publisher"
     with node(
         Experiment, "-p", f"{chosen}.depth:=7", "-p", f"{chosen}.history:=keep_last"
     ) as made:
         assert made.get_parameter(f"{chosen}.depth").value == 7
-    assert topics.VIEWED.depth == 100  # of the other nodes in this process
+    assert topics.VIEWED.depth == 100  # that of the other nodes in this process
     state = "qos_overrides./gait/entrainment.publisher"
     with node(GaitAnalyzerNode, "-p", f"{state}.depth:=2000") as made:
         (info,) = made.get_publishers_info_by_topic("/gait/entrainment")
@@ -73,7 +73,7 @@ def test_a_quality_is_taken_where_a_run_allows_it():
 
 
 @pytest.mark.parametrize(
-    "said",
+    "override",
     [
         "/gait/strides.publisher.reliability:=best_effort",
         "/gait/strides.publisher.history:=keep_last",
@@ -81,20 +81,20 @@ def test_a_quality_is_taken_where_a_run_allows_it():
         "/gait_events.subscription.reliability:=best_effort",
     ],
 )
-def test_a_quality_by_which_a_run_would_lose_messages_is_refused(said):
+def test_a_quality_of_service_with_which_a_run_would_lose_messages_is_refused(override):
     simulated = ("-p", "use_sim_time:=true")
     with (
         pytest.raises(SettingError, match=r"is refused: a run depends on this topic") as caught,
-        node(GaitAnalyzerNode, *simulated, "-p", f"qos_overrides.{said}"),
+        node(GaitAnalyzerNode, *simulated, "-p", f"qos_overrides.{override}"),
     ):
         pass
-    topic = said.rpartition(".")[0]
+    topic = override.rpartition(".")[0]
     assert str(caught.value).startswith(f"qos_overrides.{topic}: ")
     assert "allowed: history keep_" in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
-def test_a_quality_of_no_topic_is_warned_of(capfd):
+def test_a_quality_of_service_of_an_unknown_topic_is_warned_about(capfd):
     with node(Experiment, "-p", "qos_overrides./nowhere.publisher.depth:=7") as made:
         made.offer_ready()
     assert "does not take: qos_overrides./nowhere.publisher.depth" in capfd.readouterr().err
@@ -104,7 +104,7 @@ def test_a_quality_of_no_topic_is_warned_of(capfd):
     ("make", "module"),
     [(Experiment, experiment), (GaitAnalyzerNode, gait_analyzer), (WalkerSim, walker_sim)],
 )
-def test_help_says_what_a_node_takes(make, module, monkeypatch):
+def test_help_lists_what_a_node_accepts(make, module, monkeypatch):
     name = module.__name__.rpartition(".")[2]
     monkeypatch.setattr(sys, "argv", [name, "--help"])
     with pytest.raises(HelpRequestedError) as caught, node(make):
@@ -112,8 +112,8 @@ def test_help_says_what_a_node_takes(make, module, monkeypatch):
     text = str(caught.value)
     assert text.startswith(f"usage: {name} [--ros-args ")
     assert module.__doc__.strip().splitlines()[0] in text
-    for setting, told in settings_of(module.Settings).items():
-        assert f"\n  {setting}: {told.meaning}" in text
+    for name, setting in settings_of(module.Settings).items():
+        assert f"\n  {name}: {setting.meaning}" in text
 
 
 @pytest.mark.parametrize("make", [WalkerSim, SensorSim])
@@ -123,7 +123,7 @@ def test_a_walk_awaits_the_torque_of_both_ankles_if_both_are_pushed(make):
 
 
 @pytest.mark.parametrize("make", [Experiment, GaitAnalyzerNode, WalkerSim])
-def test_what_a_node_was_dumped_with_starts_it_again_without_a_word(make, tmp_path, capfd):
+def test_dumped_parameters_start_the_node_again_without_a_warning(make, tmp_path, capfd):
     with node(make) as made:
         values = {n: p.value for n, p in made._parameters.items() if not n.startswith("qos")}
         name = made.get_fully_qualified_name()
@@ -152,7 +152,7 @@ def test_both_feet_on_one_topic_are_refused(arguments):
 @pytest.mark.parametrize(
     ("name", "value", "reason"),
     [
-        ("mass", 70, ""),  # a whole number does for a real one, as where the node starts
+        ("mass", 70, ""),  # a whole number is accepted for a real one, as at startup
         ("seed", 1.5, "Wrong parameter type"),
         ("mas", 70.0, "mas: unknown parameter"),
     ],

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The clock of a participant: its offset from a question and its answer, and when that is told."""
+"""A participant's clock: its offset from a request and its answer, and when it is reported."""
 
 import pytest
 from hypothesis import given
@@ -20,12 +20,12 @@ MS = 1_000_000
     asked=st.integers(0, 2 * 10**18),
 )
 def test_the_true_offset_lies_within_the_uncertainty(offset, there, back, asked):
-    told = asked + there + offset
-    found = ClockOffset.measured(asked, told, asked + there + back)
+    reported = asked + there + offset
+    found = ClockOffset.measured(asked, reported, asked + there + back)
     assert abs(found.offset - offset / 1e9) <= found.uncertainty + 1e-6
 
 
-def test_a_clock_that_is_off_is_told_at_once_and_one_that_cannot_be_compared_is_asked_again():
+def test_a_clock_that_is_off_is_an_error_and_one_that_cannot_be_compared_is_asked_again():
     ClockOffset.measured(0, 7 * MS, 4 * MS).check("walker_sim", 0.005)
     with pytest.raises(ClockError, match=r"walker_sim is 300.0 ms ahead of this one; allowed: 5"):
         ClockOffset.measured(0, 302 * MS, 4 * MS).check("walker_sim", 0.005)

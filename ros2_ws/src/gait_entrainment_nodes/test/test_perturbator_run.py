@@ -85,7 +85,7 @@ def test_a_horizon_years_ahead_is_refused_and_promises_nothing(bench):
     assert (bench.profiles, bench.robot.promised_until) == ([], SECOND)
 
 
-def test_an_onset_of_no_train_is_not_announced(bench):
+def test_an_onset_that_belongs_to_no_train_is_not_announced(bench):
     profile = TorqueProfile(Side.RIGHT, (SECOND,), (0.0,), (SECOND,), 2 * SECOND)
     bench.robot._robot.promise = lambda _: profile
     bench.run.take_horizon(SECOND, 2 * SECOND, last=False)
@@ -114,7 +114,7 @@ def test_train_beyond_the_limits_is_refused_and_changes_nothing(bench):
     assert not any(profile.stop for profile in bench.profiles)
 
 
-def test_cancelling_stops_the_torque_at_the_latest_instant_known(bench):
+def test_cancelling_stops_the_torque_at_the_latest_known_time(bench):
     bench.run.schedule(TRAIN, KEY)
     bench.run.take_horizon(2 * SECOND, 4 * SECOND, last=False)
     bench.run.end_torque(Result.CANCELLED, "cancelled by the client")
@@ -125,7 +125,7 @@ def test_cancelling_stops_the_torque_at_the_latest_instant_known(bench):
     assert nanoseconds_of(stop.valid_until) == 4 * SECOND
     last = bench.states[-1]
     assert (last.commanded_torque, nanoseconds_of(last.header.stamp)) == (0.0, 2 * SECOND)
-    # Told once; what is promised from here on has no torque.
+    # Reported once; what is promised afterwards has no torque.
     bench.run.end_torque(Result.STOPPED, "again")
     assert bench.profiles[-1] is stop
     bench.run.take_horizon(4 * SECOND, 6 * SECOND, last=False)
@@ -133,7 +133,7 @@ def test_cancelling_stops_the_torque_at_the_latest_instant_known(bench):
     assert bench.profiles[-1].revision == stop.revision + 1
 
 
-def test_closing_horizon_is_answered_without_length_and_ends_the_train(bench):
+def test_closing_horizon_gets_a_profile_without_length_and_ends_the_train(bench):
     bench.run.schedule(TRAIN, KEY)
     bench.run.take_horizon(SECOND, 4 * SECOND, last=False)
     bench.run.take_horizon(4 * SECOND, 4 * SECOND, last=True)
@@ -150,7 +150,7 @@ def test_closing_horizon_is_answered_without_length_and_ends_the_train(bench):
     assert len(bench.profiles) == count
 
 
-def test_fault_is_told_the_walker_even_if_no_torque_was_due(bench):
+def test_fault_is_reported_to_the_walker_even_if_no_torque_was_due(bench):
     bench.run.take_horizon(SECOND, 2 * SECOND, last=False)
     bench.robot.stop()
     bench.run.end_torque(Result.STOPPED, "the stop service was called", fault=True)
@@ -161,7 +161,7 @@ def test_fault_is_told_the_walker_even_if_no_torque_was_due(bench):
         bench.run.schedule(TRAIN, KEY)
 
 
-def test_fault_found_in_what_was_delivered_is_no_delivered_train(bench, monkeypatch):
+def test_train_with_a_fault_in_its_delivery_does_not_count_as_delivered(bench, monkeypatch):
     bench.run.schedule(TRAIN, KEY)
     promise = bench.robot.promise
 
@@ -176,7 +176,7 @@ def test_fault_found_in_what_was_delivered_is_no_delivered_train(bench, monkeypa
     assert bench.states[-1].status == AnkleRobotState.FAULT
 
 
-def test_driver_that_fails_is_told(bench, monkeypatch):
+def test_failure_of_a_driver_is_reported(bench, monkeypatch):
     def fail(_):
         raise DeviceError("bus gone")
 
@@ -186,7 +186,7 @@ def test_driver_that_fails_is_told(bench, monkeypatch):
     assert bench.profiles == []
 
 
-def test_real_robots_torque_is_promised_piece_by_piece(bench, monkeypatch):
+def test_torque_of_a_real_robot_is_promised_piece_by_piece(bench, monkeypatch):
     promise = bench.robot.promise
     measured = [SECOND, SECOND + SECOND // 2, 2 * SECOND]
     monkeypatch.setattr(bench.robot, "promise", lambda until: promise(min(measured[0], until)))
@@ -203,7 +203,7 @@ def test_real_robots_torque_is_promised_piece_by_piece(bench, monkeypatch):
     assert len(bench.states) >= states
 
 
-def test_trains_end_in_their_order_each_once_its_last_pulse_is_promised(bench):
+def test_trains_end_in_order_each_once_its_last_pulse_is_promised(bench):
     bench.run.take_horizon(SECOND, 2 * SECOND, last=False)
     bench.run.schedule(TRAIN, KEY)
     bench.run.schedule(TRAIN.shifted(5 * SECOND), KEY)
@@ -235,7 +235,7 @@ def test_a_stranger_gets_no_pulse_before_between_or_after_those_of_the_run(
     bench.run.take_horizon(SECOND, 2 * SECOND, last=False)
     strange = PulseTrain.periodic(Side.RIGHT, first * SECOND // 2, 1.0, count, torque, 0.1)
     before = bench.robot.train
-    for asked in (key, bench.run.seal):  # who listens knows the seal
+    for asked in (key, bench.run.seal):  # any listener knows the seal
         with pytest.raises(LimitError, match="key: not that of the run"):
             bench.run.schedule(strange, asked)
     assert bench.robot.train is before
@@ -262,7 +262,7 @@ def test_pulses_of_every_shape_survive_the_goal():
         train_of(goal)
 
 
-def test_each_ankle_is_promised_by_itself_and_a_fault_of_one_ends_both():
+def test_each_ankle_has_its_own_promises_and_a_fault_of_one_ends_both():
     robots = make_robots("ideal", (Side.RIGHT, Side.LEFT), DeviceLimits())
     for robot in robots.values():
         robot.configure()

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Bytes of messages against what ROS itself and an independent library make of them."""
+"""Bytes of messages, checked against ROS itself and an independent library."""
 
 import math
 import struct
@@ -54,7 +54,7 @@ def test_constants_of_messages_are_those_of_the_core(message, enums):
 
 @cache
 def types_of_rosbags(name):
-    """Return the types that the rosbags library knows, with one of ours."""
+    """Return the types that the rosbags library knows, plus one of ours."""
     store = get_typestore(Stores.ROS2_JAZZY)
     types = get_types_from_msg(find_definition(name).schema_text, name)
     store.register({key: t for key, t in types.items() if key not in store.fielddefs})
@@ -62,7 +62,7 @@ def types_of_rosbags(name):
 
 
 def by_rosbags(message):
-    """Serialize by the rosbags library, which writes zeros where nothing belongs."""
+    """Serialize with the rosbags library, which pads with zeros."""
     name = "gait_entrainment_msgs/msg/" + type(message).__name__
     store = types_of_rosbags(name)
     stamp = store.types["builtin_interfaces/msg/Time"]
@@ -155,13 +155,13 @@ def test_filled_template_is_what_ros_serializes(table):
         assert deserialize_message(data, JointState) == expected
 
 
-def test_numbers_that_are_not_numbers_pass_through():
+def test_nan_passes_through():
     template = MessageTemplate(JointState(), {"position": 1})
     (data,) = template.fill(np.array([7]), np.array([[math.nan]]))
     assert math.isnan(deserialize_message(data, JointState).position[0])
 
 
-def test_nested_numbers_are_filled_where_they_adjoin():
+def test_adjoining_nested_numbers_are_filled():
     template = MessageTemplate(WrenchStamped(), {"wrench.force.x": 3})
     (data,) = template.fill(np.array([7]), np.array([[1.0, 2.0, 3.0]]))
     wrench = deserialize_message(data, WrenchStamped).wrench
@@ -169,12 +169,12 @@ def test_nested_numbers_are_filled_where_they_adjoin():
     assert wrench.torque.x == 0.0
 
 
-def test_stamp_lies_where_the_recorder_looks_for_it():
+def test_stamp_is_where_the_recorder_looks_for_it():
     data = serialize(JointState(header=header(12_000_000_034)))
     assert struct.unpack_from("<iI", data, 4) == (12, 34)
 
 
-def test_a_message_without_fields_has_the_octet_that_stands_for_them():
+def test_a_message_without_fields_has_a_placeholder_octet():
     data = serialize(Empty())
     assert data == b"\x00\x01\x00\x00\x00"
     assert deserialize_message(data, Empty) == Empty()

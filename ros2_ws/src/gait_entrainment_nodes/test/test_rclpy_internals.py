@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is taken past the executor: every message, in order, as many as asked for."""
+"""Messages taken without the executor: every one, in order, at most as many as requested."""
 
 import time
 

@@ -27,7 +27,7 @@ def numbers(element, attribute):
 
 def points_of(description, angles, base):
     """
-    Put points of the links into the world: independent forward kinematics of any URDF.
+    Transform points of the links to the world: independent forward kinematics of any URDF.
 
     Returns a function of a link and a point in its frame.
     """
@@ -60,14 +60,14 @@ def test_feet_are_where_the_walker_has_them(parameters):
         walker.extend_torque(side, [0], [0.0], until)
     strikes = [e.stamp for e in walker.advance(until) if e.kind == EventKind.HEEL_STRIKE]
     assert len(strikes) > 2  # more than a stride
-    instants = np.arange(0, until, 7_000_000)
-    samples = walker.sample(instants)
+    times = np.arange(0, until, 7_000_000)
+    samples = walker.sample(times)
     footing = Footing(parameters.leg_length, parameters.foot_length)
-    for i, instant in enumerate(instants):
+    for i, time in enumerate(times):
         position = samples.position[i]
         x, z = footing.place(position[:2], position[2:])
         place = points_of(description, dict(zip(JOINTS, position, strict=True)), [x, 0.0, z])
-        heel = parameters.step_length * (np.searchsorted(strikes, instant, side="right") - 1)
+        heel = parameters.step_length * (np.searchsorted(strikes, time, side="right") - 1)
         leading, trailing = ("l", "r") if samples.leading[i] == Side.LEFT else ("r", "l")
         toe = [parameters.foot_length, 0.0, 0.0]
         at_heel = place(f"{leading}_sole", [0.0, 0.0, 0.0])[[0, 2]]
@@ -83,10 +83,10 @@ def test_feet_are_where_the_walker_has_them(parameters):
         if samples.double_stance[i]:
             rear = place(f"{trailing}_sole", toe)[[0, 2]]
             assert rear == pytest.approx([heel - parameters.toe_separation, 0.0], abs=1e-9)
-    assert 0 < samples.double_stance.sum() < instants.size
+    assert 0 < samples.double_stance.sum() < times.size
 
 
-def test_what_is_drawn_lies_along_leg_and_foot():
+def test_drawn_shapes_lie_along_leg_and_foot():
     text = xacro.process_file(str(URDF), mappings={"leg_length": "0.8"}).toxml()
     links = {link.get("name"): link for link in ElementTree.fromstring(text).iter("link")}
     for prefix in ("l", "r"):

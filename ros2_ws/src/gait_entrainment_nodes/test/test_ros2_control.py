@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the driver of ros2_control robots believes of a joint's states, without a robot."""
+"""How the driver for ros2_control robots reads a joint's states, without a robot."""
 
 import math
 import time
@@ -25,19 +25,19 @@ def reading(publishers=1, subscribers=1, **state):
     return joint._state and joint._reading(joint._state)
 
 
-def test_the_joint_is_found_wherever_it_is_in_a_state():
+def test_the_joint_is_found_at_any_place_in_a_state():
     assert (reading().torque, reading().angle) == (1.0, 0.1)
     turned = reading(name=["ankle", "knee"])
     assert (turned.torque, turned.angle) == (9.0, 0.9)
 
 
 @pytest.mark.parametrize("names", [[], ["knee"], ["ankle", "ankle"]])
-def test_a_state_in_which_the_joint_is_not_once_is_none(names):
+def test_a_state_that_does_not_have_the_joint_exactly_once_is_ignored(names):
     assert reading(name=names) is None
 
 
 @pytest.mark.parametrize("effort", [[], [9.0], [9.0, math.nan]])
-def test_an_effort_that_is_not_told_is_no_number(effort):
+def test_a_missing_effort_is_nan(effort):
     assert math.isnan(reading(effort=effort).torque)
 
 
@@ -45,6 +45,6 @@ def test_an_effort_that_is_not_told_is_no_number(effort):
     ("publishers", "subscribers", "faults"),
     [(1, 1, []), (2, 1, ["second_master"]), (1, 0, ["controller_gone"])],
 )
-def test_who_else_commands_and_that_nobody_listens_are_faults(publishers, subscribers, faults):
+def test_a_second_commander_and_a_missing_controller_are_faults(publishers, subscribers, faults):
     found = reading(publishers, subscribers).faults
     assert [fault.name for fault in found] == faults

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What an emulated sensor measures arrives as its message says; a signal without one is told."""
+"""Values of emulated sensors survive their message; a signal without a message is an error."""
 
 import pytest
 from rclpy.serialization import deserialize_message
@@ -39,13 +39,13 @@ def test_each_detector_has_a_topic_for_each_foot(name):
     assert ["left" in topic for topic in source.topics] == [True, False]
 
 
-def test_inertial_sensors_are_told_apart_by_name_and_strange_signals_are_refused():
+def test_inertial_sensors_are_distinguished_by_name_and_unknown_signals_are_refused():
     gyroscope = ("gyro_y",)
     assert source_of("my_gyroscope", gyroscope) is FOOT
     assert source_of("shank_gyroscope", gyroscope) is SHANK
     with pytest.raises(UsageError, match="mine: no sensor's message carries gyro_y, heel"):
         source_of("mine", ("gyro_y", "heel"))
-    with pytest.raises(IndexError):  # a joint state of no joint
+    with pytest.raises(IndexError):  # a joint state without joints
         ENCODER.reader(("angle",))(sensor_topics(ENCODER)[0].type())
-    unworn = sensor_topics(ENCODER)[0].type(position=[0.3])  # by no robot, so without torque
+    unworn = sensor_topics(ENCODER)[0].type(position=[0.3])  # not on a robot, so without torque
     assert ENCODER.reader(("angle", "torque"))(unworn) == (0.3, 0.0)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Waiting in a coroutine: conditions, times that are over, and a process that was held up."""
+"""Waiting in a coroutine: conditions, timeouts, and a process that was held up."""
 
 import pytest
 
@@ -11,7 +11,7 @@ SILENCE = 3.0
 
 
 class Bench:
-    """A loop as a node's, on a clock of its own."""
+    """A loop like a node's, on its own clock."""
 
     def __init__(self):
         self.now = 100.0
@@ -30,7 +30,7 @@ def bench():
     return Bench()
 
 
-def test_coroutine_goes_on_once_its_condition_holds(bench):
+def test_coroutine_resumes_once_its_condition_holds(bench):
     answer = []
 
     async def wait():
@@ -42,36 +42,36 @@ def test_coroutine_goes_on_once_its_condition_holds(bench):
     bench.run(102.0)
     assert bench.happened == []
     answer.append("here")
-    assert bench.waiting.deadline <= bench.now  # at once, not at the next tick
+    assert bench.waiting.deadline <= bench.now  # now, not at the next tick
     bench.waiting.look_after(SILENCE)
     assert bench.happened == ["here"]
     assert not bench.waiting.busy
     assert bench.waiting.deadline > bench.now
 
 
-def test_what_is_overdue_is_raised_or_let_go(bench):
+def test_timeout_raises_if_an_error_is_given_and_returns_otherwise(bench):
     async def wait():
         await bench.waiting.until(lambda: False, 1.0)
-        bench.happened.append("let go")
+        bench.happened.append("returned")
         try:
-            await bench.waiting.until(lambda: False, 1.0, TimeoutError("nobody"))
+            await bench.waiting.until(lambda: False, 1.0, TimeoutError("overdue"))
         except TimeoutError as error:
             bench.happened.append(str(error))
 
     bench.waiting.begin(wait())
     bench.run(101.5)
-    assert bench.happened == ["let go"]
+    assert bench.happened == ["returned"]
     bench.run(103.0)
-    assert bench.happened == ["let go", "nobody"]
+    assert bench.happened == ["returned", "overdue"]
 
 
-def test_nobody_is_to_blame_while_this_process_was_held_up(bench):
+def test_timeout_is_extended_if_this_process_was_held_up(bench):
     async def wait():
         await bench.waiting.until(lambda: False, 3.0, TimeoutError())
 
     bench.waiting.begin(wait())
     bench.run(101.0)
-    bench.now += 10.0  # the loop did not come by
+    bench.now += 10.0  # the loop did not run
     assert bench.waiting.look_after(SILENCE)
     bench.run(bench.now + 1.5)
     assert bench.waiting.busy
@@ -79,7 +79,7 @@ def test_nobody_is_to_blame_while_this_process_was_held_up(bench):
         bench.run(bench.now + 1.0)
 
 
-def test_tick_that_is_a_little_late_is_none(bench):
+def test_slightly_late_tick_does_not_count_as_held_up(bench):
     bench.waiting.look_after(SILENCE)
     bench.now += HELD_UP * SILENCE
     assert not bench.waiting.look_after(SILENCE)

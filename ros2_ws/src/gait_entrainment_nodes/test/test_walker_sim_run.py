@@ -30,7 +30,7 @@ def profile(begin, until, torque=0.0):
 
 
 def closing(until):
-    """Return a profile without length, which only says where the run ends."""
+    """Return a profile without length, which only gives the end of the run."""
     return TorqueProfile(Side.RIGHT, (until,), (0.0,), (), until)
 
 
@@ -55,7 +55,7 @@ def real_time(clock):
     return RealTimeRun(3, walker(), START, due_at=SECOND, clock=clock)
 
 
-def test_each_promised_stretch_is_walked_at_once_and_reported():
+def test_each_promised_stretch_is_walked_immediately_and_reported():
     run = lock_step()
     assert run.due() is None
     run.promise(profile(0, SECOND), False)
@@ -73,7 +73,7 @@ def test_each_promised_stretch_is_walked_at_once_and_reported():
     assert run.due() is None
 
 
-def test_walker_keeps_to_what_the_recorder_has_acknowledged():
+def test_walker_waits_for_the_recorder_to_acknowledge():
     run = lock_step(acknowledged=True)
     for second in range(4):
         run.promise(profile(second * SECOND, (second + 1) * SECOND), False)
@@ -99,14 +99,14 @@ def test_profile_without_length_ends_the_run():
     assert math.isnan(timing.publish_late_p50)
 
 
-def test_missing_promise_is_refused():
+def test_gap_between_promises_is_refused():
     run = lock_step()
     run.promise(profile(0, SECOND), False)
     with pytest.raises(ValueError, match="adjoin"):
         run.promise(profile(2 * SECOND, 3 * SECOND), False)
 
 
-def test_a_promise_that_ends_before_where_the_walk_is_moves_nobody():
+def test_a_promise_that_ends_before_the_time_reached_does_not_move_the_walk():
     run = lock_step()
     run.promise(profile(0, SECOND), False)
     list(run.walk())
@@ -134,7 +134,7 @@ def test_stop_ends_the_torque_and_is_remembered():
     assert not report.reproducible
 
 
-def test_walker_that_falls_and_one_that_is_shut_down_say_so():
+def test_a_fall_and_a_shutdown_are_reported():
     run = lock_step()
     run.promise(profile(0, 30 * SECOND, torque=-30.0), False)
     *_, report = run.walk()
@@ -158,7 +158,7 @@ def test_in_real_time_nothing_comes_before_it_is_due(real_time, clock):
     assert real_time.due() == 1.019
     clock.now = SECOND + 20 * MILLISECOND
     stretch, report = real_time.walk()
-    assert list(stretch.sample_times) == []  # torque at 20 ms belongs to what comes after
+    assert list(stretch.sample_times) == []  # torque at 20 ms belongs to what follows
     clock.now = SECOND + 25 * MILLISECOND
     (stretch,) = real_time.walk()
     assert list(stretch.sample_times) == [20 * MILLISECOND]
@@ -168,7 +168,7 @@ def test_in_real_time_nothing_comes_before_it_is_due(real_time, clock):
     assert timing.publish_late_worst == pytest.approx(0.015)
 
 
-def test_in_real_time_what_is_promised_is_walked_before_it_is_due(real_time, clock):
+def test_in_real_time_a_promised_stretch_is_walked_before_it_is_due(real_time, clock):
     real_time.promise(profile(0, 15 * MILLISECOND, torque=5.0), False)
     clock.now = SECOND - MILLISECOND
     walk = real_time.walk()
@@ -180,7 +180,7 @@ def test_in_real_time_what_is_promised_is_walked_before_it_is_due(real_time, clo
     clock.now = SECOND + 9 * MILLISECOND
     (stretch,) = real_time.walk()
     assert list(stretch.sample_times) == [10 * MILLISECOND]
-    # A stop counts from what has been walked on; nothing is promised for the next sample.
+    # A stop acts from where the walk has got to; nothing is promised for the next sample.
     real_time.stop(9 * MILLISECOND)
     assert real_time.due() == 1.02
     clock.now = SECOND + 20 * MILLISECOND
@@ -190,7 +190,7 @@ def test_in_real_time_what_is_promised_is_walked_before_it_is_due(real_time, clo
     assert timing.starved == pytest.approx(0.005)
 
 
-def test_what_was_walked_early_waits_until_it_is_due():
+def test_a_stretch_walked_early_waits_until_it_is_due():
     begin = time.monotonic_ns()
     run = RealTimeRun(3, walker(), START, due_at=begin + 20 * MILLISECOND)
     run.promise(profile(0, SECOND), False)
@@ -209,7 +209,7 @@ def test_stretch_without_a_promise_is_walked_without_torque_and_counted_once(rea
     assert not reported[-1].reproducible
     torques = [t for s in reported if isinstance(s, Stretch) for t in s.samples.delivered_torque]
     assert [torque[Side.RIGHT] for torque in torques][1:] == [5.0] * 9 + [0.0] * 20
-    # What is promised now came too late for the first part of it, and is walked from here on.
+    # What is promised now is too late for its first part; only the rest is walked.
     late = real_time.promise(profile(95 * MILLISECOND, SECOND, torque=7.0), False)
     assert late == 200 * MILLISECOND
     clock.now = SECOND + 345 * MILLISECOND
@@ -234,7 +234,7 @@ def test_run_in_real_time_ends_when_its_end_is_due(real_time, clock):
     assert report.samples == 100
 
 
-def test_end_that_came_late_is_now(real_time, clock):
+def test_end_that_comes_late_is_moved_to_now(real_time, clock):
     real_time.promise(profile(0, SECOND), False)
     clock.now = 2 * SECOND + 500 * MILLISECOND
     list(real_time.walk())
