@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""In a workspace that lacks a Python package the command line says so."""
+"""The command line: missing packages, signals, output that fails, commands that do not load."""
 
 import os
 import signal
@@ -22,26 +22,28 @@ sys.exit(main(["simulate"]))
 """
 
 
-def test_missing_package_is_one_line():
+def test_a_missing_package_is_reported_in_one_line():
     done = subprocess.run([sys.executable, "-c", WITHOUT_NUMBA], capture_output=True, text=True)
     assert done.returncode == 1
     assert "package numba is missing" in done.stderr
     assert len(done.stderr.splitlines()) == 1
 
 
-@pytest.mark.parametrize(("command", "heeded"), [("driver", True), ("simulate", False)])
-def test_what_drives_a_robot_heeds_signals_before_it_is_loaded(monkeypatch, command, heeded):
+@pytest.mark.parametrize(("command", "handled"), [("driver", True), ("simulate", False)])
+def test_robot_commands_handle_signals_before_they_are_loaded(monkeypatch, command, handled):
     before = {number: signal.signal(number, signal.SIG_IGN) for number in STOPPING}
     seen = {}
-    look = "gait_entrainment_commands.make_parser"
-    monkeypatch.setattr(look, lambda _: seen.update({n: signal.getsignal(n) for n in STOPPING}))
+    make_parser = "gait_entrainment_commands.make_parser"
+    monkeypatch.setattr(
+        make_parser, lambda _: seen.update({n: signal.getsignal(n) for n in STOPPING})
+    )
     try:
         with pytest.raises(AttributeError):  # there is no parser
             main([command])
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-    assert set(seen.values()) == {signal.default_int_handler if heeded else signal.SIG_IGN}
+    assert set(seen.values()) == {signal.default_int_handler if handled else signal.SIG_IGN}
 
 
 @pytest.mark.parametrize(
@@ -52,32 +54,30 @@ def test_what_drives_a_robot_heeds_signals_before_it_is_loaded(monkeypatch, comm
         ("stderr", ["simulate", "--baseline=-3"], 2),
     ],
 )
-def test_where_nothing_can_be_written_the_exit_code_tells(monkeypatch, stream, arguments, code):
+def test_the_exit_code_is_right_if_nothing_can_be_written(monkeypatch, stream, arguments, code):
     with open("/dev/full", "w", buffering=1) as full:
         monkeypatch.setattr(sys, stream, full)
         assert main(arguments) == code
         os.dup2(os.open(os.devnull, os.O_WRONLY), full.fileno())
 
 
-def test_an_error_is_one_line_before_the_end_of_a_log(monkeypatch, capsys):
+def test_an_error_is_one_line_followed_by_the_end_of_a_log(monkeypatch, capsys):
     def fail(_):
         raise EntrainmentError("no file a\nb\n  walker_sim| started\n  walker_sim| failed")
 
     monkeypatch.setattr("gait_entrainment_commands.make_parser", fail)
     assert main(["run_it"]) == 1
-    told = "entrain run_it: no file a\\nb\n  walker_sim| started\n  walker_sim| failed\n"
-    assert capsys.readouterr().err == told
+    expected = "entrain run_it: no file a\\nb\n  walker_sim| started\n  walker_sim| failed\n"
+    assert capsys.readouterr().err == expected
 
 
-def test_figures_ask_no_backend_of_windows(monkeypatch):
+def test_figures_ignore_a_backend_with_windows(monkeypatch):
     monkeypatch.setenv("MPLBACKEND", "module://of.a.notebook")
     assert main(["simulate", "--baseline=-3"]) == 2
     assert "MPLBACKEND" not in os.environ
 
 
-def test_a_broken_command_of_somebody_else_does_not_take_the_others_with_it(
-    monkeypatch, tmp_path, capsys
-):
+def test_a_broken_external_command_does_not_break_the_others(monkeypatch, tmp_path, capsys):
     (tmp_path / "of_somebody.py").write_text("1 / 0")
     monkeypatch.syspath_prepend(tmp_path)
     about = tmp_path / "of_somebody-1.dist-info"

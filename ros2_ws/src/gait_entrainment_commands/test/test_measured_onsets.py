@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Measured onsets as they become known: however the streams interleave, those of the whole run."""
+"""Measured onsets as they become known: any interleaving gives the onsets of the whole run."""
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -31,7 +31,7 @@ def record(driver, period):
 
 RUNS = [
     record("emulated:jitter=0.005,loss=0.3,state_rate=200", 0.45),
-    # The next pulse begins before the one before it could be judged.
+    # The next pulse begins before the previous one can be judged.
     record("emulated:bandwidth=5,delay=0.05,loss=0.3,state_rate=200", 0.15),
     record("ideal", 0.15),
 ]
@@ -68,7 +68,7 @@ def test_every_interleaving_gives_the_audit_of_the_whole_run_and_keeps_its_promi
             assert all(onset >= promised for onset in found)
             known += found
             promised = max(promised, until)
-    # All but the last pulses have been told before the end.
+    # All but the last pulses are known before the end.
     assert promised > promises[-1][1] - 900 * MS
     known += onsets.finish()
     assert onsets.timings == judged_at_once(pulses, states)
@@ -76,7 +76,7 @@ def test_every_interleaving_gives_the_audit_of_the_whole_run_and_keeps_its_promi
     assert len(known) == 8
 
 
-def test_pulses_called_off_by_a_stop_are_none():
+def test_pulses_cancelled_by_a_stop_have_no_onset():
     onsets = MeasuredOnsets()
     onsets.add_promise([100 * MS, 700 * MS, 900 * MS], 1000 * MS)
     onsets.add_pulse(100 * MS, HEIGHT, WIDTH)

@@ -18,7 +18,7 @@ from gait_entrainment_commands.outcome import distribution, outcome_of, summary
 MS = 1_000_000
 
 
-def test_the_distribution_is_that_of_the_pulses_seen():
+def test_the_distribution_is_that_of_the_observed_pulses():
     timings = [PulseTiming(0, n * MS, None) for n in range(1, 201)] + [PulseTiming(0, None, None)]
     figures = distribution(timings, "sent", 2.0)
     assert figures["pulses"] == 200
@@ -32,16 +32,16 @@ def test_the_distribution_is_that_of_the_pulses_seen():
     assert distribution([*timings, sham], "sent", 2.0)["missing"] == 1
 
 
-def test_a_pulse_without_its_toe_off_has_no_say_in_the_final_lag():
+def test_a_pulse_without_its_toe_off_does_not_affect_the_final_lag():
     simulated = simulate(Protocol())
-    whole = outcome_of(simulated)
+    complete = outcome_of(simulated)
     last = simulated.analysis.pulses[-1].toe_off
     events = tuple(event for event in simulated.events if event.stamp != last)
     analysis = analyze(events, simulated.onsets, Side.RIGHT)
     assert math.isnan(analysis.pulses[-1].phase_lag)
     outcome = outcome_of(replace(simulated, events=events, analysis=analysis))
-    assert outcome["final_phase_lag"] == pytest.approx(whole["final_phase_lag"], abs=1e-6)
-    assert outcome["double_stance"] == pytest.approx(whole["double_stance"], abs=1e-6)
+    assert outcome["final_phase_lag"] == pytest.approx(complete["final_phase_lag"], abs=1e-6)
+    assert outcome["double_stance"] == pytest.approx(complete["double_stance"], abs=1e-6)
 
 
 BLOCKS = """
@@ -86,13 +86,13 @@ def test_each_block_has_its_own_line_and_verdict():
         ("pulses: {jitter: 0.05, count: 5}", "13.35 N m", ", each off by up to 50 ms"),
     ],
 )
-def test_a_single_block_is_told_with_its_pulses(text, begin, end):
+def test_the_summary_of_a_single_block_describes_its_pulses(text, begin, end):
     found = summary(outcome_of(simulate(read_protocol(text + "\n")))).splitlines()[2]
     assert found.startswith(f"pulses           {begin}")
     assert found.endswith(end)
 
 
-def test_what_is_lost_between_blocks_is_told():
+def test_events_lost_between_blocks_are_a_hole():
     blocks = "[{baseline: 3, pulses: {count: 0}, rest: 30}, {baseline: 3, pulses: {count: 3}}]"
     simulated = simulate(read_protocol(f"blocks: {blocks}\n"))
     assert outcome_of(simulated)["holes"] == []
@@ -104,7 +104,7 @@ def test_what_is_lost_between_blocks_is_told():
     assert hole["end"] - hole["start"] == pytest.approx(8.0, abs=1.5)
 
 
-def test_an_open_baseline_is_told_as_walked():
+def test_an_open_baseline_is_reported_as_walked():
     protocol = read_protocol("baseline: 3\nbaseline_time: 12\nwashout: 1\npulses: {count: 3}\n")
     outcome = outcome_of(simulate(protocol))
     (block,) = outcome["blocks"]

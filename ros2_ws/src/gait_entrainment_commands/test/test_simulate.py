@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""entrain simulate: one JSON object with what was promised, and one line for every mistake."""
+"""entrain simulate: one JSON object with the documented keys, one line for every mistake."""
 
 import itertools
 import json
@@ -30,7 +30,7 @@ def simulate(capsys, *options):
     return code, out, err
 
 
-def test_json_holds_what_is_promised(capsys):
+def test_json_is_as_documented(capsys):
     code, out, err = simulate(capsys, "--json", "--initial-phase", "0.2", "--side", "left")
     assert (code, err) == (0, "")
     outcome = json.loads(out)
@@ -49,7 +49,7 @@ def test_json_holds_what_is_promised(capsys):
     assert outcome["parameters"]["walker"]["ankle_stiffness"] == 87.3
 
 
-def test_a_sham_of_no_torque_is_walked_and_drifts(capsys):
+def test_a_sham_without_torque_is_walked_and_drifts(capsys):
     code, out, err = simulate(capsys, "--json", "--torque", "0")
     assert (code, err) == (0, "")
     outcome = json.loads(out)
@@ -60,7 +60,7 @@ def test_a_sham_of_no_torque_is_walked_and_drifts(capsys):
     assert (code, err) == (0, "")
 
 
-def test_a_stride_period_that_nothing_measured_is_not_told(capsys):
+def test_a_stride_period_that_was_not_measured_is_not_reported(capsys):
     options = ["--baseline", "1", "--period", "1.8", "--driver", "emulated"]
     code, out, _ = simulate(capsys, *options)
     assert code == 0
@@ -128,7 +128,7 @@ def test_a_mistake_gives_one_line_and_exit_code_2(capsys, options, words):
         (["--driver", "ak_mit_can:channel=none"], ["real time only", "entrain run --real-time"]),
     ],
 )
-def test_what_the_robot_cannot_do_gives_one_line_and_exit_code_1(capsys, options, words):
+def test_an_impossible_robot_setting_gives_one_line_and_exit_code_1(capsys, options, words):
     code, out, err = simulate(capsys, *options)
     assert (code, out) == (1, "")
     assert err.count("\n") == 1
@@ -136,7 +136,7 @@ def test_what_the_robot_cannot_do_gives_one_line_and_exit_code_1(capsys, options
         assert word in err
 
 
-def test_a_fall_is_told_and_is_exit_code_1(capsys):
+def test_a_fall_is_reported_with_exit_code_1(capsys):
     code, out, err = simulate(
         capsys, "--torque", "-29", "--width", "0.4", "--initial-phase", "0.5", "--json"
     )
@@ -146,7 +146,7 @@ def test_a_fall_is_told_and_is_exit_code_1(capsys):
 
 
 def test_simulating_loads_neither_ros_nor_matplotlib():
-    """They take longer than the simulation."""
+    """Loading them takes longer than the simulation."""
     code = (
         "import sys, gait_entrainment_commands as c;"
         "c.main(['simulate', '--pulses', '2', '--washout', '1', '--baseline', '2']);"

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Measured onsets against flanks whose crossing is known in closed form."""
+"""Measured onsets, checked against flanks with a crossing in closed form."""
 
 import math
 
@@ -38,7 +38,7 @@ def test_a_linear_flank_is_crossed_exactly_between_samples(onset, rise, height, 
     index, found = measured_onset([round(t * MS) for t in times], torques, height, fraction)
     assert times[index] * MS >= found - 1
     crossing = onset + fraction * rise
-    # On the flank's own line the interpolation is exact; else it lies within its sample.
+    # Interpolation is exact on the flank itself; otherwise the result lies within its sample.
     earlier = max(t for t in times if t < crossing)
     if earlier >= onset and earlier + step <= onset + rise:
         assert found == pytest.approx(crossing * MS, abs=3)
@@ -46,14 +46,14 @@ def test_a_linear_flank_is_crossed_exactly_between_samples(onset, rise, height, 
         assert earlier * MS - 1 <= found <= (earlier + step) * MS + 1
 
 
-def test_what_never_rises_or_was_never_low_has_no_onset():
+def test_a_torque_that_never_rises_or_was_never_low_has_no_onset():
     assert measured_onset([0, MS, 2 * MS], [0.0, 4.9, 4.0], 10.0) is None
     assert measured_onset([0, MS], [9.0, 10.0], 10.0) is None
     assert measured_onset([0, MS], [math.nan, math.nan], 10.0) is None
     assert measured_onset([], [], 10.0) is None
 
 
-def test_a_torque_that_is_known_only_where_it_jumps_is_not_interpolated():
+def test_a_torque_that_is_known_only_at_its_jumps_is_not_interpolated():
     assert measured_onset([0, 500 * MS], [0.0, 10.0], 10.0) == (1, 500 * MS)
 
 
@@ -75,14 +75,14 @@ def test_the_audit_of_an_emulated_robot_finds_its_delay_and_lag():
     onsets.finish()
     timings = onsets.timings
     assert [t.commanded for t in timings] == [500 * MS, 1500 * MS, 2500 * MS]
-    # Asked for after the delay; half the height is reached ln 2 time constants later.
+    # Sent after the delay; half the height is reached ln 2 time constants later.
     half = 7 + 1e3 * math.log(2) / (2 * math.pi * 10)
     for timing in timings:
         assert timing.sent - timing.commanded == 7 * MS
         assert (timing.measured - timing.commanded) / MS == pytest.approx(half - 1, abs=0.2)
 
 
-def test_a_pulse_that_never_came_is_told_as_missing():
+def test_a_pulse_that_never_came_is_reported_as_missing():
     onsets = MeasuredOnsets()
     onsets.add_promise([100 * MS], 1000 * MS)
     onsets.add_pulse(100 * MS, 5.0, 0.1)
@@ -102,7 +102,7 @@ def default():
 
 
 def test_a_device_of_realistic_bandwidth_still_entrains(default):
-    """Its pulses come later, so the gait locks with them commanded earlier by as much."""
+    """Its pulses come later, so the gait locks to pulses commanded earlier by the same time."""
     emulated = simulate(Protocol(driver="emulated"), timings_of=timings_of)
     assert emulated.analysis.entrainments[-1].verdict is Verdict.ENTRAINED
     late = [(t.measured - t.commanded) / 1e9 for t in emulated.timings]
@@ -111,7 +111,7 @@ def test_a_device_of_realistic_bandwidth_still_entrains(default):
     assert max(late) < 0.020
     lag, ideal = (s.analysis.pulses[-1].phase_lag for s in (emulated, default))
     assert lag < ideal - 0.005
-    # Seen from the torque that was measured, the lag is nearer to the ideal robot's.
+    # With onsets from the measured torque, the lag is nearer to the ideal robot's.
     seen = simulate(Protocol(driver="emulated"), timings_of=timings_of, measured_onsets=True)
     assert seen.events == emulated.events
     assert abs(seen.analysis.pulses[-1].phase_lag - ideal) < abs(lag - ideal) / 2

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The gate and the seat: who gets through, and who acts."""
+"""The gate and the seat: who gets in, and who may act."""
 
 import asyncio
 
@@ -26,7 +26,7 @@ HERE = {"host": "127.0.0.1:8080"}
 FAR = Access("0.0.0.0", {TOKEN: ACT, LOOK_TOKEN: LOOK})
 
 
-def asked(access, headers, query="", kind="http", method="GET", path="/"):
+def request(access, headers, query="", kind="http", method="GET", path="/"):
     """Send a request through a gate; return status, headers, and the scope behind it."""
     sent, passed = [], []
 
@@ -44,13 +44,13 @@ def asked(access, headers, query="", kind="http", method="GET", path="/"):
     }  # fmt: skip
     asyncio.run(Gate(app, access, 8080)(scope, None, send))
     first = sent[0]
-    told = [(k.decode(), v.decode()) for k, v in first.get("headers", [])]
-    return first.get("status", first["type"]), told, passed[0] if passed else None
+    answered = [(k.decode(), v.decode()) for k, v in first.get("headers", [])]
+    return first.get("status", first["type"]), answered, passed[0] if passed else None
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1:8080", "localhost:8080", "[::1]:8080"])
-def test_this_host_may_look_and_act_but_not_within_the_page_of_another(host):
-    status, headers, scope = asked(Access.of("127.0.0.1"), {"host": host})
+def test_this_host_may_look_and_act_but_not_in_a_frame_of_another_page(host):
+    status, headers, scope = request(Access.of("127.0.0.1"), {"host": host})
     assert (status, scope["state"]["role"]) == (200, ACT)
     assert ("x-frame-options", "DENY") in headers
 
@@ -70,49 +70,49 @@ def test_this_host_may_look_and_act_but_not_within_the_page_of_another(host):
 )
 @pytest.mark.parametrize("kind", ["http", "websocket"])
 def test_no_other_site_gets_through(headers, kind):
-    status, _, scope = asked(Access.of("127.0.0.1"), headers, kind=kind, method="POST")
+    status, _, scope = request(Access.of("127.0.0.1"), headers, kind=kind, method="POST")
     assert status == (403 if kind == "http" else "websocket.close")
     assert scope is None
 
 
 def test_a_link_on_another_site_may_lead_here():
     headers = HERE | {"sec-fetch-site": "cross-site", "sec-fetch-mode": "navigate"}
-    assert asked(Access.of("127.0.0.1"), headers)[0] == 200
+    assert request(Access.of("127.0.0.1"), headers)[0] == 200
 
 
 @pytest.mark.parametrize("query", ["", "token=x", "token=a;%20Path=/x"])
-def test_who_is_known_keeps_his_seat_whatever_else_this_host_has_set(query):
+def test_a_known_browser_keeps_its_seat_whatever_other_cookies_it_has(query):
     others = 'theme={"dark": true}; bare; a[b]=1; path=/; session="x y'
     known = HERE | {"cookie": f"{others}; entrain_page_browser_8080=me"}
-    status, headers, scope = asked(Access.of("127.0.0.1"), known, query)
+    status, headers, scope = request(Access.of("127.0.0.1"), known, query)
     assert (status, scope["state"]["browser"]) == (200, "me")
     assert "set-cookie" not in dict(headers)
 
 
-def test_the_name_of_a_host_has_no_case(monkeypatch):
+def test_host_names_are_case_insensitive(monkeypatch):
     monkeypatch.setattr("socket.gethostname", lambda: "Lab-PC")
     far = Access.of("0.0.0.0", TOKEN)
     assert far.addresses(8080)[1][1] == f"http://Lab-PC:8080/?token={TOKEN}"
-    assert asked(far, {"host": "Lab-PC:8080"}, f"token={TOKEN}")[0] == 303
+    assert request(far, {"host": "Lab-PC:8080"}, f"token={TOKEN}")[0] == 303
 
 
-def test_beyond_this_host_a_token_is_asked_for_once():
+def test_other_hosts_need_a_token_once():
     far = {"host": "10.0.0.7:8080"}
-    assert asked(FAR, far)[0] == 401
-    assert asked(FAR, far, "token=nonsense")[0] == 401
-    assert asked(FAR, far, kind="websocket")[0] == "websocket.close"
+    assert request(FAR, far)[0] == 401
+    assert request(FAR, far, "token=nonsense")[0] == 401
+    assert request(FAR, far, kind="websocket")[0] == "websocket.close"
     for token, role in ((TOKEN, ACT), (LOOK_TOKEN, LOOK)):
-        status, headers, scope = asked(FAR, far, f"token={token}", path="//evil.example/")
-        assert (status, scope) == (303, None)  # the token leaves the address
+        status, headers, scope = request(FAR, far, f"token={token}", path="//evil.example/")
+        assert (status, scope) == (303, None)  # the token is removed from the address
         cookie = dict(headers)["set-cookie"]
         assert "HttpOnly" in cookie
         assert "SameSite=Lax" in cookie
         assert dict(headers)["location"] == "/"
-        _, _, scope = asked(FAR, far | {"cookie": cookie.partition(";")[0]})
+        _, _, scope = request(FAR, far | {"cookie": cookie.partition(";")[0]})
         assert scope["state"]["role"] == role
 
 
-def test_tokens_are_made_where_none_are_given_and_short_ones_refused():
+def test_tokens_are_generated_if_not_given_and_short_ones_are_refused():
     made = [Access.of("0.0.0.0").tokens for _ in range(2)]
     assert made[0].keys().isdisjoint(made[1])
     assert all(len(token) >= 16 for tokens in made for token in tokens)
@@ -120,7 +120,7 @@ def test_tokens_are_made_where_none_are_given_and_short_ones_refused():
         Access.of("127.0.0.1", "short")
 
 
-def test_a_port_that_is_taken_is_told():
+def test_a_port_in_use_is_reported():
     with listen("127.0.0.1", 0) as first:
         port = first.getsockname()[1]
         with pytest.raises(UsageError, match=f"--port: {port} is taken"):
@@ -144,7 +144,7 @@ def test_one_browser_acts_until_another_takes_over():
 
 
 @given(st.text())
-def test_a_note_is_one_line_of_what_can_be_seen(text):
+def test_a_note_is_one_printable_line(text):
     line = one_line(text)
     assert line.isprintable()
     assert len(line) <= LONGEST_NOTE

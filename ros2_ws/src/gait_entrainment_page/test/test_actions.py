@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the page does: the stop, and what it starts, with which words, told to whom."""
+"""Actions of the page: the stop, the commands it starts, and which output is shown to whom."""
 
 import asyncio
 import contextlib
@@ -19,43 +19,43 @@ CUT = "not every robot confirmed the stop: cut the power"
 
 
 @pytest.fixture
-def told(tmp_path, monkeypatch):
-    """Return a function that starts a command and returns what is told of it at its end."""
+def output(tmp_path, monkeypatch):
+    """Return a function that starts a command and returns its messages at its end."""
     program = tmp_path / "entrain"
     program.write_text('#!/bin/sh\necho "$@"\n[ "$2" != fails ]\n')
     program.chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
 
-    def tell(words, *, preflight=False, outcome=True, **options):
+    def start(words, *, preflight=False, outcome=True, **options):
         command = Command(words, **options)
         assert command.start(preflight=preflight) == f"entrain {command.name} has started"
         command._process.wait(10)
         return command.messages(outcome=outcome)
 
-    return tell
+    return start
 
 
 @pytest.mark.parametrize(
     ("kind", "checklist"), [("run", "preflight"), ("session", "preflight --session")]
 )
-def test_a_run_or_session_is_started_or_its_checklist(told, kind, checklist):
+def test_a_run_a_session_or_its_checklist_is_started(output, kind, checklist):
     words = (kind, "file.yaml", "--real-time")
-    assert told(words, preflight=True, heartbeat=True) == [
+    assert output(words, preflight=True, heartbeat=True) == [
         f"{checklist} file.yaml --real-time",
         "entrain preflight has ended with exit code 0",
     ]
-    assert told(words, heartbeat=True)[0] == f"{kind} file.yaml --real-time --heartbeat"
+    assert output(words, heartbeat=True)[0] == f"{kind} file.yaml --real-time --heartbeat"
 
 
-def test_a_blinded_operator_is_told_of_a_run_only_that_it_ended_or_why_it_failed(told):
-    assert told(("run", "well"), outcome=False) == ["entrain run has ended with exit code 0"]
-    assert told(("run", "fails"), outcome=False) == [
+def test_a_blinded_operator_learns_only_that_a_run_ended_or_why_it_failed(output):
+    assert output(("run", "well"), outcome=False) == ["entrain run has ended with exit code 0"]
+    assert output(("run", "fails"), outcome=False) == [
         "run fails", "entrain run has ended with exit code 1",
     ]  # fmt: skip
-    assert told(("session", "well"), outcome=False)[0] == "session well"  # neutral by itself
+    assert output(("session", "well"), outcome=False)[0] == "session well"  # neutral by itself
 
 
-def test_a_blinded_operator_is_not_told_what_the_checklist_is_about():
+def test_a_blinded_operator_sees_only_what_fails_in_the_checklist():
     command = Command(["run", "file.yaml"])
     command._output.write(b"ok    limits     40 pulses of 10 N m\nFAIL  stop       not pressed\n")
     command._output.flush()
@@ -66,7 +66,7 @@ def test_a_blinded_operator_is_not_told_what_the_checklist_is_about():
     assert "10 N m" in command.messages()[0]
 
 
-def test_one_goes_on_at_a_time(tmp_path, monkeypatch):
+def test_one_command_runs_at_a_time(tmp_path, monkeypatch):
     (tmp_path / "entrain").write_text("#!/bin/sh\nexec sleep 60\n")
     (tmp_path / "entrain").chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
@@ -80,12 +80,12 @@ def test_one_goes_on_at_a_time(tmp_path, monkeypatch):
         command._process.wait()
 
 
-def test_a_double_click_starts_one(monkeypatch):
+def test_a_double_click_starts_one_command(monkeypatch):
     both, started = threading.Barrier(2), []
 
     def begin(words, **_):
         with contextlib.suppress(threading.BrokenBarrierError):
-            both.wait(0.2)  # for the second one, which does not come
+            both.wait(0.2)  # for a second start, which never comes
         started.append(words)
         return subprocess.CompletedProcess(words, 0)
 
@@ -99,7 +99,7 @@ def test_a_double_click_starts_one(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("here", "elsewhere", "told"),
+    ("here", "elsewhere", "messages"),
     [
         ({}, "zero", ["asked over ROS: zero"]),
         ({}, "", ["asked over ROS: no answer", CUT]),
@@ -107,7 +107,7 @@ def test_a_double_click_starts_one(monkeypatch):
         ({"motor/1": NO_ANSWER}, "zero", ["motor/1: does not answer", CUT]),
     ],
 )
-def test_a_stop_asks_the_robot_that_is_shown_wherever_it_is(here, elsewhere, told, monkeypatch):
+def test_a_stop_reaches_the_displayed_robot_wherever_it_is(here, elsewhere, messages, monkeypatch):
     asked = threading.Event()
 
     def ask(what):
@@ -118,7 +118,7 @@ def test_a_stop_asks_the_robot_that_is_shown_wherever_it_is(here, elsewhere, tol
         return elsewhere
 
     monkeypatch.setattr("gait_entrainment_page.actions.stop_all", lambda: here)
-    assert stop(SimpleNamespace(ask=ask, offered=lambda: {"stop"})) == told
+    assert stop(SimpleNamespace(ask=ask, offered=lambda: {"stop"})) == messages
     assert asked.wait(10)
 
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A recorded bag at any instant, against what is known of the committed one."""
+"""A recorded bag at any time, checked against what is known of the committed bag."""
 
 import contextlib
 from pathlib import Path
@@ -18,12 +18,12 @@ BAG = Path(__file__).parents[4] / "bags/paper_example"
 
 @pytest.fixture(scope="module")
 def source():
-    made = BagSource(BAG)
-    yield made
-    made.close()
+    opened = BagSource(BAG)
+    yield opened
+    opened.close()
 
 
-def test_at_its_end_it_shows_the_outcome(source):
+def test_the_end_shows_the_outcome(source):
     source.show(source.end)
     view = source.view
     assert (view.part, view.state.stride, view.state.strides) == ("finished", 80, 80)
@@ -36,17 +36,17 @@ def test_at_its_end_it_shows_the_outcome(source):
 
 @settings(max_examples=8, deadline=None)
 @given(st.floats(0.0, 1.0))
-def test_at_any_instant_it_shows_what_had_been_by_then(source, share):
-    instant = source.start + round(share * (source.end - source.start))
-    source.show(instant)
+def test_any_time_shows_the_strides_completed_by_then(source, share):
+    time = source.start + round(share * (source.end - source.start))
+    source.show(time)
     strides = [number for number, _ in source.view.strides]
     assert strides == list(range(1, len(strides) + 1))
     # A stride of the committed walk lasts 1.88 to 1.94 s.
-    assert abs(len(strides) - (instant - source.start) / 1.91e9) < 2
-    assert source.view.now == instant
+    assert abs(len(strides) - (time - source.start) / 1.91e9) < 2
+    assert source.view.now == time
 
 
-def test_of_instants_asked_for_meanwhile_only_the_latest_is_shown(source, monkeypatch):
+def test_only_the_latest_of_the_requested_times_is_shown(source, monkeypatch):
     @contextlib.contextmanager
     def waited_for():
         with monkeypatch.context() as meanwhile:
@@ -70,7 +70,7 @@ def without(path, out, *topics):
     return out
 
 
-def test_a_bag_without_states_says_what_is_missing(tmp_path):
+def test_a_bag_without_states_reports_what_is_missing(tmp_path):
     bag = without(BAG, tmp_path / "bag", "experiment/state", "perturbator/state", "joint_states")
     source = BagSource(bag)
     assert source.lacking == ["parts of the protocol", "states of the robot", "joint angles"]

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The view: what is said of a run, bounded histories, and what it must never say."""
+"""The view: what it shows of a run, bounded histories, and what it must never show."""
 
 import json
 import math
@@ -49,7 +49,7 @@ def robot(at, commanded, measured, faults=(), side=RIGHT):
 
 
 def walk(view, first, last, strides, readings=20, height=10.0, period=PERIOD):
-    """Walk strides of one second: toe-off at 0.6 s, behind a double stance of 0.2 s."""
+    """Walk strides of one second: toe-off at 0.6 s, after a double stance of 0.2 s."""
     for number in range(first, last + 1):
         start = number * period
         view.take("gait_events", event(start, STRIKE, RIGHT))
@@ -77,7 +77,7 @@ def size(view):
     return sum(len(json.dumps(chart(view))) for chart in CHARTS)
 
 
-def test_ten_thousand_strides_cost_what_the_first_hundreds_did():
+def test_ten_thousand_strides_take_no_more_space_than_300():
     view = View()
     walk(view, 1, 300, 10_000)
     before = size(view)
@@ -88,7 +88,7 @@ def test_ten_thousand_strides_cost_what_the_first_hundreds_did():
     assert view.time_left() == 0.0
 
 
-def test_the_last_stride_and_its_double_stance_are_cut_out():
+def test_the_last_stride_and_its_double_stance_are_extracted():
     view = View()
     walk(view, 1, 3, 10)
     assert view.torque[0][0] == 0.0
@@ -109,7 +109,7 @@ def test_dense_readings_are_thinned():
     assert len(view.torque) <= READINGS_DRAWN + 2
 
 
-def test_torque_that_was_not_measured_is_never_called_zero():
+def test_torque_that_was_not_measured_is_never_shown_as_zero():
     view = View()
     assert "0" not in view.measured()
     view.take("perturbator/state", robot(PERIOD, 0.0, math.nan))
@@ -118,7 +118,7 @@ def test_torque_that_was_not_measured_is_never_called_zero():
     assert view.measured() == "+0.00 N m"
 
 
-def test_each_of_two_ankles_is_told_if_they_differ():
+def test_both_ankles_are_shown_if_they_differ():
     view = View()
     walk(view, 1, 1, 10)
     for side, torque, faults in ((LEFT, 9.0, ("too much torque",)), (RIGHT, 0.0, ())):
@@ -126,14 +126,14 @@ def test_each_of_two_ankles_is_told_if_they_differ():
     assert view.measured() == "left +9.00 N m, right +0.00 N m"
     assert view.faults() == "left too much torque, right none"
     assert dict(view.robot_words())["state"] == "active"
-    # The chart is of the leg whose strides are counted.
+    # The chart shows the leg whose strides are counted.
     view.take("perturbator/state", robot(2 * PERIOD + 1, 7.0, 7.0, (), LEFT))
     assert view.pushes
     walk(view, 2, 2, 10, readings=2, height=3.0)
     assert max(commanded for _, commanded, _ in view.torque) == 3.0
 
 
-def test_a_torque_that_was_measured_long_ago_is_told_with_its_age():
+def test_an_old_torque_measurement_is_shown_with_its_age():
     now = 100.0
     view = View(clock=lambda: now)
     view.take("perturbator/state", robot(PERIOD, 9.0, 9.0))
@@ -142,17 +142,17 @@ def test_a_torque_that_was_measured_long_ago_is_told_with_its_age():
     assert view.measured() == "+9.00 N m, 7 s ago"
     recorded = View()
     recorded.take("perturbator/state", robot(PERIOD, 9.0, 9.0))
-    walk(recorded, 5, 5, 10, readings=0)  # through a hole in the record
+    walk(recorded, 5, 5, 10, readings=0)  # across a hole in the record
     assert recorded.measured() == "+9.00 N m, 5 s ago"
 
 
-def test_a_simulated_torque_is_called_so_in_each_run():
+def test_a_simulated_torque_is_marked_as_such_in_each_run():
     view = View()
     setup = Message(
         header=header(0), run=1, side=RIGHT, driver="ideal", armed_by="", watchdog="",
         limit_names=["torque"], limits=[30.0],
     )  # fmt: skip
-    for _ in range(2):  # of which the second has the same number, and its robot is told of first
+    for _ in range(2):  # the second has the same number, and its robot reports first
         view.take("perturbator/setup", setup)
         view.take("experiment/state", state(0, 5, phase=1))
         view.take("perturbator/state", robot(PERIOD, 0.0, 0.0))
@@ -161,17 +161,17 @@ def test_a_simulated_torque_is_called_so_in_each_run():
         walk(view, 1, 5, 5)
 
 
-def test_another_run_begins_anew_also_of_another_command():
+def test_another_run_starts_empty_even_from_another_command():
     view = View()
     walk(view, 1, 5, 10)
-    view.take("experiment/state", state(0, 20, phase=1))  # the number of its run is the same
+    view.take("experiment/state", state(0, 20, phase=1))  # another run of the same number
     assert list(view.strides) == []
     walk(view, 1, 5, 20)
     view.take("experiment/state", state(0, 20, phase=1, run=2))
     assert list(view.strides) == []
-    view.take("gait/strides", Message(run=1))  # of the run before, on its way for long
+    view.take("gait/strides", Message(run=1))  # from the previous run, delayed
     assert list(view.strides) == []
-    walk(view, 1, 2, 20)  # of another command, whose runs are counted anew
+    walk(view, 1, 2, 20)  # of another command, which counts its own runs
     assert len(view.strides) == 1  # from its first state on
     trouble = Message(header=header(0), run=1, message="refused: 12 N m")
     view.take("experiment/state", state(0, 20, phase=5))
@@ -181,7 +181,7 @@ def test_another_run_begins_anew_also_of_another_command():
     assert list(view.troubles) == []
 
 
-def test_a_lag_is_told_from_what_it_refers_to_or_as_unknown():
+def test_a_lag_is_shown_with_its_reference_or_as_unknown():
     view = View()
     walk(view, 1, 2, 10)
     lag = Message(header=header(PERIOD), run=1, stride=2, phase_lag=-0.1, toe_off=stamp(0))
@@ -193,13 +193,13 @@ def test_a_lag_is_told_from_what_it_refers_to_or_as_unknown():
 
 
 def everything(view):
-    """All that the page shows of a view, blinded or not."""
+    """Return all that the page shows of a view, blinded or not."""
     words = (view.part_words(), view.measured(), view.pushes, view.time_left())
     return *words, view.robot_words(), view.sensor_words()
 
 
-def conditioned(torque, lag, verdict, name, period=PERIOD, *, blinded, **of_robot):
-    """Return the view of a run in which pulses of a torque have come and one is under way."""
+def conditioned(torque, lag, verdict, name, period=PERIOD, *, blinded, **robot_options):
+    """Return the view of a run with past pulses of this torque and one under way."""
     view = View(blinded=blinded)
     view.take(
         "perturbator/setup",
@@ -209,14 +209,14 @@ def conditioned(torque, lag, verdict, name, period=PERIOD, *, blinded, **of_robo
     walk(view, 1, 3, 10, height=torque, period=period)
     at = 4 * period
     view.take("gait/pulse_phases", Message(header=header(at), run=1, stride=3, phase_lag=lag))
-    told = Message(header=header(at), run=1, verdict=verdict, reason=0, drift=lag, window=10)
-    told.drift_interval = told.pulse_period = told.mean_period = lag
-    told.entrained_since_stride = 2
-    view.take("gait/entrainment", told)
+    result = Message(header=header(at), run=1, verdict=verdict, reason=0, drift=lag, window=10)
+    result.drift_interval = result.pulse_period = result.mean_period = lag
+    result.entrained_since_stride = 2
+    view.take("gait/entrainment", result)
     now = state(3, 10)
     now.pulse_period, now.blocks, now.block_name = 1.0 + lag, 2, name
     view.take("experiment/state", now)
-    view.take("perturbator/state", robot(at, torque, 0.9 * torque, **of_robot))
+    view.take("perturbator/state", robot(at, torque, 0.9 * torque, **robot_options))
     return view
 
 
@@ -234,20 +234,20 @@ def test_a_blinded_operator_sees_the_same_whatever_the_condition(one, other):
     assert "30 N m" in dict(views[0].robot_words())["limits"]
 
 
-def test_who_is_not_blinded_sees_the_condition():
+def test_an_operator_who_is_not_blinded_sees_the_condition():
     sham, real = (conditioned(t, 0.1, 1, str(t), blinded=False) for t in (0.5, 10.0))
     differs = [one != other for one, other in zip(everything(sham), everything(real), strict=True)]
     assert differs == [True, True, False, False, True, False]
     assert torque_chart(sham) != torque_chart(real)
 
 
-def test_whether_torque_falls_after_a_fault_is_told_to_everybody():
+def test_a_blinded_operator_also_sees_the_torque_after_a_fault():
     view = conditioned(10.0, 0.1, 1, "b", blinded=True, faults=["too much torque"])
     assert view.measured() == "+9.00 N m"
     assert ("faults", "too much torque") in view.robot_words()
 
 
-def test_a_node_that_falls_silent_is_called_so():
+def test_a_node_that_falls_silent_is_shown_as_stale():
     now = 100.0
     view = View(clock=lambda: now)
     status = Message(name="ns/walker_sim: state", level=b"\0", message="ready", values=[])
@@ -258,7 +258,7 @@ def test_a_node_that_falls_silent_is_called_so():
     assert view.node_words() == [("ns/walker_sim", "stale", "silent for 6 s")]
     status.name, status.level, status.message = "camera: exposure", b"\2", "dark"
     fine = Message(name="camera: temperature", level=b"\0", message="fine", values=[])
-    view.take_diagnostics(Message(status=[status, fine]))  # of another's parts, each is told
+    view.take_diagnostics(Message(status=[status, fine]))  # parts of another node: all are shown
     assert [level for _, level, _ in view.node_words()] == ["error", "ok", "stale"]
 
 
@@ -267,22 +267,22 @@ KINDS = st.sampled_from(["event", "robot", "stride", "state", "verdict"])
 
 
 @given(st.lists(st.tuples(KINDS, VALUES, VALUES), max_size=60))
-def test_whatever_comes_can_be_shown(messages):
+def test_any_messages_can_be_shown(messages):
     view = View()
     for number, (kind, one, other) in enumerate(messages, start=1):
         at = number * PERIOD
-        if kind == "event":  # kinds and sides that there are, and others
+        if kind == "event":  # valid and invalid kinds and sides
             view.take("gait_events", event(at, number % 3, number % 4))
         elif kind == "robot":
             view.take("perturbator/state", robot(at, one, other, side=number % 3))
         elif kind == "state":
             view.take("experiment/state", state(number % 7, 7, phase=number % 8))
         elif kind == "verdict":
-            told = Message(header=header(at), run=1, verdict=number % 6, reason=number % 10)
-            told.drift = one
-            told.drift_interval = told.pulse_period = told.mean_period = other
-            told.entrained_since_stride = told.window = number
-            view.take("gait/entrainment", told)
+            result = Message(header=header(at), run=1, verdict=number % 6, reason=number % 10)
+            result.drift = one
+            result.drift_interval = result.pulse_period = result.mean_period = other
+            result.entrained_since_stride = result.window = number
+            view.take("gait/entrainment", result)
         else:
             message = Message(header=header(at), run=1, side=number % 3, number=number)
             message.start, message.period = stamp(at - PERIOD), one
