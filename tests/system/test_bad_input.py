@@ -80,7 +80,7 @@ def test_wrong_usage_gives_one_line_and_leaves_nothing_behind(case, tmp_path):
         ),
     ],
 )
-def test_impossible_robot_options_give_one_line_and_leave_nothing_behind(options, named, tmp_path):
+def test_refused_robot_options_give_one_line_and_leave_nothing_behind(options, named, tmp_path):
     code, text = entrain(tmp_path, *options)
     assert code == 1
     assert_one_line(text, named)
