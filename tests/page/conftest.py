@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Pages are tested with what runs and browsers share, each in a domain of its own."""
+"""Page tests use the helpers for runs and browsers, each in its own domain."""
 
 import importlib
 import os

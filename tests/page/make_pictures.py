@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The pictures of docs/page.md: a real run with an emulated motor, as a browser shows it.
+Make the pictures of docs/page.md: a real run with an emulated motor, as a browser shows it.
 
     python tests/page/make_pictures.py        page_desktop.png and page_tablet.png in docs/figures
 
-The walk is that of the paper, in real time: it takes two minutes. It needs root, as the pictures
-are to name no operator and no computer but operator@lab.
+The walk is that of the paper in real time, so it takes two minutes. The script needs root, as the
+pictures must show operator@lab and no real operator or computer.
 """
 
 import ctypes
@@ -20,7 +20,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 sys.path[:0] = [str(ROOT / "tests" / name) for name in ("page", ".", "system")]
-_CLONE_NEWUTS = 0x04000000  # a host name of one's own
+_CLONE_NEWUTS = 0x04000000  # a separate host name
 os.environ["LOGNAME"] = "operator"
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
@@ -32,7 +32,7 @@ from test_drivers import emulated_motor  # noqa: E402
 from gait_entrainment_drivers.proof import keep_proof  # noqa: E402
 
 FIGURES = ROOT / "docs/figures"
-# A picture is taken in this stride, once the gait has locked and a pulse has come.
+# The pictures are taken in this stride, after the gait has locked and a pulse has come.
 SHOWN = 48
 DESKTOP = (1440, 900)
 

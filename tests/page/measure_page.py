@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-What the page costs a run, and how soon its STOP acts: the figures of docs/page.md.
+Measure what the page costs a run and how soon its STOP acts: the figures of docs/page.md.
 
-    python tests/page/measure_page.py cpu speed lateness frozen stop      all, or some of them
+    python tests/page/measure_page.py cpu speed lateness frozen stop      all of them, or some
 """
 
 import os
@@ -42,7 +42,7 @@ def share(process: int) -> str:
 
 
 def cpu(folder: Path) -> None:
-    """Tell what the page uses with no browser, one and ten."""
+    """Print what the page uses with no browser, one and ten."""
     port, robot = free_port(), "--driver=emulated:state_rate=200"
     walk = ("--real-time", robot, "--pulses=300", "--page", f"--port={port}")
     with entrain_run(folder / "cpu", *walk) as run:
@@ -60,9 +60,9 @@ def cpu(folder: Path) -> None:
 
 def speed(folder: Path) -> None:
     """
-    Tell what a page that looks on costs a lock-step run, by pairs in either order.
+    Print what a page that watches costs a lock-step run, from pairs in either order.
 
-    On a machine that others share, processor time says more than speed.
+    On a shared machine, processor time is a better measure than speed.
     """
     ratios, used = [], {"55": [], "56": [], "page": []}
     with page(folder, ROS_DOMAIN_ID="55") as served:
@@ -84,32 +84,32 @@ def speed(folder: Path) -> None:
 
 
 def ended_cpu_seconds() -> float:
-    """Return the processor time of all that has ended beneath this process."""
+    """Return the processor time of all child processes that have ended."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 
 
 def lateness(folder: Path) -> None:
-    """Tell how late samples are in real time, without and with a page."""
+    """Print how late samples are in real time, without and with a page."""
     for number in range(4):
         walk = (*QUICK, "--real-time", "--json", "--baseline=3", "--pulses=45", "--washout=2")
         with_page = ("--page", f"--port={free_port()}") if number % 2 else ()
         with entrain_run(folder / f"late_{number}", *walk, *with_page) as run:
-            told = run.outcome()
-            print("with page:" if with_page else "without:", told["publish_lateness_ms"],
-                  told["promises"], "lost", told["lost"], flush=True)  # fmt: skip
+            outcome = run.outcome()
+            print("with page:" if with_page else "without:", outcome["publish_lateness_ms"],
+                  outcome["promises"], "lost", outcome["lost"], flush=True)  # fmt: skip
 
 
 def frozen(folder: Path) -> None:
-    """Tell what becomes of a run whose page is frozen, in real time and in lock-step."""
+    """Print what happens to a run whose page is frozen, in real time and in lock-step."""
     port = free_port()
     walk = (*QUICK, "--real-time", "--json", "--pulses=50", "--sample-rate=1000")
     with entrain_run(folder / "frozen", *walk, "--page", f"--port={port}") as run:
         process = run.find_nodes((*NODES, PAGE))[PAGE]
         until_served(port, run)
         os.kill(process, signal.SIGSTOP)
-        told = run.outcome()
-        print("frozen, real time:", told["promises"], "lost", told["lost"], flush=True)
+        outcome = run.outcome()
+        print("frozen, real time:", outcome["promises"], "lost", outcome["lost"], flush=True)
     with page(folder, ROS_DOMAIN_ID="57") as served:
         os.kill(served.process.pid, signal.SIGSTOP)
         with entrain_run(folder / "held", "--json", ROS_DOMAIN_ID="57") as run:
@@ -117,7 +117,7 @@ def frozen(folder: Path) -> None:
 
 
 def stop(folder: Path) -> None:
-    """Tell how long torque lasts after STOP is clicked in mid-pulse, at the emulated motor."""
+    """Print how long an emulated motor's torque lasts after STOP is clicked in mid-pulse."""
     for number in range(4):
         place = folder / f"stop_{number}"
         place.mkdir()
@@ -135,7 +135,7 @@ def stop(folder: Path) -> None:
 
 
 def main() -> None:
-    """Measure what is asked for."""
+    """Run the requested measurements."""
     measures = {m.__name__: m for m in (cpu, speed, lateness, frozen, stop)}
     for name in sys.argv[1:] or measures:
         with tempfile.TemporaryDirectory() as folder:

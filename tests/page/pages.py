@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Pages as processes, and a browser's look at them: what the tests of the page share."""
+"""Pages as processes, and a browser's view of them, for the tests of the page."""
 
 import http.client
 import socket
@@ -24,7 +24,7 @@ def free_port() -> int:
 
 
 def request(port: int, path: str = "/", method: str = "GET", **headers: str) -> tuple[int, str]:
-    """Ask a page; return status and text."""
+    """Send a request to a page; return status and text."""
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
     names = {name.replace("_", "-"): value for name, value in headers.items()}
     connection.request(method, path, headers=names)
@@ -33,7 +33,7 @@ def request(port: int, path: str = "/", method: str = "GET", **headers: str) -> 
 
 
 def until_served(port: int, *commands: Started) -> None:
-    """Wait until a page is served, while the commands go on."""
+    """Wait until a page is served, while the commands keep running."""
     deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
         for command in commands:
@@ -48,9 +48,9 @@ def until_served(port: int, *commands: Started) -> None:
 
 @contextmanager
 def page(folder: Path, *options: str, port: int = 0, **environment: str) -> Iterator[Started]:
-    """Start ``entrain page`` and wait until it serves; ``port`` of the result says where."""
+    """Start ``entrain page`` and wait until it serves; ``port`` of the result is its port."""
     port = port or free_port()
-    environment.setdefault("ROS_DOMAIN_ID", "98")  # where no run of another test is
+    environment.setdefault("ROS_DOMAIN_ID", "98")  # which no run of another test uses
     command = ["entrain", "page", f"--port={port}", *options]
     started: Any = Started(command, folder / f"page-{port}.out", **environment)
     started.port = port
@@ -70,7 +70,7 @@ class Look:
 
     @property
     def text(self) -> str:
-        """All text that is shown; empty while it is loaded."""
+        """All text that is shown; empty while the page loads."""
         try:
             return str(self.browser.find_element(By.TAG_NAME, "body").text)
         except (StaleElementReferenceException, WebDriverException):
@@ -104,9 +104,9 @@ class Look:
 
     def press_stop(self, when: Callable[[], object]) -> int:
         """
-        Press STOP once it is time; return when the browser took it [ns].
+        Press STOP once ``when`` returns true; return when the browser received it [ns].
 
-        WebDriver takes its own time until then, less if the pointer is there already.
+        WebDriver adds a delay of its own, shorter if the pointer is already there.
         """
         self.browser.execute_script(
             "document.addEventListener('pointerdown', () => window.pressed = Date.now(),"

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-A page of a walk of 10,000 strides, of which 9,900 come at once when a line is read.
+Serve a page of a walk of 10,000 strides: 100, then 9,900 more as soon as a line is read.
 
     python serve_strides.py PORT
 """

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The operator's page in a real browser: followed, acted on, reloaded, shared, lost and found."""
+"""The operator's page in a real browser: display, actions, reloading, two browsers, no server."""
 
 import subprocess
 import sys
@@ -54,7 +54,7 @@ def test_a_blinded_session_with_a_robot_is_conducted_from_the_page(tmp_path, bro
             shown = operator.until("torque is possible from now on", "hidden")
             assert "N m" not in shown.replace("torque 6 N m", "")
             operator.note(NOTE)
-            operator.until(NOTE)  # as text, not as what it says in HTML
+            operator.until(NOTE)  # as text, not as HTML
             operator.type("belt stopped")
             operator.click("Pause before the next block")
             operator.until("then a pause: belt stopped")
@@ -73,14 +73,14 @@ def test_a_blinded_session_with_a_robot_is_conducted_from_the_page(tmp_path, bro
             other.click("Go on")
             operator.until("entrain session has ended with exit code 0", "finished", "23 of 23")
     folder = SessionFolder(study / "sub-P01/ses-1")
-    told = [(e.what, e.block, e.text) for e in folder.ledger]
-    assert [entry for entry in told if entry[0] in ("note", "pause", "repeat", "go on")] == [
+    entries = [(e.what, e.block, e.text) for e in folder.ledger]
+    assert [entry for entry in entries if entry[0] in ("note", "pause", "repeat", "go on")] == [
         ("note", "1", NOTE),
         ("pause", "1", "belt stopped"),
         ("repeat", "1", "belt stopped"),
         ("go on", "1", ""),
     ]
-    assert [text.partition(": ")[2] for what, _, text in told if what == "preflight"] == [
+    assert [text.partition(": ")[2] for what, _, text in entries if what == "preflight"] == [
         "passed", "passed",
     ]  # fmt: skip
     assert [e.bag for e in folder.ledger if e.what == "done"] == ["block-01", "block-01_run-2"]
@@ -93,7 +93,7 @@ def test_a_blinded_session_with_a_robot_is_conducted_from_the_page(tmp_path, bro
     assert notes == [[NOTE], []]
 
 
-def test_ten_thousand_strides_leave_the_page_as_small(browser):
+def test_ten_thousand_strides_do_not_grow_the_page(browser):
     port = free_port()
     program = Path(__file__).with_name("serve_strides.py")
     with subprocess.Popen(
@@ -113,9 +113,9 @@ def test_ten_thousand_strides_leave_the_page_as_small(browser):
             served.kill()
 
 
-def test_a_bag_is_scrubbed_and_a_clock_that_is_off_is_told(tmp_path, browser):
+def test_a_bag_is_scrubbed_and_a_wrong_browser_clock_is_reported(tmp_path, browser):
     with page(tmp_path, f"--bag={BAG}") as served:
-        # As a browser whose clock is an hour ahead.
+        # Imitates a browser whose clock is an hour ahead.
         ahead = "const now = Date.now; Date.now = () => now() + 3600e3;"
         browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": ahead})
         look = Look(browser, served.port)
@@ -135,7 +135,7 @@ def test_a_bag_is_scrubbed_and_a_clock_that_is_off_is_told(tmp_path, browser):
         look.until("What you see is old: nothing comes from the page's server. STOP works.")
 
 
-def test_who_may_not_is_told_so_in_one_line(tmp_path):
+def test_refused_requests_and_a_port_in_use_are_one_line(tmp_path):
     with page(tmp_path, f"--bag={BAG}", "--token=letmeactnow") as served:
         assert request(served.port) == (
             401, "this page asks for a token: open the address that entrain page has printed"
@@ -153,7 +153,7 @@ def test_who_may_not_is_told_so_in_one_line(tmp_path):
     assert len(taken.stderr.splitlines()) == 1
 
 
-def test_the_web_server_is_loaded_only_where_it_runs():
+def test_the_web_server_is_loaded_only_if_it_runs():
     program = (
         "import sys; from gait_entrainment_commands import main\n"
         "for words in (['--help'], ['run', '--help'], ['page', '--help']):\n"

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""STOP on the page, and its heartbeat, in a real browser: both end the torque of a motor."""
+"""STOP on the page and its heartbeat, in a real browser: both end a motor's torque."""
 
 import os
 import re
@@ -15,8 +15,8 @@ from time_to_zero import GONE, HEIGHT, WALK, rows_of, wait_for_pulse
 
 from gait_entrainment_bringup.node_list import NODES, PAGE
 
-# Pulses follow each other by 470 ms: torque that lasts longer than this [ms] goes on.
-GOES_ON = 470
+# A pulse comes every 470 ms: torque that lasts longer than that has not ended.
+PERIOD_MS = 470
 
 
 def test_a_page_that_dies_harms_no_run_and_stop_on_the_next_one_ends_the_torque(tmp_path, browser):
@@ -40,19 +40,19 @@ def test_a_page_that_dies_harms_no_run_and_stop_on_the_next_one_ends_the_torque(
                 look.until_not("No connection to the page's server")
                 look.until("pulses", "You are the operator")
                 since = look.press_stop(lambda: wait_for_pulse(run, trace, 1))
-                told = look.until("STOP:", "measured)", "the stop is latched")
+                answer = look.until("STOP:", "measured)", "the stop is latched")
                 assert run.wait() == 1
                 look.until("failed", "latched: stopped")
     rows = [row for row in rows_of(trace) if row[0] >= since]
     pushing = [at for at, _, torque in rows if abs(torque) > GONE]
     print(f"zero after {(max(pushing, default=since) - since) / 1e6:.0f} ms")
-    assert not pushing or (pushing[-1] - since) / 1e6 < GOES_ON
-    assert max(command for at, command, _ in rows if at > since + GOES_ON * 10**6) < HEIGHT / 2
-    # What is told is what the loop measured when it answered.
-    assert re.search(r"motor\S*: torque .*\([-+]\d+\.\d\d N m measured\)", told), told
+    assert not pushing or (pushing[-1] - since) / 1e6 < PERIOD_MS
+    assert max(command for at, command, _ in rows if at > since + PERIOD_MS * 10**6) < HEIGHT / 2
+    # The page shows what the loop measured when it answered.
+    assert re.search(r"motor\S*: torque .*\([-+]\d+\.\d\d N m measured\)", answer), answer
 
 
-def test_leaving_the_page_that_is_the_heartbeat_ends_the_torque_and_the_run_says_so(
+def test_leaving_a_page_with_the_heartbeat_ends_the_torque_and_the_run_reports_it(
     tmp_path, browser
 ):
     with emulated_motor(tmp_path) as (driver, trace):
@@ -66,7 +66,7 @@ def test_leaving_the_page_that_is_the_heartbeat_ends_the_torque_and_the_run_says
             browser.switch_to.new_window("tab")  # in front of it
             since = time.time_ns()
             look = Look(browser, served.port)
-            told = look.until("entrain run has ended with exit code 1")
-    assert "operator" in told.partition("Operator")[0]
-    late = [torque for at, _, torque in rows_of(trace) if at > since + GOES_ON * 10**6]
+            shown = look.until("entrain run has ended with exit code 1")
+    assert "operator" in shown.partition("Operator")[0]
+    late = [torque for at, _, torque in rows_of(trace) if at > since + PERIOD_MS * 10**6]
     assert max(map(abs, late)) < GONE

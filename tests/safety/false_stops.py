@@ -2,14 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Whether anything ends the torque without a cause: docs/safety.md.
+Check whether anything ends the torque without a cause, for docs/safety.md.
 
     python tests/safety/false_stops.py --minutes 30 --busy 8
 
-One `entrain run --real-time` on an emulated motor, beside busy processes. Prints how long it went
-on, how many pulses the motor gave and, if it ended, what it said; then exits with 1. A bare loop
-of sleeps, by SCHED_FIFO above everything in the run if the system permits it, shows how late any
-process woke up on this machine meanwhile.
+Starts one `entrain run --real-time` on an emulated motor, next to busy processes. Prints how long
+it ran and how many pulses the motor gave; if it ended early, prints its output and exits with 1.
+Meanwhile a bare loop of sleeps, by SCHED_FIFO above everything in the run if the system permits
+it, shows how late any process on this machine woke up.
 """
 
 import argparse
@@ -30,7 +30,7 @@ from time_to_zero import HEIGHT, MOTORS, WALK, busy, emulated_motor, rows_of
 sys.path.insert(0, str(Path(__file__).parents[1] / "system"))
 from harness import entrain_run
 
-LATENESS = 0.05  # at which the torque loop latches [s]
+LATENESS = 0.05  # the torque loop latches at this [s]
 
 
 def pulses(trace: Path) -> int:
@@ -41,7 +41,7 @@ def pulses(trace: Path) -> int:
 
 @contextlib.contextmanager
 def bare_loop() -> Iterator[None]:
-    """Have a loop sleep from millisecond to millisecond; print its worst lateness at the end."""
+    """Run a loop that sleeps until each millisecond; print its worst lateness at the end."""
     worst, over = multiprocessing.Value("d", 0.0), multiprocessing.Value("i", 0)
 
     def sleep() -> None:
@@ -62,16 +62,16 @@ def bare_loop() -> Iterator[None]:
     finally:
         process.kill()
         print(
-            f"a bare loop beside it: at worst {1e3 * worst.value:.1f} ms late, "
+            f"a bare loop next to it: at worst {1e3 * worst.value:.1f} ms late, "
             f"{over.value} times above {1e3 * LATENESS:g} ms"
         )
 
 
 def main() -> int:
-    """Walk for so long, unless something ends the run; print what came of it."""
+    """Walk for the given time unless something ends the run; print the outcome."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
     parser.add_argument("--minutes", type=float, default=30.0)
-    parser.add_argument("--busy", type=int, default=8, help="busy processes beside it")
+    parser.add_argument("--busy", type=int, default=8, help="busy processes next to it")
     parser.add_argument("--motor", choices=MOTORS, default="ak")
     options = parser.parse_args()
     program, driver = MOTORS[options.motor]
@@ -90,7 +90,7 @@ def main() -> int:
                         continue
                     break
                 stopped = run.process.poll() is not None
-                print(f"{pulses(trace)} pulses beside {options.busy} busy processes")
+                print(f"{pulses(trace)} pulses next to {options.busy} busy processes")
                 if stopped:
                     print(f"ended in minute {minute}: {run.text}")
                 else:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The short form of time_to_zero.py: torque ends, no pulse follows, the cause is named."""
+"""A short form of time_to_zero.py: torque ends, no pulse follows, the cause is reported."""
 
 import math
 import random
@@ -13,12 +13,12 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 from time_to_zero import MOTORS, trial
 
-# Pulses follow each other by 470 ms: torque that lasts longer than this [ms] goes on.
-GOES_ON = 470
+# A pulse comes every 470 ms: torque that lasts longer than that has not ended.
+PERIOD_MS = 470
 
 
 @pytest.mark.parametrize(
-    ("action", "said"),
+    ("action", "cause"),
     [
         ("entrain stop", "latched: stopped"),
         ("SIGTSTP", "interrupted"),
@@ -26,14 +26,14 @@ GOES_ON = 470
         ("kill torque loop", "torque_loop_ended"),
     ],
 )
-def test_torque_ends_and_no_pulse_follows(tmp_path, action, said):
+def test_torque_ends_and_no_pulse_follows(tmp_path, action, cause):
     draw = random.Random(action)
-    for attempt in "abc":  # a run that a busy computer ended before counts for nothing
+    for attempt in "abc":  # a run that ends before the action on a busy computer is repeated
         (tmp_path / attempt).mkdir()
-        time, further, told = trial(action, draw.choice(list(MOTORS)), draw, tmp_path / attempt)
+        time, further, output = trial(action, draw.choice(list(MOTORS)), draw, tmp_path / attempt)
         if not math.isnan(time):
             break
-    print(f"{action}: {time:.0f} ms, {told}")
+    print(f"{action}: {time:.0f} ms, {output}")
     assert further == 0
-    assert time < GOES_ON
-    assert said in told
+    assert time < PERIOD_MS
+    assert cause in output

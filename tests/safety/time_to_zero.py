@@ -2,16 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-How long torque lasts after whatever ends it, in whole runs, at the motor: docs/safety.md.
+Measure how long torque lasts at the motor after anything that ends it, for docs/safety.md.
 
     python tests/safety/time_to_zero.py --trials 100            every action, both emulated motors
     python tests/safety/time_to_zero.py --trials 12 --seed 5    a short form
-    python tests/safety/time_to_zero.py --only stop --busy 8    beside eight busy processes
+    python tests/safety/time_to_zero.py --only stop --busy 8    next to eight busy processes
 
 Each trial is an `entrain run --real-time` with an emulated motor in another process, whose own
-timeout is 0.05 s. At a random instant of a pulse something is done; then the motor's own trace
-says when its torque fell below 5 % of the pulse for good, and how many pulses followed. Prints a
-table: action, motor, trials, median and worst [ms], further pulses, what the run said.
+timeout is 0.05 s. The action comes at a random time in a pulse. The motor's own trace then shows
+when its torque fell below 5 % of the pulse for good, and how many pulses followed. Prints a table:
+action, motor, trials, median and worst [ms], further pulses. Each run's first line goes to stderr.
 """
 
 import argparse
@@ -33,14 +33,14 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1] / "system"))
 from harness import EntrainRun, entrain_run
 
-# A walker in sixteenfold gravity, so that a trial takes a quarter of the time.
+# Sixteen times normal gravity, so that a trial takes a quarter of the time.
 WALK = (
     "--gravity=156.96", "--mass=5", "--period-offset=-0.0125", "--width=0.08", "--torque=5",
     "--baseline=4", "--pulses=5000", "--real-time", "--arm", "--unproved",
 )  # fmt: skip
 HEIGHT = 5.0
 GONE = 0.05 * HEIGHT
-# For so long after an action the motor is watched [s]: several strides of this walker.
+# How long the motor is watched after an action [s]: several strides of this walker.
 WATCHED = 2.5
 MOTORS = {
     "ak": ("ak_motor_emulator", "ak_mit_can"),
@@ -58,7 +58,7 @@ def torque_loop(run: EntrainRun) -> int:
 
 
 def actions() -> dict[str, Callable[[EntrainRun], None]]:
-    """Return what may happen, by name."""
+    """Return the actions by name."""
     found: dict[str, Callable[[EntrainRun], None]] = {}
     for node in FROZEN:
         found[f"kill {node}"] = lambda run, n=node: os.kill(run.nodes[n], signal.SIGKILL)
@@ -77,7 +77,7 @@ def actions() -> dict[str, Callable[[EntrainRun], None]]:
 
 @contextlib.contextmanager
 def emulated_motor(program: str, trace: Path) -> Iterator[int]:
-    """Run an emulated motor on a bus of its own; gives the port."""
+    """Run an emulated motor on its own bus; yield the port."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind(("", 0))
         port = free.getsockname()[1]
@@ -94,7 +94,7 @@ def emulated_motor(program: str, trace: Path) -> Iterator[int]:
 
 @contextlib.contextmanager
 def busy(count: int) -> Iterator[None]:
-    """Keep so many processes busy."""
+    """Keep this many processes busy."""
     loop = [sys.executable, "-c", "while True: pass"]
     processes = [subprocess.Popen(loop) for _ in range(count)]
     try:
@@ -112,7 +112,7 @@ def rows_of(trace: Path) -> list[tuple[int, float, float]]:
 
 
 def wait_for_pulse(run: EntrainRun, trace: Path, number: int) -> bool:
-    """Wait until a pulse is under way; False if the run ends before."""
+    """Wait until a pulse is under way; return False if the run ends first."""
     pulses, pushing, place = 0, False, 0
     while run.process.poll() is None:
         with trace.open() as file:
@@ -131,7 +131,7 @@ def wait_for_pulse(run: EntrainRun, trace: Path, number: int) -> bool:
 
 
 def trial(action: str, motor: str, draw: random.Random, folder: Path) -> tuple[float, int, str]:
-    """Do one thing in one run; return time to zero [ms], further pulses, and what was said."""
+    """Carry out an action in a run; return time to zero [ms], further pulses, and its message."""
     program, driver = MOTORS[motor]
     trace = folder / "trace"
     with emulated_motor(program, trace) as port:
@@ -139,28 +139,28 @@ def trial(action: str, motor: str, draw: random.Random, folder: Path) -> tuple[f
         with entrain_run(folder / "bag", f"--driver={options}", *WALK) as run:
             run.find_nodes()
             if not wait_for_pulse(run, trace, draw.randint(1, 3)):
-                return float("nan"), 0, "the run ended before: " + run.text[-200:]
+                return float("nan"), 0, "the run ended before the action: " + run.text[-200:]
             time.sleep(draw.random() * 0.05)
             since = time.time_ns()
             actions()[action](run)
             time.sleep(WATCHED)
             rows = [row for row in rows_of(trace) if row[0] >= since]
-            said = run.text.strip().splitlines()
+            lines = run.text.strip().splitlines()
     pushing = [at for at, _, torque in rows if abs(torque) > GONE]
     further = sum(
         before < 0.5 * HEIGHT <= after for (_, _, before), (_, _, after) in pairwise(rows)
     )
     last = max(pushing, default=since)
-    return (last - since) / 1e6, further, said[0] if said else ""
+    return (last - since) / 1e6, further, lines[0] if lines else ""
 
 
 def main() -> int:
-    """Run the trials and print the table; 1 if torque lasted to the end of one."""
+    """Run the trials and print the table; return 1 if torque lasted to the end of a trial."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
     parser.add_argument("--trials", type=int, default=100)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--busy", type=int, default=0, help="busy processes beside it")
-    parser.add_argument("--only", default="", help="part of the names of the actions wanted")
+    parser.add_argument("--busy", type=int, default=0, help="busy processes next to it")
+    parser.add_argument("--only", default="", help="part of the names of the wanted actions")
     options = parser.parse_args()
     draw = random.Random(options.seed)
     wanted = [name for name in actions() if options.only in name]
@@ -180,7 +180,7 @@ def main() -> int:
         f"{'action':<24}{'motor':<8}{'trials':>7}{'median':>8}{'worst':>8}{'further pulses':>16}"
     )
     for (action, motor), results in sorted(found.items()):
-        # Those that had ended before anything was done tell nothing.
+        # Runs that ended before the action are left out.
         times = [result[0] for result in results if not math.isnan(result[0])]
         if not times:
             continue

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the layouts for RViz, Foxglove and PlotJuggler name is what the nodes publish."""
+"""The layouts for RViz, Foxglove and PlotJuggler name only what the nodes publish."""
 
 import json
 import re
@@ -24,7 +24,7 @@ DRAWN = {f"/{ROBOT_DESCRIPTION.name}", f"/{MARKERS.name}"}
 
 
 def number_at(path, separator):
-    """Return the default of a number that a path of topic, fields and index leads to."""
+    """Return the default of the number at a path of topic, fields and index."""
     topic = max((t for t in TYPES if path.startswith(t + separator)), key=len, default="")
     assert topic, f"{path}: no such topic"
     value = TYPES[topic]()

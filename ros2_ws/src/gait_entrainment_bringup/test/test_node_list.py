@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One list of nodes, one set of parameters: given and listed ones are all that are declared."""
+"""One list of nodes and parameters: nodes declare exactly those that are given or listed."""
 
 from pathlib import Path
 
@@ -50,7 +50,7 @@ CLASSES = (
     WalkerDisplay,
 )
 ALL = {*NODES, *nodes_for("sensed"), "bag_player"}
-# Not for the file: of ROS itself, of the mode or the launch file, of a node started by hand.
+# Not in the file: from ROS, set by the mode or the launch file, or for nodes started by hand.
 ELSEWHERE = {
     *(f"{name}.use_sim_time" for name in ALL),
     *(f"{name}.start_type_description_service" for name in (*ALL, DISPLAY)),
@@ -68,7 +68,7 @@ def declared(arguments):
     """Start every node with arguments; return its parameters by full name."""
     rclpy.init(args=arguments)
     found = {}
-    for make in CLASSES:  # a bag of before may hold a topic as another type than a node's today
+    for make in CLASSES:  # the type of a topic in an older bag may differ from a node's
         node = make()
         parameters = node._parameters.items()
         found |= {f"{node.get_name()}.{n}": p.value for n, p in parameters if n != "output"}
@@ -86,9 +86,9 @@ def full_names(tree, prefix=""):
             yield f"{prefix}{name}"
 
 
-def test_file_lists_what_a_user_may_set_at_its_default(tmp_path):
+def test_file_lists_user_parameters_with_their_defaults(tmp_path):
     file = yaml.safe_load(settings_file().read_text())
-    del file[f"/**/{PAGE}"]  # below
+    del file[f"/**/{PAGE}"]  # tested below
     listed = set(
         full_names({n.removeprefix("/**/"): p["ros__parameters"] for n, p in file.items()})
     )
@@ -116,12 +116,12 @@ def test_launch_finds_the_executable_of_each_node(node):
     assert (prefix / "lib" / package / node).exists()
 
 
-def test_file_lists_what_a_user_may_set_of_the_page_at_its_default():
-    # Not by the node itself: it would serve.
+def test_file_lists_user_parameters_of_the_page_with_their_defaults():
+    # The node itself is not started: it would serve the page.
     file = yaml.safe_load(settings_file().read_text())
     listed = file[f"/**/{PAGE}"]["ros__parameters"]
-    of_a_run = ("command", "record")
-    names = [name for name in settings_of(operator_page.Settings) if name not in of_a_run]
+    set_by_run = ("command", "record")
+    names = [name for name in settings_of(operator_page.Settings) if name not in set_by_run]
     assert listed == {name: getattr(operator_page.Settings, name) for name in names}
 
 
@@ -142,7 +142,7 @@ def test_parameters_are_given_to_every_node(real_time):
 
 
 @pytest.mark.parametrize(
-    ("walker", "detector", "told"),
+    ("walker", "detector", "warning"),
     [
         ("sensed", "ankle_encoder", "ankle_encoder: a fallback: no toe-offs"),
         ("sensed", "shank_gyroscope", ""),
@@ -151,20 +151,20 @@ def test_parameters_are_given_to_every_node(real_time):
         ("simulated", "ankle_encoder", ""),
     ],
 )
-def test_what_a_detector_lacks_is_told_before_a_run(walker, detector, told, capsys):
+def test_limitations_of_a_detector_are_printed_before_a_run(walker, detector, warning, capsys):
     check_walker(walker, detector, real_time=True)
     error = capsys.readouterr().err
-    assert told in error
-    assert bool(error) == bool(told)
+    assert warning in error
+    assert bool(error) == bool(warning)
 
 
 @pytest.mark.parametrize("walker", WALKERS)
-def test_whoever_walks_plays_the_role_to_the_experiment(walker):
+def test_every_kind_of_walker_takes_part_in_the_experiment(walker):
     given = parameters(DEFAULT_PROTOCOL, Path("/bag"), real_time=True, walker=walker)
     role, lead = given["experiment"]["walker"], given["experiment"]["longest_lookahead"]
     assert set(given) == {*nodes_for(walker), DISPLAY, PAGE}
     assert role in given["experiment"]["participants"]
-    # What is known of a sensed walker is older by the detector's latency.
+    # Events of a sensed walker are known later, by the detector's latency.
     assert (lead == 0.3) is (walker == "simulated")
     assert 0.3 <= lead < 0.5
 
@@ -175,11 +175,11 @@ def test_torque_is_stopped_first_and_the_record_last():
     assert STOP_ORDER[-1] == "bag_recorder"
 
 
-def test_a_bag_of_an_earlier_version_is_replayed_under_the_names_of_today(tmp_path):
+def test_a_bag_of_an_earlier_version_is_replayed_under_current_names(tmp_path):
     progress = "gait_entrainment_msgs/msg/Progress"
     event = "gait_entrainment_msgs/msg/GaitEvent"
-    told = {"protocol": "{baseline: 20}\n"}
-    bag = BagWriter(tmp_path / "bag", ros_distro="jazzy", custom_data=told)
+    metadata = {"protocol": "{baseline: 20}\n"}
+    bag = BagWriter(tmp_path / "bag", ros_distro="jazzy", custom_data=metadata)
     for name, kind in (
         ("/truth/gait_events", event),
         ("/gait_events", event),

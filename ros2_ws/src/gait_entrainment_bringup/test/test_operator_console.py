@@ -1,14 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The keyboard of a run, which may be a shell's job in the background."""
+"""The keyboard of a run, which may be a background job of a shell."""
 
 import os
 import pty
 import subprocess
 import sys
 
-# A shell, that is who leads a session with a terminal, and its job.
+# A shell, which leads a session with a terminal, and its job.
 SHELL = """
 import fcntl, os, subprocess, sys, termios
 fcntl.ioctl(0, termios.TIOCSCTTY, 0)
@@ -22,7 +22,7 @@ with keys_at_once():
 """
 
 
-def test_a_job_in_the_background_is_not_suspended_by_its_own_terminal():
+def test_a_background_job_is_not_suspended_by_its_own_terminal():
     ours, theirs = pty.openpty()
     os.write(ours, b"typed for the shell\n")
     words = [sys.executable, "-c", SHELL, JOB]

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Options of the page that cannot be had, and a computer without a browser."""
+"""Options of the page: ports in use, tokens, and a computer without a browser."""
 
 import argparse
 import os
@@ -15,7 +15,7 @@ from gait_entrainment_page.access import listen
 
 
 @pytest.mark.parametrize("option", ["--port", "--foxglove"])
-def test_a_port_that_is_taken_is_told_by_its_option(option):
+def test_a_port_in_use_is_reported_with_its_option(option):
     with listen("127.0.0.1", 0) as listener:
         taken = listener.getsockname()[1]
         parser = argparse.ArgumentParser()
@@ -25,7 +25,7 @@ def test_a_port_that_is_taken_is_told_by_its_option(option):
             checked_page(options, None)
 
 
-def test_tokens_of_the_environment_stand_unless_one_is_chosen(monkeypatch):
+def test_tokens_of_the_environment_are_kept_unless_one_is_chosen(monkeypatch):
     monkeypatch.setenv("ENTRAIN_PAGE_TOKENS", "letmeactnow letmelookon more")
     parser = argparse.ArgumentParser()
     add_page_options(parser)
@@ -35,7 +35,7 @@ def test_tokens_of_the_environment_stand_unless_one_is_chosen(monkeypatch):
     assert os.environ["ENTRAIN_PAGE_TOKENS"].startswith("nowthisone ")
 
 
-def test_without_a_browser_the_address_is_told(monkeypatch, capsys):
+def test_without_a_browser_the_address_is_printed(monkeypatch, capsys):
     monkeypatch.setattr(page.webbrowser, "open", lambda address: False)  # noqa: ARG005
     monkeypatch.setenv("ENTRAIN_PAGE_TOKENS", "letmeactnow letmelookon")
     with listen("127.0.0.1", 0) as listener:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A session as it goes, without nodes: what the operator answers, rests, doses, failures."""
+"""The course of a session, without nodes: answers of the operator, rests, doses, failures."""
 
 import argparse
 import itertools
@@ -30,7 +30,7 @@ blocks:
 
 @pytest.fixture
 def conduct(tmp_path, monkeypatch):
-    """Return a function that conducts what is left; blocks end as told, by default well."""
+    """Return a function that conducts the remaining blocks; ``ends`` are their errors, if any."""
     conducted = []
 
     def conducting(answers=(), ends=(), limits="", driver="ideal", **options):
@@ -38,8 +38,8 @@ def conduct(tmp_path, monkeypatch):
         path.write_text(TEXT.replace("LIMITS", limits).replace("DRIVER", driver))
         session = read_session(path)
         folder = SessionFolder.begin(tmp_path / "study", session)
-        told = {"note": "", "repeat": None, "reason": "", "real_time": False, "no_rest": False}
-        told["page"] = False
+        defaults = {"note": "", "repeat": None, "reason": "", "real_time": False, "no_rest": False}
+        defaults["page"] = False
         ended = itertools.chain(ends, itertools.repeat(""))
 
         def in_a_process(_self, protocol, bag, about):
@@ -51,7 +51,7 @@ def conduct(tmp_path, monkeypatch):
         if answers:
             replies = iter(answers)
             ask = lambda question: next(replies)  # noqa: E731, ARG005
-        run = SessionRun(session, folder, argparse.Namespace(**{**told, **options}), 0, ask)
+        run = SessionRun(session, folder, argparse.Namespace(**{**defaults, **options}), 0, ask)
         run.conduct()
         return folder
 
@@ -63,7 +63,7 @@ def ledger(folder):
     return [(entry.what, entry.block, entry.text) for entry in folder.ledger]
 
 
-def test_blocks_come_one_after_the_other_without_anybody_to_ask(conduct):
+def test_blocks_follow_one_another_without_an_operator(conduct):
     folder = conduct()
     assert [bag for _, bag, _ in conduct.conducted] == ["block-01", "block-02"]
     assert [what for what, _, _ in ledger(folder)] == ["begun", "done", "begun", "done"]
@@ -104,7 +104,7 @@ def test_a_paused_session_waits_and_repeats_the_block_before_it_goes_on(
         desk().repeat("belt stopped")
         desk().note("go on", 1)
 
-    # Its own clock: other threads of the test's process sleep, too.
+    # Only the module's clock: other threads of the test's process also sleep.
     monkeypatch.setattr(session_run, "time", SimpleNamespace(sleep=meanwhile))
     folder = conduct(ends=first_block())
     assert [bag for _, bag, _ in conduct.conducted] == ["block-01", "block-01_run-2", "block-02"]
@@ -125,16 +125,16 @@ def test_the_end_of_the_input_is_a_pause(conduct, monkeypatch):
     assert ledger(conduct()) == [("pause", "1", "the input ended")]
 
 
-def test_a_block_that_fails_ends_the_session_and_is_the_next(conduct):
-    told = r"block 2: it fell; the same command resumes at this block\n  walker_sim\| more"
-    with pytest.raises(BlockFailedError, match=told):
+def test_a_block_that_fails_ends_the_session_and_is_the_next_one(conduct):
+    message = r"block 2: it fell; the same command resumes at this block\n  walker_sim\| more"
+    with pytest.raises(BlockFailedError, match=message):
         conduct(ends=["", "it fell\n  walker_sim| more"])
     folder = conduct()
     assert ledger(folder)[3:5] == [("failed", "2", "it fell walker_sim| more"), ("begun", "2", "")]
     assert sorted(folder.runs()) == [1, 2]
 
 
-def test_of_a_run_that_could_not_be_recorded_nothing_is_kept(tmp_path):
+def test_nothing_is_kept_of_a_run_that_could_not_be_recorded(tmp_path):
     assert kept(tmp_path / "removed, as the disk is full") == ""
 
 
@@ -148,7 +148,7 @@ def test_a_repetition_needs_a_block_that_is_done(conduct):
     ]
 
 
-def test_rests_are_counted_down_for_a_person_only(conduct, capsys, monkeypatch):
+def test_rests_are_counted_down_only_for_a_person(conduct, capsys, monkeypatch):
     slept = []
     clock = SimpleNamespace(monotonic=lambda: sum(slept), sleep=slept.append)
     monkeypatch.setattr(session_run, "time", clock)
@@ -159,18 +159,18 @@ def test_rests_are_counted_down_for_a_person_only(conduct, capsys, monkeypatch):
     assert sum(slept) == pytest.approx(0.05)
 
 
-def test_limits_of_a_session_hold_over_its_blocks(conduct):
+def test_limits_of_a_session_apply_across_its_blocks(conduct):
     limits = "limits: {session_pulses: 120}"
     folder = conduct(limits=limits)
     assert [p.limits.session_pulses for p, _, _ in conduct.conducted] == [120, 120]
-    # What a crash left of a record may have been a whole block.
+    # What a crash left of a record may have been a complete block.
     for name in ("block-01", "block-02"):
         (folder.path / "bags" / name / "broken.mcap").write_bytes(b"no bag")
     with pytest.raises(SessionError, match=r"50 in all; allowed: at most 10, since 110 pulses"):
         conduct(limits=limits, repeat=1, reason="why")
 
 
-def test_what_was_delivered_is_what_the_record_says(conduct):
+def test_the_delivered_dose_is_that_of_the_record(conduct):
     limits = "limits: {session_impulse: 200}"
     folder = conduct(limits=limits)
     for file in (Path(__file__).parents[4] / "bags/paper_example").glob("*.mcap"):
@@ -180,10 +180,10 @@ def test_what_was_delivered_is_what_the_record_says(conduct):
     assert conduct.conducted[-1][0].limits.session_impulse == pytest.approx(200 - 66.73, abs=0.01)
 
 
-def test_the_checklist_of_a_real_robot_is_told_before_each_block(conduct, tmp_path, monkeypatch):
+def test_the_preflight_of_a_real_robot_is_noted_before_each_block(conduct, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    told = {"limits": "limits: {torque: 15}", "driver": "odrive_can"}
-    folder = conduct(**told)
+    real = {"limits": "limits: {torque: 15}", "driver": "odrive_can"}
+    folder = conduct(**real)
     assert ledger(folder)[0] == ("preflight", "1", "none")
     keep_preflight("odrive_can", "")
-    assert ledger(conduct(**told, repeat=1, reason="why"))[-3][2].endswith(": passed")
+    assert ledger(conduct(**real, repeat=1, reason="why"))[-3][2].endswith(": passed")

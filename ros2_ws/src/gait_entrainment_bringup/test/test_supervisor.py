@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The supervisor: processes stopped in order, those that do not obey by force."""
+"""The supervisor: processes are stopped in order and killed if they do not obey."""
 
 import os
 import signal
@@ -35,7 +35,7 @@ def main():
 
 @pytest.fixture
 def programs(tmp_path, monkeypatch):
-    """Make modules that stand for the nodes of the package."""
+    """Make modules that replace the nodes of the package."""
     folder = tmp_path / "stand_in" / "nodes"
     folder.mkdir(parents=True)
     scripts = {"one": OBEDIENT, "two": OBEDIENT, "three": OBEDIENT, "four": OBEDIENT}
@@ -62,7 +62,7 @@ def stopped_at(supervisor, name):
     return int(supervisor.last_lines(name).split()[-1])
 
 
-def test_first_ends_before_the_next_is_asked_and_last_comes_last(programs):
+def test_first_ends_before_the_next_is_stopped_and_last_ends_last(programs):
     started(programs, "one", "two", "three", "four")
     assert programs.ended() == {}
     assert programs.stop(["three", "one", "two", "four"]) == []
@@ -73,7 +73,7 @@ def test_first_ends_before_the_next_is_asked_and_last_comes_last(programs):
 
 
 @pytest.mark.usefixtures("programs")
-def test_a_node_that_is_stopped_as_it_starts_ends_without_a_word(tmp_path, capfd):
+def test_a_node_that_is_stopped_as_it_starts_ends_silently(tmp_path, capfd):
     before = {number: signal.getsignal(number) for number in STOPPING}
     stop_on_signals()
     try:
@@ -87,7 +87,7 @@ def test_a_node_that_is_stopped_as_it_starts_ends_without_a_word(tmp_path, capfd
     assert capfd.readouterr().err == ""
 
 
-def test_who_does_not_obey_is_killed(programs):
+def test_a_process_that_does_not_obey_is_killed(programs):
     started(programs, "one", "stubborn")
     begin = time.monotonic()
     assert programs.stop(["stubborn", "one"]) == ["stubborn"]
@@ -97,14 +97,14 @@ def test_who_does_not_obey_is_killed(programs):
 
 @pytest.fixture
 def interruptible():
-    """Heed Ctrl-C, also where the tests run in the background of a shell, which ignores it."""
+    """Handle Ctrl-C, even if the tests run in the background of a shell, which ignores it."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
 
 
 @pytest.mark.usefixtures("interruptible")
-def test_second_ctrl_c_does_not_break_off_the_stopping(programs):
+def test_second_ctrl_c_does_not_interrupt_the_stopping(programs):
     started(programs, "one", "stubborn", "two")
     impatient = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
     impatient.start()
@@ -131,12 +131,12 @@ def test_end_of_a_process_is_noticed_with_its_last_lines(programs):
     assert programs.last_lines("never started") == ""
 
 
-def test_waiting_has_an_end(programs):
+def test_waiting_times_out(programs):
     started(programs, "one")
     assert programs.wait("one", 0.01) is None
 
 
-def test_the_end_of_an_onlooker_is_nobodys_failure(programs):
+def test_the_end_of_an_onlooker_is_not_a_failure(programs):
     programs.start("broken", [], "stand_in.nodes")
     assert programs.wait("broken", 10) == 3
     assert programs.check(may_end=()) == {"broken": 3}
