@@ -147,7 +147,7 @@ def test_a_pause_is_a_gap():
 
 @pytest.mark.parametrize("begin", [0, 4])
 def test_running_keeps_the_strike_numbers_and_is_reported(begin):
-    """Stance is a third of a stride, so there is no double stance; or only after two strides."""
+    """Stance is a third of a stride, so no double stance, from the start or after two strides."""
     found = [d for d in detections(2) if d.time < begin]
     for n in range(40):
         side, strike = Side(1 - n % 2), begin + 0.35 * n

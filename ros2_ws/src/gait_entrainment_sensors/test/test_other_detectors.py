@@ -110,7 +110,7 @@ def test_toe_off_ends_the_push_off_plateau_and_a_jump_is_a_strike():
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_the_mounting_of_the_shank_is_found(sign):
+def test_the_mounting_on_the_shank_is_found(sign):
     detector = ShankGyroscopeDetector(Side.RIGHT)
     found = fed(detector, sampled(lambda t: (0.0, 0.0, sign * shank_rate(t)), UNTIL))
     assert detector._axis == (0.0, 0.0, sign)
