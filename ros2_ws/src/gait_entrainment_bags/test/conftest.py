@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Messages, topics and bags that the tests of this folder share."""
+"""Messages, topics and bags shared by the tests in this folder."""
 
 import os
 import sys
@@ -21,14 +21,14 @@ TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
 
 @pytest.fixture(scope="session")
 def prefixes() -> list[Path]:
-    """Where ROS 2 is installed: as announced, or the virtual environment that runs the tests."""
+    """Return the prefixes in AMENT_PREFIX_PATH and that of the Python that runs the tests."""
     found = [*os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep), sys.prefix]
     return [Path(prefix) for prefix in found if prefix]
 
 
 @pytest.fixture(scope="session")
 def topic(prefixes: list[Path]) -> Callable[..., TopicInfo]:
-    """Make the description of a topic of an installed type."""
+    """Return a function that describes a topic whose message type is installed."""
 
     def make(name: str, type_name: str, *qos: QosProfile) -> TopicInfo:
         found = find_definition(type_name, prefixes)
@@ -39,7 +39,7 @@ def topic(prefixes: list[Path]) -> Callable[..., TopicInfo]:
 
 @pytest.fixture(scope="session")
 def typestore() -> Any:
-    """Give the message types of `rosbags`, which stands for an independent ROS 2."""
+    """Return the message types of `rosbags`, an independent implementation of ROS 2 formats."""
     return TYPESTORE
 
 
@@ -50,7 +50,7 @@ def _type(name: str) -> Any:
 
 @pytest.fixture(scope="session")
 def joint_state() -> Callable[[int, list[float]], bytes]:
-    """Serialize a JointState of as many joints as there are positions."""
+    """Return a function that serializes a JointState with one joint per position."""
 
     def make(stamp: int, positions: list[float]) -> bytes:
         header = _type("std_msgs/msg/Header")(
@@ -66,7 +66,7 @@ def joint_state() -> Callable[[int, list[float]], bytes]:
 
 @pytest.fixture(scope="session")
 def clock() -> Callable[[int], bytes]:
-    """Serialize a Clock."""
+    """Return a function that serializes a Clock."""
 
     def make(stamp: int) -> bytes:
         time = _type("builtin_interfaces/msg/Time")(*divmod(stamp, 10**9))
@@ -78,7 +78,7 @@ def clock() -> Callable[[int], bytes]:
 
 @pytest.fixture(scope="session")
 def small_bag(tmp_path_factory: pytest.TempPathFactory, clock: Callable[[int], bytes]) -> Path:
-    """Write a bag of four messages in two chunks, as small as the format allows."""
+    """Write a bag with four messages in two chunks, as small as the format allows."""
     folder = tmp_path_factory.mktemp("bags") / "small"
     with BagWriter(folder, ros_distro="jazzy", custom_data={"key": "value"}) as writer:
         for name in ("/a", "/b"):

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""For each rule a bag that breaks it, and it alone where that is possible."""
+"""Each rule, with a bag that breaks it and, if possible, no other rule."""
 
 import struct
 import zlib
@@ -26,7 +26,7 @@ from gait_entrainment_bags.checks import RULES
 from gait_entrainment_bags.metadata import offered_qos_text
 
 HASH = "RIHS01_" + "0" * 64
-# The same profile as versions before 9 spell it.
+# The same profile as written by versions before 9.
 NUMBERS = (
     offered_qos_text([QosProfile()])
     .replace("keep_last", "1")
@@ -43,7 +43,7 @@ DATA = b"\0\1\0\0" + bytes(8)
 
 
 def write_file(path: Path, options: dict[str, Any]) -> None:
-    """Write an MCAP file that keeps every rule but those that the options break."""
+    """Write an MCAP file that follows every rule except those that the options break."""
     with path.open("wb") as stream:
         writer = Writer(
             stream,
@@ -161,7 +161,7 @@ def write_checksum(data: bytearray, summary_start: int) -> None:
     struct.pack_into("<I", data, len(data) - 12, zlib.crc32(data[summary_start:-12]))
 
 
-def test_not_closed_and_damaged(small_bag: Path, tmp_path: Path) -> None:
+def test_unclosed_and_damaged_files(small_bag: Path, tmp_path: Path) -> None:
     data = (small_bag / "small_0.mcap").read_bytes()
     path = tmp_path / "bag.mcap"
     path.write_bytes(data[:-50])
@@ -243,13 +243,13 @@ def test_rules_of_the_metadata_file(
     assert str(folder) in found[0].detail
 
 
-def test_file_that_is_missing(small_bag: Path, tmp_path: Path) -> None:
+def test_missing_file(small_bag: Path, tmp_path: Path) -> None:
     (tmp_path / "metadata.yaml").write_bytes((small_bag / "metadata.yaml").read_bytes())
     rules = [finding.rule for finding in check(tmp_path)]
     assert rules == ["mcap", "metadata-files", "metadata-topics"]
 
 
-def test_message_without_fields_keeps_the_rules(
+def test_message_without_fields_follows_the_rules(
     tmp_path: Path, topic: Callable[..., TopicInfo]
 ) -> None:
     with BagWriter(tmp_path / "bag", ros_distro="jazzy") as writer:
@@ -258,7 +258,7 @@ def test_message_without_fields_keeps_the_rules(
     assert check(tmp_path / "bag") == []
 
 
-def test_many_places_give_one_line(tmp_path: Path) -> None:
+def test_many_violations_of_a_rule_give_one_line(tmp_path: Path) -> None:
     path = tmp_path / "bag.mcap"
     write_file(path, {"data": b""})
     (finding,) = check(path)

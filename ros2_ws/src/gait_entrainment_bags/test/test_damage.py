@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Whatever happens to the bytes of a bag: a verdict or data, never a traceback or a hang."""
+"""Reading a damaged bag gives data or a reported error, never a traceback or a hang."""
 
 import contextlib
 import os
@@ -19,7 +19,7 @@ ALL = [1, 2, 3, 4]
 
 
 def read(path: Path) -> list[int] | None:
-    """Read a bag as far as it goes; None after a verdict."""
+    """Return the log times in a bag, or None if it is reported as unreadable."""
     try:
         with BagReader(path) as reader:
             found = [message.log_time for message in reader.messages()]
@@ -27,9 +27,9 @@ def read(path: Path) -> list[int] | None:
             assert some == [2] or "/b" not in reader.topics
             return found
     except UnreadableBagError as error:
-        said = str(error)
-    assert str(path) in said
-    assert "\n" not in said
+        text = str(error)
+    assert str(path) in text
+    assert "\n" not in text
     return None
 
 
@@ -48,7 +48,7 @@ def test_every_byte_flipped(small_bag: Path, tmp_path: Path) -> None:
     with path.open("r+b", buffering=0) as file:
         for offset, byte in enumerate(path.read_bytes()):
             os.pwrite(file.fileno(), bytes([byte ^ 0xFF]), offset)
-            # Either a verdict or all of the messages: never fewer in silence.
+            # Either an error or all of the messages, never silently fewer.
             assert read(path) in (None, ALL)
             assert check(path) != [], f"byte {offset}"
             os.pwrite(file.fileno(), bytes([byte]), offset)
@@ -63,7 +63,7 @@ def test_every_byte_of_the_metadata_file_flipped(small_bag: Path, tmp_path: Path
         data[offset] ^= 0x15
         (folder / "metadata.yaml").write_bytes(data)
         data[offset] ^= 0x15
-        # Either takes its time, and both read the file by the same function.
+        # Both are slow and read the file with the same function, so each gets half the bytes.
         if offset % 2:
             check(folder)
         else:
@@ -90,7 +90,7 @@ def test_message_that_reaches_beyond_its_chunk(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["schema", "channel"])
-def test_a_number_that_stands_for_two_things(tmp_path: Path, kind: str) -> None:
+def test_one_id_for_two_schemas_or_channels(tmp_path: Path, kind: str) -> None:
     path = tmp_path / "bag.mcap"
     with path.open("wb") as stream:
         writer = Writer(stream, use_chunking=False, enable_crcs=False, use_statistics=False)

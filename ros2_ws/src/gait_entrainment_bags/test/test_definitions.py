@@ -27,7 +27,7 @@ PUBLISHED_HASHES = {
 
 
 @pytest.mark.parametrize("type_name", PUBLISHED_HASHES)
-def test_hash_is_the_published_one(type_name: str, prefixes: list[Path]) -> None:
+def test_hash_equals_the_published_one(type_name: str, prefixes: list[Path]) -> None:
     assert find_definition(type_name, prefixes).type_hash == PUBLISHED_HASHES[type_name]
 
 
@@ -64,7 +64,7 @@ def test_separators_are_those_of_rosbag2(tmp_path: Path) -> None:
     assert found.type_hash == "RIHS01_1"
 
 
-def test_every_installed_message_is_complete(prefixes: list[Path]) -> None:
+def test_definition_of_every_installed_message_is_complete(prefixes: list[Path]) -> None:
     found = 0
     for prefix in prefixes:
         for path in prefix.glob("share/*/msg/*.msg"):
@@ -75,7 +75,7 @@ def test_every_installed_message_is_complete(prefixes: list[Path]) -> None:
     assert found > 100
 
 
-def test_message_inside_a_service_is_made_from_its_type_description(
+def test_definition_of_a_service_message_comes_from_its_type_description(
     prefixes: list[Path],
 ) -> None:
     found = find_definition("std_srvs/srv/SetBool_Event", prefixes)
@@ -89,12 +89,12 @@ def test_message_inside_a_service_is_made_from_its_type_description(
 @pytest.mark.parametrize(
     "type_name", ["nothing/msg/Here", "std_srvs/srv/Trigger_Nothing", "JointState", "a/b/c/d"]
 )
-def test_what_is_not_installed_is_named(type_name: str, prefixes: list[Path]) -> None:
+def test_types_that_are_not_installed_are_named(type_name: str, prefixes: list[Path]) -> None:
     with pytest.raises(DefinitionMissingError, match=type_name):
         find_definition(type_name, prefixes)
 
 
-def test_without_prefixes_the_environment_counts(
+def test_without_prefixes_the_environment_is_used(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path))
@@ -103,7 +103,7 @@ def test_without_prefixes_the_environment_counts(
 
 
 @pytest.mark.parametrize("text", ["", "{}", "[1]", '{"type_hashes": 3}', "\ufffe"])
-def test_broken_type_description_is_named(text: str, tmp_path: Path) -> None:
+def test_broken_type_description_is_reported(text: str, tmp_path: Path) -> None:
     messages = tmp_path / "share" / "p" / "msg"
     messages.mkdir(parents=True)
     (messages / "A.msg").write_text("float64 x\n")

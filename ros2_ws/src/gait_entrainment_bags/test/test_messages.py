@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Messages and values: nothing but attributes is used, and what has no meaning is refused."""
+"""Messages to values and back: only attributes are used, meaningless values are refused."""
 
 import math
 from types import SimpleNamespace
@@ -66,7 +66,7 @@ def test_events():
         ({"side": 7}, r"side: 7; allowed: 0 \(left\), 1 \(right\)"),
     ],
 )
-def test_an_event_without_meaning_is_refused(values, words):
+def test_an_event_with_unknown_values_is_refused(values, words):
     with pytest.raises(MessageError, match=f"^{words}$"):
         event_of(message(0, **{"kind": 0, "side": 0, "step": 0, **values}))
 
@@ -88,25 +88,25 @@ def test_profiles():
             profile_of(profile_message(**wrong))
 
 
-def test_each_profile_is_held_against_the_one_before():
+def test_each_profile_is_checked_against_the_previous_one():
     def take(order, revision, begin, until, **values):
-        told = profile_message(
+        sent = profile_message(
             revision=revision, last=False, times=[stamp(begin)], torques=[0.0], onsets=[],
             valid_until=stamp(until), **values,
         )  # fmt: skip
-        void, hole, profile = order.take(told)
-        told = (void, *(hole or ()), profile and profile.valid_until)
-        return tuple(value and value - START for value in told)
+        void, hole, profile = order.take(sent)
+        stamps = (void, *(hole or ()), profile and profile.valid_until)
+        return tuple(value and value - START for value in stamps)
 
     order = ProfileOrder()
     assert take(order, 0, 0, 10) == (None, 10)
-    assert take(order, 3, 30, 40) == (None, 10, 30, 40)  # two of them are missing
+    assert take(order, 3, 30, 40) == (None, 10, 30, 40)  # revisions 1 and 2 are missing
     with pytest.raises(MessageError, match="adjoin"):
-        take(order, 4, 10**12, 2 * 10**12)  # nothing lies between the two
-    assert take(order, 5, 50, 10**12) == (None, 40, 50, 10**12)  # so far ahead is nothing promised
+        take(order, 4, 10**12, 2 * 10**12)  # nothing is missing between the two
+    assert take(order, 5, 50, 10**12) == (None, 40, 50, 10**12)  # promised too far ahead
     with pytest.raises(MessageError, match="revision 5: does not adjoin 5"):
         take(order, 5, 50, 60)
-    assert take(order, 6, 60, 70) == (60, 70)  # what was promised from there on was not so
+    assert take(order, 6, 60, 70) == (60, 70)  # what was promised from 60 on is void
     assert order.hole_up_to(START + 70) is None
     assert order.hole_up_to(START + 71) == (START + 70, START + 71)
     assert take(order, 7, 70, 80, stop=True) == (0, None)
@@ -114,9 +114,9 @@ def test_each_profile_is_held_against_the_one_before():
     assert ProfileOrder().hole_up_to(START) == (0, START)
 
 
-def test_a_stop_has_an_instant():
-    told = SimpleNamespace(header=SimpleNamespace(stamp=stamp(7)), stop=True)
-    assert stop_of(told, START) == 7
+def test_a_stop_has_a_time():
+    stop = SimpleNamespace(header=SimpleNamespace(stamp=stamp(7)), stop=True)
+    assert stop_of(stop, START) == 7
 
 
 def test_pulses_and_states():
@@ -124,8 +124,8 @@ def test_pulses_and_states():
     for torque, duration in (math.nan, 0.1), (3.0, math.inf), (3.0, 1e308), (3.0, -0.1):
         with pytest.raises(MessageError, match="torque, duration"):
             pulse_of(message(4, torque=torque, duration=duration))
-    told = message(9, commanded_torque=1.0, measured_torque=0.9, angle=0.2, faults=["stopped"])
-    assert state_of(told, START) == RobotState(9, 1.0, 0.9, 0.2)
+    state = message(9, commanded_torque=1.0, measured_torque=0.9, angle=0.2, faults=["stopped"])
+    assert state_of(state, START) == RobotState(9, 1.0, 0.9, 0.2)
 
 
 def test_results_have_the_fields_of_their_messages():

@@ -39,7 +39,7 @@ def test_qos_survives_its_text(found: list[QosProfile]) -> None:
     assert parse_qos_profiles(offered_qos_text(found), "here") == tuple(found)
 
 
-def test_no_limit_is_what_ros_writes() -> None:
+def test_an_unlimited_duration_is_written_as_ros_does() -> None:
     assert QosProfile().as_map()["deadline"] == {"sec": 9223372036, "nsec": 854775807}
 
 
@@ -77,12 +77,12 @@ def test_policies_may_be_integers_as_before_version_9() -> None:
         ("[" * 5000, "not valid YAML"),
     ],
 )
-def test_what_is_wrong_with_qos_is_named(value: Any, reason: str) -> None:
+def test_errors_in_qos_profiles_are_reported(value: Any, reason: str) -> None:
     with pytest.raises(UnreadableBagError, match=reason):
         parse_qos_profiles(value, "here")
 
 
-def test_interrupted_write_leaves_the_file_before(
+def test_interrupted_write_leaves_the_previous_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     BagDescription((), (FileInformation("a_0.mcap", 5, 9, 2),), ros_distro="jazzy").write(tmp_path)

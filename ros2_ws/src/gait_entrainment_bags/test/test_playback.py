@@ -23,7 +23,7 @@ START = 100 * SECOND
 
 
 def write(folder, instants):
-    """Write a message of one byte per instant [ns from the start], on two topics in turn."""
+    """Write a one-byte message per instant [ns from the start], alternating between two topics."""
     with BagWriter(folder, ros_distro="jazzy") as writer:
         for name in ("/a", "/b/c"):
             writer.add_topic(TopicInfo(name, "p/msg/C", "byte b\n"))
@@ -35,7 +35,7 @@ def write(folder, instants):
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory):
-    """A bag of ten messages, a second apart."""
+    """Read a bag of ten messages, one second apart."""
     folder = write(tmp_path_factory.mktemp("bags") / "ten", [n * SECOND for n in range(10)])
     with BagReader(folder) as reader:
         yield reader
@@ -46,16 +46,16 @@ def playback(bag, **options):
 
 
 def played(playing, until, step=SECOND // 4, begin=0):
-    """Give (steady time, instant from the start) of all that is given out up to a time [ns]."""
-    given_out = []
+    """Return (steady time, instant from the start) of everything played up to a time [ns]."""
+    taken = []
     for now in range(begin, until + 1, step):
         while moment := playing.take(now):
-            given_out.append((now, moment.instant - START))
-    return given_out
+            taken.append((now, moment.instant - START))
+    return taken
 
 
 @pytest.mark.parametrize("rate", [0.5, 1.0, 4.0])
-def test_each_message_is_due_at_its_time_over_the_rate(bag, rate):
+def test_each_message_is_due_at_its_time_divided_by_the_rate(bag, rate):
     playing = playback(bag, rate=rate)
     playing.begin(7)
     for n in range(10):
@@ -67,7 +67,7 @@ def test_each_message_is_due_at_its_time_over_the_rate(bag, rate):
     assert playing.due() is None
 
 
-def test_a_late_call_delays_nothing_after_it(bag):
+def test_a_late_call_delays_no_later_message(bag):
     playing = playback(bag)
     playing.begin(0)
     late = 3 * SECOND + 5
@@ -76,13 +76,13 @@ def test_a_late_call_delays_nothing_after_it(bag):
     assert playing.due() == 4 * SECOND
 
 
-def test_the_fastest_rate_gives_everything_at_once(bag):
+def test_the_fastest_rate_plays_everything_immediately(bag):
     playing = playback(bag, rate=FASTEST)
     playing.begin(5)
     assert len(played(playing, 5, begin=5)) == 10
 
 
-def test_a_pause_moves_everything_after_it(bag):
+def test_a_pause_delays_everything_after_it(bag):
     playing = playback(bag)
     playing.begin(0)
     played(playing, 2 * SECOND)
@@ -95,7 +95,7 @@ def test_a_pause_moves_everything_after_it(bag):
     assert playing.due() == 100 * SECOND + SECOND - 400
 
 
-def test_a_changed_rate_holds_from_then_on(bag):
+def test_a_changed_rate_applies_from_then_on(bag):
     playing = playback(bag)
     playing.begin(0)
     played(playing, 2 * SECOND)
@@ -105,7 +105,7 @@ def test_a_changed_rate_holds_from_then_on(bag):
     assert len(played(playing, 3 * SECOND, begin=3 * SECOND)) == 7
 
 
-def test_seeking_goes_both_ways_and_not_outside(bag):
+def test_seeking_works_in_both_directions_within_the_selection(bag):
     playing = playback(bag, start_offset=1.0, duration=6.0)
     playing.begin(0)
     playing.seek(START + 5 * SECOND - 7, 10)
@@ -123,7 +123,7 @@ def test_seeking_goes_both_ways_and_not_outside(bag):
     assert [instant for _, instant in played(playing, 40, begin=40)] == [6 * SECOND]
 
 
-def test_offset_and_duration_choose_a_stretch(bag):
+def test_offset_and_duration_select_what_is_played(bag):
     playing = playback(bag, start_offset=2.5, duration=4.0)
     playing.begin(0)
     assert [instant for _, instant in played(playing, 20 * SECOND)] == [
@@ -134,13 +134,13 @@ def test_offset_and_duration_choose_a_stretch(bag):
 def test_a_loop_returns_to_its_start_without_drift(bag):
     playing = playback(bag, start_offset=7.0, loop=True)
     playing.begin(0)
-    given_out = played(playing, 10 * SECOND, step=SECOND // 4)
-    assert [instant // SECOND for _, instant in given_out[:7]] == [7, 8, 9, 7, 8, 9, 7]
+    taken = played(playing, 10 * SECOND, step=SECOND // 4)
+    assert [instant // SECOND for _, instant in taken[:7]] == [7, 8, 9, 7, 8, 9, 7]
     # A round lasts two seconds: its last message and the first of the next are due together.
-    assert [now // SECOND for now, _ in given_out[:7]] == [0, 1, 2, 2, 3, 4, 4]
+    assert [now // SECOND for now, _ in taken[:7]] == [0, 1, 2, 2, 3, 4, 4]
 
 
-def test_single_messages_are_given_while_paused(bag):
+def test_single_messages_can_be_played_while_paused(bag):
     playing = playback(bag, paused=True)
     playing.begin(0)
     assert playing.take(10 * SECOND) is None
@@ -154,7 +154,7 @@ def test_single_messages_are_given_while_paused(bag):
     assert playing.ended
 
 
-def test_ticks_of_the_clock_lie_at_fixed_instants(bag):
+def test_clock_ticks_are_at_fixed_times(bag):
     ticks = {}
     for rate in (0.5, 3.0, FASTEST):
         playing = playback(bag, rate=rate, clock_period=0.4)
@@ -168,51 +168,51 @@ def test_ticks_of_the_clock_lie_at_fixed_instants(bag):
     assert ticks[0.5] == ticks[3.0] == ticks[FASTEST] == [n * 400_000_000 for n in range(23)]
 
 
-def test_nobody_waits_for_the_ticks_of_years(tmp_path):
+def test_clock_ticks_in_a_gap_of_years_are_skipped(tmp_path):
     years = 10**9 * SECOND
     with BagReader(write(tmp_path / "bag", [0, SECOND, years + SECOND // 2])) as bag:
         playing = playback(bag, rate=FASTEST, clock_period=1.0)
         playing.begin(0)
-        given_out = [instant for _, instant in played(playing, 0)]
-    assert given_out == [0, 0, SECOND, SECOND, years, years + SECOND // 2]
+        taken = [instant for _, instant in played(playing, 0)]
+    assert taken == [0, 0, SECOND, SECOND, years, years + SECOND // 2]
 
 
 @settings(derandomize=True, deadline=None, max_examples=25)
 @given(
     instants=st.lists(st.integers(0, 3 * SECOND), min_size=1, max_size=1200),
-    wishes=st.lists(
+    requests=st.lists(
         st.tuples(st.sampled_from(["pause", "resume", "slow", "fast"]), st.integers(0, SECOND)),
         max_size=8,
     ),
 )
-def test_every_message_is_given_once_in_order_whatever_is_wished(
-    tmp_path_factory, instants, wishes
+def test_every_message_is_played_once_in_order_whatever_is_requested(
+    tmp_path_factory, instants, requests
 ):
     folder = write(tmp_path_factory.mktemp("bags") / "any", instants)
     with BagReader(folder) as bag:
         playing = playback(bag)
         playing.begin(0)
-        now, given_out = 0, []
+        now, taken = 0, []
 
         def take_all():
             while moment := playing.take(now):
-                given_out.append(moment.message)
+                taken.append(moment.message)
 
-        for wish, wait in wishes:
+        for request, wait in requests:
             now += wait
             take_all()
-            if wish in ("pause", "resume"):
-                getattr(playing, wish)(now)
+            if request in ("pause", "resume"):
+                getattr(playing, request)(now)
             else:
-                playing.set_rate({"slow": 0.3, "fast": 50.0}[wish], now)
+                playing.set_rate({"slow": 0.3, "fast": 50.0}[request], now)
         playing.resume(now)
         now += 10 * 3 * SECOND
         take_all()
-        assert given_out == list(bag.messages())
+        assert taken == list(bag.messages())
         assert playing.ended
 
 
-def test_a_playback_that_is_not_listened_to_can_be_stopped(tmp_path):
+def test_a_playback_whose_messages_are_not_taken_can_be_stopped(tmp_path):
     with BagReader(write(tmp_path / "long", range(20_000))) as bag:
         playing = playback(bag)
         playing.begin(0)
@@ -221,7 +221,7 @@ def test_a_playback_that_is_not_listened_to_can_be_stopped(tmp_path):
         assert playing.take(SECOND) is None
 
 
-def test_damage_is_told_when_it_is_reached(tmp_path):
+def test_damage_is_reported_when_it_is_read(tmp_path):
     folder = write(tmp_path / "broken", range(20_000))
     file = folder / "broken_0.mcap"
     content = bytearray(file.read_bytes())

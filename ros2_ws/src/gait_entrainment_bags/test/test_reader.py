@@ -60,7 +60,7 @@ def test_what_goes_in_comes_out_in_order(
             writer.write(name, data, log_time, publish_time)
             if flush:
                 writer.flush()
-    # Python's sort is stable: messages of one instant stay in the order of the file.
+    # Python's sort is stable: messages with the same log time stay in file order.
     expected = sorted(
         ((name, log, publish, data) for name, log, publish, data, _ in recording),
         key=lambda entry: entry[1],
@@ -81,7 +81,7 @@ def test_what_goes_in_comes_out_in_order(
             assert (reader.start, reader.end) == (expected[0][1], expected[-1][1])
 
 
-def write_by_mcap_library(path: Path, compression: CompressionType, **options: object) -> None:
+def write_with_mcap_library(path: Path, compression: CompressionType, **options: object) -> None:
     with path.open("wb") as stream:
         writer = Writer(stream, chunk_size=300, compression=compression, **options)  # type: ignore[arg-type]
         writer.start("ros2")
@@ -117,7 +117,7 @@ def test_files_of_other_writers_are_read_with_whatever_index_they_have(
     tmp_path: Path, options: dict[str, object]
 ) -> None:
     path = tmp_path / "other.mcap"
-    write_by_mcap_library(path, CompressionType.LZ4, **options)
+    write_with_mcap_library(path, CompressionType.LZ4, **options)
     with BagReader(path) as reader:
         assert [message.log_time for message in reader.messages()] == list(range(60))
         some = list(reader.messages(["/b/c"], 10, 40))
@@ -126,7 +126,7 @@ def test_files_of_other_writers_are_read_with_whatever_index_they_have(
         assert reader.topics["/d"].schema_text == "uint8[] bytes\n"
 
 
-def test_bag_of_rosbags_is_read(
+def test_bag_written_by_rosbags_is_read(
     tmp_path: Path,
     typestore: object,
     joint_state: Callable[[int, list[float]], bytes],
@@ -144,7 +144,7 @@ def test_bag_of_rosbags_is_read(
         assert decoded.position == [0.25]
 
 
-def test_decodes_by_the_text_in_the_bag(
+def test_messages_are_decoded_with_the_definitions_in_the_bag(
     tmp_path: Path,
     topic: Callable[..., TopicInfo],
     joint_state: Callable[[int, list[float]], bytes],
@@ -180,7 +180,7 @@ def test_a_reader_knows_what_is_in_the_bag(small_bag: Path) -> None:
         assert bag.size == (small_bag / "small_0.mcap").stat().st_size
 
 
-def test_counts_and_single_topics_read_the_index_only(
+def test_counts_and_single_topics_read_no_unneeded_chunks(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with BagWriter(tmp_path / "walk", ros_distro="jazzy", chunk_size=1000) as writer:
@@ -230,12 +230,12 @@ def test_chunks_are_read_as_they_are_needed(
     assert ahead <= 4
 
 
-def test_topic_that_is_not_there_is_named(small_bag: Path) -> None:
+def test_missing_topics_are_named(small_bag: Path) -> None:
     with BagReader(small_bag) as reader, pytest.raises(BagError, match="no topic /x, /y"):
         list(reader.messages(["/a", "/y", "/x"]))
 
 
-def no_bag(tmp_path: Path, kind: str) -> Path:
+def not_a_bag(tmp_path: Path, kind: str) -> Path:
     path = tmp_path / kind
     if kind == "empty file":
         path.write_bytes(b"")
@@ -298,8 +298,8 @@ def no_bag(tmp_path: Path, kind: str) -> Path:
         ("file missing", "file missing/a_0.mcap: no such file"),
     ],
 )
-def test_what_is_no_bag_is_named(tmp_path: Path, kind: str, reason: str) -> None:
-    path = no_bag(tmp_path, kind)
+def test_a_path_that_is_not_a_bag_is_reported(tmp_path: Path, kind: str, reason: str) -> None:
+    path = not_a_bag(tmp_path, kind)
     with pytest.raises(UnreadableBagError, match=reason) as caught:
         BagReader(path)
     assert "\n" not in str(caught.value)
@@ -308,7 +308,7 @@ def test_what_is_no_bag_is_named(tmp_path: Path, kind: str, reason: str) -> None
 @pytest.mark.parametrize(
     ("other", "refused"), [("int32 x # [m]\n\n", False), ("float32 x\n", True)]
 )
-def test_a_topic_with_two_definitions_is_decoded_by_neither(
+def test_a_topic_with_two_conflicting_definitions_is_refused(
     tmp_path: Path, other: str, refused: bool
 ) -> None:
     path = tmp_path / "merged.mcap"
@@ -330,7 +330,7 @@ def test_a_topic_with_two_definitions_is_decoded_by_neither(
             assert [message.x for _, message in reader.decoded()] == [0, 1]
 
 
-def test_a_definition_that_contains_itself_is_named(
+def test_a_definition_that_contains_itself_is_reported(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     decode = decoder_for(TopicInfo("/a", "p/msg/T", "T again\n"))
@@ -341,7 +341,7 @@ def test_a_definition_that_contains_itself_is_named(
     assert capfd.readouterr().err == ""
 
 
-def test_a_file_that_is_listed_twice_is_read_once(small_bag: Path, tmp_path: Path) -> None:
+def test_a_file_listed_twice_is_read_once(small_bag: Path, tmp_path: Path) -> None:
     (tmp_path / "small_0.mcap").write_bytes((small_bag / "small_0.mcap").read_bytes())
     listed = "{relative_file_paths: [small_0.mcap, small_0.mcap]}"
     (tmp_path / "metadata.yaml").write_text(f"rosbag2_bagfile_information: {listed}\n")
@@ -349,7 +349,7 @@ def test_a_file_that_is_listed_twice_is_read_once(small_bag: Path, tmp_path: Pat
         assert len([*reader.messages()]) == reader.message_count == 4
 
 
-def test_broken_metadata_file_does_not_keep_from_reading(small_bag: Path, tmp_path: Path) -> None:
+def test_bag_with_a_broken_metadata_file_can_be_read(small_bag: Path, tmp_path: Path) -> None:
     folder = tmp_path / "bag"
     folder.mkdir()
     for number in (0, 10, 2):

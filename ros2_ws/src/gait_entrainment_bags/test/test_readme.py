@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The example in the package's README runs, and prints what it says."""
+"""The example in the package's README runs and prints the output shown there."""
 
 import re
 import subprocess
@@ -11,7 +11,7 @@ from pathlib import Path
 README = Path(__file__).parents[1] / "README.md"
 
 
-def test_the_example_prints_what_the_readme_says(tmp_path: Path) -> None:
+def test_the_example_prints_what_the_readme_shows(tmp_path: Path) -> None:
     code, printed = re.findall(r"```(?:python)?\n(.*?)```", README.read_text(), re.DOTALL)
     ended = subprocess.run(
         [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True

@@ -80,7 +80,7 @@ def test_killed_recording_loses_nothing_that_was_flushed(tmp_path: Path, chunk_s
         assert found == list(range(1, len(found) + 1))
         assert len(found) >= flushed
         assert rescued.last == len(found)
-        # Nothing is left behind but the bag itself.
+        # Only the bag itself is left behind.
         assert sorted(path.name for path in folder.iterdir() if path.suffix != ".tmp") == [
             "metadata.yaml",
             f"walk{trial}_0.mcap",
@@ -101,22 +101,22 @@ def record_chunks(folder: Path, compression: str) -> tuple[Path, list[Chunk], li
     return path, chunks, counts
 
 
-def test_every_whole_chunk_of_a_cut_recording_is_rescued(tmp_path: Path) -> None:
+def test_every_complete_chunk_of_a_truncated_recording_is_rescued(tmp_path: Path) -> None:
     path, chunks, counts = record_chunks(tmp_path / "walk", "zstd")
     assert len(chunks) > 5
     for number in reversed(range(len(chunks))):
         end = chunks[number].offset + chunks[number].length
-        for length, whole in ((end + 1, number + 1), (end, number + 1), (end - 1, number)):
+        for length, complete in ((end + 1, number + 1), (end, number + 1), (end - 1, number)):
             with path.open("r+b") as stream:
                 stream.truncate(length)
             out = tmp_path / f"rescued{length}"
             found = recover(path, out)
-            assert sum(found.counts.values()) == sum(counts[:whole])
+            assert sum(found.counts.values()) == sum(counts[:complete])
             assert found.losses
             shutil.rmtree(out)
 
 
-def test_whole_bag_loses_nothing(small_bag: Path, tmp_path: Path) -> None:
+def test_intact_bag_loses_nothing(small_bag: Path, tmp_path: Path) -> None:
     found = recover(small_bag, tmp_path / "copy")
     assert found.counts == {"/a": 3, "/b": 1}
     assert (found.losses, found.last) == ((), 4)
@@ -132,7 +132,7 @@ def test_whole_bag_loses_nothing(small_bag: Path, tmp_path: Path) -> None:
     assert check(tmp_path / "copy") == []
 
 
-def test_damage_costs_no_more_than_its_chunk(small_bag: Path, tmp_path: Path) -> None:
+def test_damage_loses_only_the_damaged_chunk(small_bag: Path, tmp_path: Path) -> None:
     file = McapFile(small_bag / "small_0.mcap")
     first, second = file.scan().chunks
     data = bytearray((small_bag / "small_0.mcap").read_bytes())
@@ -141,7 +141,7 @@ def test_damage_costs_no_more_than_its_chunk(small_bag: Path, tmp_path: Path) ->
     for chunk, place, left in (
         (first, chunk_middle(first), [3, 4]),  # the first chunk announces the topics
         (second, chunk_middle(second), [1, 2]),
-        (first, first.offset + 5, [3, 4]),  # its length leads beyond the end of the file
+        (first, first.offset + 5, [3, 4]),  # its length points beyond the end of the file
     ):
         data[place] ^= 0xFF
         path.write_bytes(data)
@@ -155,13 +155,13 @@ def test_damage_costs_no_more_than_its_chunk(small_bag: Path, tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4"])
-def test_a_broken_length_in_an_unfinished_file_costs_one_chunk(
+def test_a_broken_length_in_an_unfinished_file_loses_one_chunk(
     tmp_path: Path, compression: str
 ) -> None:
     path, chunks, counts = record_chunks(tmp_path / "walk", compression)
-    whole = path.read_bytes()[: chunks[-1].offset + chunks[-1].length]  # as after a crash
-    for place in (3, 8):  # of the length, which then leads far beyond the end of the file
-        data = bytearray(whole)
+    unfinished = path.read_bytes()[: chunks[-1].offset + chunks[-1].length]  # as after a crash
+    for place in (3, 8):  # in the length, which then points far beyond the end of the file
+        data = bytearray(unfinished)
         data[chunks[2].offset + place] ^= 0x41
         path.write_bytes(data)
         out = tmp_path / f"rescued{place}"
@@ -187,7 +187,7 @@ def test_files_of_a_split_recording_are_joined(tmp_path: Path) -> None:
     assert check(tmp_path / "rescued") == []
 
 
-def test_rescue_overwrites_nothing_and_names_what_is_no_bag(
+def test_rescue_overwrites_nothing_and_reports_what_is_not_a_bag(
     small_bag: Path, tmp_path: Path
 ) -> None:
     with pytest.raises(BagExistsError):
@@ -203,7 +203,7 @@ def test_rescue_overwrites_nothing_and_names_what_is_no_bag(
     assert not (tmp_path / "out").exists()
 
 
-def test_topic_without_a_type_is_named(tmp_path: Path) -> None:
+def test_topic_without_a_valid_type_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "other.mcap"
     with path.open("wb") as stream:
         writer = Writer(stream)
@@ -276,7 +276,7 @@ def test_encodings_and_definitions_stay_as_they_are(tmp_path: Path) -> None:
 
 
 def without(bag: Path, out: Path, begin: float, end: float) -> Path:
-    """Copy a bag without what was logged from one time to another [s since its start]."""
+    """Copy a bag without the messages logged between two times [s since its start]."""
     with BagReader(bag) as reader, BagWriter(out, ros_distro="") as writer:
         writer.custom_data |= reader.custom_data
         for topic in reader.topics.values():
@@ -296,7 +296,7 @@ def without(bag: Path, out: Path, begin: float, end: float) -> Path:
         (100.0, 1000.0, "the end of run"),
     ],
 )
-def test_what_the_run_lacks_is_told(
+def test_what_the_run_lacks_is_reported(
     tmp_path: Path, begin: float, end: float, missing: str
 ) -> None:
     cut = without(PAPER_EXAMPLE, tmp_path / "cut", begin, end)
@@ -304,8 +304,8 @@ def test_what_the_run_lacks_is_told(
     assert missing in "; ".join(rescued.losses)
     assert [finding.rule for finding in check(cut)] == ["record"]
     run = read_run(cut)
-    told = recorded_outcome(run, cut)
-    assert told["holes"]
-    assert told["lost"] != 0 or end > 200, "the counts at the end of the run tell"
+    outcome = recorded_outcome(run, cut)
+    assert outcome["holes"]
+    assert outcome["lost"] != 0 or end > 200, "the counts at the end of the run show it"
     assert recorded_outcome(read_run(rescued.folder), cut)["lost"] != 0
     assert run.analysis.entrainments[-1].verdict not in (Verdict.LOST, Verdict.DRIFTING)

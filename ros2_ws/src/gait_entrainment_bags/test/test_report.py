@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Outcome and figures of a run, checked against the simulation that they tell of."""
+"""Outcome and figures of a run, checked against the simulation that they describe."""
 
 import dataclasses
 import json
@@ -31,33 +31,33 @@ def simulation():
     return simulate(Protocol())
 
 
-def test_the_final_lag_is_told_with_its_place_in_double_stance(simulation):
-    told = outcome_of(simulation)
+def test_the_final_lag_is_reported_with_its_place_in_double_stance(simulation):
+    outcome = outcome_of(simulation)
     pulse = simulation.analysis.pulses[-1]
-    # Of the perturbed leg's toe-off and the other leg's strike before it, straight from events.
+    # From the other leg's strike to the perturbed leg's toe-off, straight from the events.
     strike = max(e.stamp for e in simulation.events if not e.kind and e.stamp < pulse.toe_off)
-    assert told["double_stance"] == pytest.approx((pulse.toe_off - strike) / 1e9)
-    assert told["final_phase_lag"] == pytest.approx(pulse.phase_lag, abs=1e-8)
+    assert outcome["double_stance"] == pytest.approx((pulse.toe_off - strike) / 1e9)
+    assert outcome["final_phase_lag"] == pytest.approx(pulse.phase_lag, abs=1e-8)
     percent = 100 * (pulse.onset - strike) / (pulse.toe_off - strike)
-    assert f"{percent:.0f} % into double stance" in summary(told)
+    assert f"{percent:.0f} % into double stance" in summary(outcome)
 
 
-def test_a_slow_passage_is_not_taken_for_a_lock_and_says_so():
-    # docs/analysis.md: no lock is there, and more pulses leave it.
+def test_a_slow_passage_is_reported_and_not_mistaken_for_a_lock():
+    # docs/analysis.md: the lock there is unstable, and with more pulses the gait leaves it.
     plan = PulsePlan(period_offset=-0.07, initial_phase=0.6)
-    told = outcome_of(simulate(Protocol(pulses=plan)))
-    assert (told["verdict"], told["reason"]) == ("undecided", "creeping")
-    assert "slow passage" in summary(told)
+    outcome = outcome_of(simulate(Protocol(pulses=plan)))
+    assert (outcome["verdict"], outcome["reason"]) == ("undecided", "creeping")
+    assert "slow passage" in summary(outcome)
 
 
-def test_what_is_not_known_is_null_in_json():
+def test_unknown_values_are_null_in_json():
     protocol = Protocol(baseline=2, washout=0, pulses=PulsePlan(count=1))
     nothing = analyze([], [], Side.RIGHT)
-    told = outcome_of(Simulation(protocol, (), (), math.nan, math.nan, nothing, (), None, None))
-    text = json.dumps(told, allow_nan=False)
+    outcome = outcome_of(Simulation(protocol, (), (), math.nan, math.nan, nothing, (), None, None))
+    text = json.dumps(outcome, allow_nan=False)
     assert json.loads(text)["unperturbed_stride_period"] is None
     assert json.loads(text)["verdict"] == "undecided"
-    text = summary(told)
+    text = summary(outcome)
     assert "undecided: neither locked nor drifting" in text
     assert "the last 3 strides at 0.0 s: not in the record" in text
 
@@ -84,9 +84,9 @@ def recorded(simulation, **changes):
     return dataclasses.replace(run, **changes)
 
 
-def test_the_figures_are_drawn(simulation, tmp_path):
+def test_figures_are_drawn(simulation, tmp_path):
     run = recorded(simulation)
-    others = tmp_path / "of_somebody_else"
+    others = tmp_path / "foreign"
     (tmp_path / "phase_lag.svg").symlink_to(others)
     paths = [p for p in draw_figures(run, tmp_path) if p.suffix == ".png"]
     assert [p.stem for p in paths] == ["stride_period", "phase_lag", "ankle_torque"]
@@ -103,7 +103,7 @@ def test_the_figures_are_drawn(simulation, tmp_path):
         assert height > 300
 
 
-def test_what_is_long_short_or_not_finite_stays_in_the_figure():
+def test_long_names_short_runs_and_nan_stay_within_the_figure():
     walk = simulate(Protocol(baseline=3, washout=2, pulses=PulsePlan(count=0)))
     hole = Hole(walk.analysis.strides[0].end, walk.analysis.strides[3].start, "2 strides")
     run = recorded(
@@ -133,7 +133,7 @@ def test_each_stride_is_drawn_while_a_lock_forms(simulation):
     numbers = [stride.number for stride in drawn_strides(drifting)]
     assert len(numbers) == STRIDES_DRAWN
     assert max(np.diff(numbers)) <= 4
-    # Of several blocks the first has locked.
+    # Of the two blocks, only the first locks.
     plans = "{baseline: 15, pulses: {}, washout: 5}, {pulses: {period_offset: -0.2, count: 20}}"
     walk = simulate(read_protocol(f"blocks: [{plans}]\n"))
     assert [b.analysis.entrainments[-1].verdict.name for b in walk.blocks] == [
@@ -143,7 +143,7 @@ def test_each_stride_is_drawn_while_a_lock_forms(simulation):
     assert set(range(first, since + 2)) <= {stride.number for stride in drawn_strides(walk)}
 
 
-def test_a_run_without_pulses_or_strides_can_be_drawn_too(tmp_path):
+def test_a_run_without_pulses_or_strides_can_be_drawn(tmp_path):
     empty = np.empty(0)
     run = RecordedRun(
         protocol=Protocol(),
@@ -163,21 +163,21 @@ def test_a_run_without_pulses_or_strides_can_be_drawn_too(tmp_path):
     assert len(draw_figures(run, tmp_path)) == 2 * 3, "PNG and SVG"
 
 
-def test_holes_are_told_in_json_and_to_people(simulation):
+def test_holes_are_reported_in_json_and_in_the_summary(simulation):
     onsets = simulation.onsets[:30] + simulation.onsets[31:]
     events = [e for e in simulation.events if e.step < 120]
     analysis = analyze(events, onsets, Side.RIGHT)
-    told = outcome_of(dataclasses.replace(simulation, analysis=analysis))
-    assert [hole["missing"] for hole in told["holes"]] == ["1 pulse(s)", "the last 21 strides"]
-    assert told["holes"][0]["start"] == pytest.approx((onsets[29] - events[0].stamp) / 1e9)
-    assert len(told["stretches"]) == 2
-    text = summary(told)
+    outcome = outcome_of(dataclasses.replace(simulation, analysis=analysis))
+    assert [hole["missing"] for hole in outcome["holes"]] == ["1 pulse(s)", "the last 21 strides"]
+    assert outcome["holes"][0]["start"] == pytest.approx((onsets[29] - events[0].stamp) / 1e9)
+    assert len(outcome["stretches"]) == 2
+    text = summary(outcome)
     assert "1 pulse(s) at " in text
     assert "until stride" in text
     assert "the train is longer" not in text
 
 
-def test_a_train_that_is_longer_than_the_run_is_told():
+def test_a_train_that_is_longer_than_the_run_is_reported():
     plan = PulsePlan(count=10, period_offset=0.3, torque_fraction=0.0)
-    told = summary(outcome_of(simulate(Protocol(baseline=3, washout=0, pulses=plan))))
-    assert "pulses placed in them: 9 of 10; the train is longer than the run" in told
+    text = summary(outcome_of(simulate(Protocol(baseline=3, washout=0, pulses=plan))))
+    assert "pulses placed in them: 9 of 10; the train is longer than the run" in text

@@ -12,7 +12,7 @@ import pytest
 
 from gait_entrainment_bags import BagError, BagExistsError, BagWriter, TopicInfo, export
 
-pytest.importorskip("pyarrow", reason="tables are made with pyarrow: pip install pyarrow")
+pytest.importorskip("pyarrow", reason="tables need pyarrow: pip install pyarrow")
 
 TEXT = (
     "# Torque at both ankles [N m].\n"
@@ -48,7 +48,7 @@ def bag(
     topic: Callable[..., TopicInfo],
     joint_state: Callable[[int, list[float]], bytes],
 ) -> Path:
-    """Write a bag of JointStates, of one message of every kind of field, and of nothing."""
+    """Write a bag with JointStates, a message with every kind of field and an empty topic."""
     from mcap_ros2._dynamic import serialize_dynamic
 
     encode = serialize_dynamic("p/msg/All", TEXT)["p/msg/All"]
@@ -135,7 +135,7 @@ def test_every_kind_of_field_in_parquet(bag: Path, tmp_path: Path) -> None:
     assert states.column("position.l_hip").to_pylist() == [0.0, 1.0, 2.0]
 
 
-def test_nothing_is_overwritten_and_nothing_half_written_stays(
+def test_export_overwrites_nothing_and_leaves_nothing_half_written(
     bag: Path,
     tmp_path: Path,
     topic: Callable[..., TopicInfo],
@@ -163,7 +163,7 @@ def test_nothing_is_overwritten_and_nothing_half_written_stays(
     assert not (tmp_path / "out").exists()
 
 
-def test_each_topic_has_a_table_of_its_own(tmp_path: Path) -> None:
+def test_each_topic_has_its_own_table(tmp_path: Path) -> None:
     names = ("/a/b", "/a.b", "/")
     with BagWriter(tmp_path / "walk", ros_distro="jazzy") as writer:
         for number, name in enumerate(names):
@@ -173,7 +173,7 @@ def test_each_topic_has_a_table_of_its_own(tmp_path: Path) -> None:
     assert [rows_of(files[name])[0]["data"] for name in names] == ["0", "1", "2"]
 
 
-def test_names_without_a_value_each_stay_in_the_table(
+def test_names_without_matching_values_stay_in_the_table(
     tmp_path: Path,
 ) -> None:
     from mcap_ros2._dynamic import serialize_dynamic

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Errors of a detector, of events that are known to be shifted, left out and made up."""
+"""Detector errors, for events that are known to be shifted, left out or made up."""
 
 from dataclasses import replace
 
@@ -40,22 +40,22 @@ def test_what_was_left_out_and_shifted_is_found(missed, shifts):
     errors = detector_errors(found, TRUTH)
     for kind in EventKind:
         places = [p for p, e in enumerate(TRUTH) if e.kind is kind]
-        told = errors[kind.name.lower()]
+        row = errors[kind.name.lower()]
         gone = len(missed & set(places))
-        assert (told["events"], told["missed"], told["false"]) == (40, gone, 0)
+        assert (row["events"], row["missed"], row["false"]) == (40, gone, 0)
         mean = sum(shifts[p] for p in places if p not in missed) / (40 - gone)
-        assert abs(told["bias"] - mean / 1000) < 1e-9
+        assert abs(row["bias"] - mean / 1000) < 1e-9
 
 
-def test_an_event_that_nobody_made_is_false_and_what_was_not_begun_is_not_missed():
+def test_an_extra_event_is_false_and_events_before_the_first_are_not_missed():
     late = [event for event in TRUTH if event.stamp > 5000 * MS]
     doubled = [*late, replace(late[4], stamp=late[4].stamp + 400 * MS)]
     errors = detector_errors(doubled, TRUTH)
-    assert sum(told["false"] for told in errors.values()) == 1
-    assert sum(told["missed"] for told in errors.values()) == 0
+    assert sum(row["false"] for row in errors.values()) == 1
+    assert sum(row["missed"] for row in errors.values()) == 0
 
 
-def test_nothing_is_said_of_exact_events_and_all_of_detected_ones():
+def test_detection_errors_are_printed_for_detected_events_only():
     assert detection_lines({}) == []
     outcome = {
         "toe_off_bias": 0.004,
@@ -68,7 +68,7 @@ def test_nothing_is_said_of_exact_events_and_all_of_detected_ones():
     assert "40 of 40 heel strikes, 0 false, +0.0 ms (SD 0.0); 40 of 40 toe-offs" in errors
 
 
-def test_a_known_bias_of_toe_off_is_taken_off_and_nothing_else():
+def test_a_known_toe_off_bias_is_subtracted_and_nothing_else_changes():
     late = [
         replace(e, stamp=e.stamp + 4 * MS) if e.kind is EventKind.TOE_OFF else e for e in TRUTH
     ]

@@ -59,7 +59,7 @@ def write_joint_states(
 
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4", "none"])
-def test_rosbags_reads_all_of_it(
+def test_rosbags_reads_the_whole_bag(
     tmp_path: Path,
     topic: Callable[..., TopicInfo],
     joint_state: Callable[[int, list[float]], bytes],
@@ -98,7 +98,7 @@ def test_rosbags_reads_all_of_it(
     assert list(last.position) == [49, 7, -49, 0.1]
 
 
-def test_mcap_library_decodes_by_the_text_in_the_bag(
+def test_mcap_library_decodes_with_the_definitions_in_the_bag(
     tmp_path: Path,
     topic: Callable[..., TopicInfo],
     joint_state: Callable[[int, list[float]], bytes],
@@ -121,7 +121,7 @@ def test_mcap_library_decodes_by_the_text_in_the_bag(
 
 
 @pytest.mark.parametrize("compression", ["zstd", "none"])
-def test_files_are_those_of_the_mcap_library_to_the_byte(
+def test_files_equal_those_of_the_mcap_library_byte_for_byte(
     tmp_path: Path, compression: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     written = []
@@ -134,7 +134,7 @@ def test_files_are_those_of_the_mcap_library_to_the_byte(
                 name = f"/noise_{number // 100}"  # announced between messages
                 if number % 100 == 0:
                     w.add_topic(replace(NOISE, name=name))
-                # Log times that go back, within a chunk and over its border.
+                # Log times that go backwards, within a chunk and across chunks.
                 w.write(name, bytes(number), 10**18 + number * 7 % 90, 10**18 + number)
         written.append((bag / "bag_0.mcap").read_bytes())
     assert written[0] == written[1]
@@ -148,7 +148,7 @@ def test_folder_is_never_overwritten(tmp_path: Path) -> None:
     assert [path.name for path in (tmp_path / "walk").iterdir()] == ["precious"]
 
 
-def test_folder_that_cannot_be_made_is_named(tmp_path: Path) -> None:
+def test_folder_that_cannot_be_created_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(BagWriteError, match="file/walk"):
         BagWriter(tmp_path / "file" / "walk", ros_distro="jazzy")
@@ -157,13 +157,13 @@ def test_folder_that_cannot_be_made_is_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "options", [{"compression": "gzip"}, {"chunk_size": 0}, {"max_duration": float("nan")}]
 )
-def test_options_out_of_range_make_no_folder(tmp_path: Path, options: dict[str, Any]) -> None:
+def test_options_out_of_range_create_no_folder(tmp_path: Path, options: dict[str, Any]) -> None:
     with pytest.raises(BagError):
         BagWriter(tmp_path / "walk", ros_distro="jazzy", **options)
     assert not (tmp_path / "walk").exists()
 
 
-def test_what_the_caller_did_wrong_is_named_and_costs_nothing(tmp_path: Path) -> None:
+def test_wrong_calls_are_reported_and_lose_no_data(tmp_path: Path) -> None:
     folder = tmp_path / "walk"
     with BagWriter(folder, ros_distro="jazzy") as writer:
         writer.add_topic(NOISE)
@@ -186,7 +186,7 @@ def test_what_the_caller_did_wrong_is_named_and_costs_nothing(tmp_path: Path) ->
         assert [message.log_time for message in reader.messages()] == [1, 2**64 - 1]
 
 
-def test_custom_data_may_be_completed_until_the_end(tmp_path: Path) -> None:
+def test_custom_data_can_be_added_until_the_bag_is_closed(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "walk", ros_distro="jazzy", custom_data={"a": "1"}) as writer:
         writer.custom_data["lost"] = "0"
     with BagReader(tmp_path / "walk") as reader:
@@ -214,7 +214,7 @@ def test_long_recordings_are_split(
         assert [data for _, _, data in other.messages()] == datas
 
 
-def test_a_second_after_a_message_its_chunk_reaches_the_file(
+def test_a_chunk_reaches_the_file_a_second_after_its_first_message(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = 0
@@ -223,7 +223,7 @@ def test_a_second_after_a_message_its_chunk_reaches_the_file(
         writer.add_topic(NOISE)
         size = (tmp_path / "walk" / "walk_0.mcap").stat().st_size
         for now, grown in (
-            (5 * 10**9, False),  # a message after silence starts the second
+            (5 * 10**9, False),  # the first message after a silence starts the second
             (5_999_999_999, False),
             (6_000_000_000, True),
             (6_500_000_000, False),
@@ -236,7 +236,7 @@ def test_a_second_after_a_message_its_chunk_reaches_the_file(
             size = new
 
 
-def test_metadata_names_every_topic_before_the_end(tmp_path: Path) -> None:
+def test_metadata_names_every_topic_before_the_bag_is_closed(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "walk", ros_distro="jazzy", custom_data={"seed": "1"}) as writer:
         writer.add_topic(NOISE)
         text = (tmp_path / "walk" / "metadata.yaml").read_text()
@@ -245,7 +245,7 @@ def test_metadata_names_every_topic_before_the_end(tmp_path: Path) -> None:
 
 
 class SimulatedDisk:
-    """A disk of limited size; what is put aside takes its part until it is given back."""
+    """A disk of limited size; reserved space counts as used until it is released."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, size: int) -> None:
         self.size = size
@@ -293,7 +293,7 @@ class SimulatedDisk:
 
 
 def fill(folder: Path, chunk_size: int = 20_000) -> tuple[int, str]:
-    """Record noise until the disk is full; give the number of messages and what was said."""
+    """Record noise until the disk is full; return the number of messages and the error message."""
     count = 0
     writer = BagWriter(folder, ros_distro="jazzy", chunk_size=chunk_size)
     writer.add_topic(NOISE)
@@ -307,18 +307,18 @@ def fill(folder: Path, chunk_size: int = 20_000) -> tuple[int, str]:
     raise AssertionError("the disk never filled up")
 
 
-def test_full_disk_ends_with_a_whole_bag(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_full_disk_leaves_a_complete_bag(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     SimulatedDisk(monkeypatch, 3_000_000)
-    count, said = fill(tmp_path / "walk")
-    assert said.startswith(str(tmp_path / "walk"))
-    assert f"disk full after {count} messages" in said
+    count, message = fill(tmp_path / "walk")
+    assert message.startswith(str(tmp_path / "walk"))
+    assert f"disk full after {count} messages" in message
     assert count > 1000
     assert check(tmp_path / "walk") == []
     with BagReader(tmp_path / "walk") as reader:
         assert [message.log_time for message in reader.messages()] == list(range(1, count + 1))
 
 
-def test_disk_without_space_put_aside_leaves_a_bag_to_recover(
+def test_full_disk_without_reserved_space_leaves_a_recoverable_bag(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def unsupported(*_: int) -> None:
@@ -326,8 +326,8 @@ def test_disk_without_space_put_aside_leaves_a_bag_to_recover(
 
     SimulatedDisk(monkeypatch, 300_000)
     monkeypatch.setattr(writer_module.os, "posix_fallocate", unsupported)
-    count, said = fill(tmp_path / "walk")
-    assert "entrain bag recover" in said
+    count, message = fill(tmp_path / "walk")
+    assert "entrain bag recover" in message
     monkeypatch.undo()
     rescued = recover(tmp_path / "walk", tmp_path / "rescued")
     assert count - 20 <= rescued.counts["/noise"] < count
@@ -342,7 +342,7 @@ def test_disk_full_from_the_start_leaves_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_other_errors_of_the_disk_are_told_from_a_full_one(
+def test_other_disk_errors_are_not_reported_as_a_full_disk(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     writer = BagWriter(tmp_path / "walk", ros_distro="jazzy")
@@ -360,7 +360,7 @@ def test_other_errors_of_the_disk_are_told_from_a_full_one(
     assert recover(tmp_path / "walk", tmp_path / "rescued").counts == {"/noise": 1}
 
 
-def test_disk_that_fails_in_the_background_is_reported(
+def test_disk_failure_in_the_background_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def broken(_: int) -> None:
@@ -382,7 +382,7 @@ def test_disk_that_fails_in_the_background_is_reported(
 
 @pytest.fixture
 def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """Mount a real file system of 4 MB; where that is not allowed, give one that is simulated."""
+    """Mount a real file system of 4 MB, or simulate one if mounting is not allowed."""
     place = tmp_path / "disk"
     place.mkdir()
     mounted = (
@@ -402,9 +402,9 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     subprocess.run(["umount", place], check=True)
 
 
-def test_real_small_disk_ends_with_a_whole_bag(small_disk: Path) -> None:
-    count, said = fill(small_disk / "walk")
-    assert f"disk full after {count} messages" in said
+def test_real_small_disk_leaves_a_complete_bag(small_disk: Path) -> None:
+    count, message = fill(small_disk / "walk")
+    assert f"disk full after {count} messages" in message
     assert check(small_disk / "walk") == []
     with BagReader(small_disk / "walk") as reader:
         assert reader.message_count == count

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Session files, and a session whose blocks are done: the committed bag stands for each."""
+"""Session files, and a session whose blocks are done: each is a copy of the committed bag."""
 
 import shutil
 from pathlib import Path
@@ -49,7 +49,7 @@ def write(tmp_path):
 
 @pytest.fixture
 def done(write, tmp_path):
-    """Return a function that gives the folder of a session whose two blocks are done."""
+    """Return a function that returns the folder of a session whose two blocks are done."""
 
     def conducted(*replaced, study="study"):
         session = read_session(write(*replaced))

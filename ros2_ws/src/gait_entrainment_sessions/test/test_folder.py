@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The folder of a session: resumed where it stopped, never overwritten, sealed and unsealed."""
+"""A session's folder: resumed where it stopped, never overwritten, sealed and unsealed."""
 
 import json
 
@@ -16,40 +16,40 @@ BLIND = ("rest: 30", "blind: true")
 
 
 @pytest.fixture
-def begun(write, tmp_path):
-    """Return a function that begins, or resumes, a session."""
+def begin(write, tmp_path):
+    """Return a function that starts or resumes a session."""
     return lambda *replaced: SessionFolder.begin(tmp_path / "s", read_session(write(*replaced)))
 
 
-def test_a_session_is_resumed_at_the_first_block_that_is_not_done(begun):
-    folder = begun()
+def test_a_session_is_resumed_at_the_first_block_that_is_not_done(begin):
+    folder = begin()
     assert folder.path.parts[-2:] == ("sub-P01", "ses-1")
     assert folder.next_block() == 1
     folder.note("begun", 1, "block-01")
     folder.note("failed", 1, "block-01", "it\tbroke\noff")
-    assert begun().next_block() == 1
+    assert begin().next_block() == 1
     folder.note("done", 1, "block-01_run-2")
-    assert begun().next_block() == 2
+    assert begin().next_block() == 2
     assert folder.runs() == {1: folder.path / "bags/block-01_run-2"}
     assert [entry.text for entry in folder.ledger] == ["", "it broke off", ""]
     assert folder.repeat("why", 1) == 1
     folder.note("done", 2, "block-02")
-    assert begun().next_block() == 1
+    assert begin().next_block() == 1
     folder.note("done", 1, "block-01_run-3")
-    assert begun().next_block() is None
+    assert begin().next_block() is None
     assert list(folder.runs()) == [1, 2]
 
 
-def test_no_bag_is_overwritten(begun):
-    folder = begun()
+def test_no_bag_is_overwritten(begin):
+    folder = begin()
     for name in ("block-02", "block-02_run-2", "block-02_run-3"):
         bag = folder.new_bag(2)
         assert bag.name == name
         bag.mkdir(parents=True)
 
 
-def test_a_line_that_a_crash_cut_short_says_nothing_and_spoils_no_other(begun):
-    folder = begun()
+def test_a_line_truncated_by_a_crash_is_ignored_and_spoils_no_other(begin):
+    folder = begin()
     folder.note("done", 1, "block-01")
     with (folder.path / "ledger.tsv").open("ab") as file:
         file.write("2026-11-26T10:00:00\tdone\t\N{BALLOT X}".encode()[:-1])
@@ -62,35 +62,35 @@ def test_a_line_that_a_crash_cut_short_says_nothing_and_spoils_no_other(begun):
     ("old", "new", "line"),
     [("count: 20", "count: 30", 9), ("name: slower", "name: slow", 15), ("left", "right", 7)],
 )
-def test_a_session_that_was_changed_is_not_resumed(begun, old, new, line):
-    begun()
+def test_a_changed_session_is_not_resumed(begin, old, new, line):
+    begin()
     with pytest.raises(SessionError) as error:
-        begun((old, new))
+        begin((old, new))
     assert f"session.yaml:{line}: " in str(error.value)
     assert "when the session began" in str(error.value)
     assert "\n" not in str(error.value)
 
 
-def test_nor_is_one_whose_protocol_file_was_changed(begun, write):
+def test_a_session_whose_protocol_file_was_changed_is_not_resumed(begin, write):
     by_file = ("{pulses: {period: 1.9, torque_fraction: 0.1}}", "slower.yaml")
     protocol = write().parent / "slower.yaml"
     protocol.write_text("pulses: {period: 1.9}\n")
-    begun(by_file)
-    begun(by_file)
+    begin(by_file)
+    begin(by_file)
     protocol.write_text("pulses: {period: 1.8}\n")
     with pytest.raises(SessionError, match=r"session.yaml:15: protocol: that of slower is not"):
-        begun(by_file)
+        begin(by_file)
 
 
-def test_what_else_is_in_the_folder_is_left_alone(begun, tmp_path):
+def test_other_files_in_the_folder_are_left_alone(begin, tmp_path):
     (tmp_path / "s/sub-P01/ses-1").mkdir(parents=True)
     (tmp_path / "s/sub-P01/ses-1/mine").touch()
     with pytest.raises(SessionError, match="holds something else"):
-        begun()
+        begin()
 
 
 @pytest.mark.parametrize("last", ["key.json", "session.yaml", "ledger.tsv", "session.part"])
-def test_a_session_whose_beginning_was_cut_short_begins_anew(begun, monkeypatch, last):
+def test_a_session_interrupted_while_starting_starts_again(begin, monkeypatch, last):
     def cut(path, text):
         path.write_text(text[: 0 if path.name == last else None])
         if path.name == last:
@@ -99,21 +99,21 @@ def test_a_session_whose_beginning_was_cut_short_begins_anew(begun, monkeypatch,
     with monkeypatch.context() as broken:
         broken.setattr(folder_module, "_write", cut)
         with pytest.raises(OSError, match="No space"):
-            begun(BLIND)
-    assert begun(BLIND).next_block() == 1
-    assert begun(BLIND).unblind() == ["faster", "slower"]
+            begin(BLIND)
+    assert begin(BLIND).next_block() == 1
+    assert begin(BLIND).unblind() == ["faster", "slower"]
 
 
 @pytest.mark.parametrize("other", [("code: P01", "code: P02"), ("number: 2", "number: 3")])
-def test_each_person_of_a_study_has_one_number(begun, other):
-    begun()
+def test_each_person_of_a_study_has_one_number(begin, other):
+    begin()
     with pytest.raises(SessionError, match=r"person.number: . of P0.; allowed: one number for"):
-        begun(other, ('session: "1"', 'session: "2"'))
-    begun(("code: P01, number: 2", "code: P02, number: 3"))
+        begin(other, ('session: "1"', 'session: "2"'))
+    begin(("code: P01, number: 2", "code: P02, number: 3"))
 
 
-def test_two_do_not_conduct_it_at_once(begun):
-    folder = begun()
+def test_two_processes_cannot_conduct_the_same_session(begin):
+    folder = begin()
     with (
         folder.held(),
         pytest.raises(SessionError, match="another entrain session"),
@@ -124,8 +124,8 @@ def test_two_do_not_conduct_it_at_once(begun):
         pass
 
 
-def test_a_block_is_repeated_while_it_goes_on_or_once_it_is_done(begun):
-    folder = begun()
+def test_a_block_can_be_repeated_while_it_runs_or_once_it_is_done(begin):
+    folder = begin()
     with pytest.raises(SessionError, match="no block has started; allowed: none yet"):
         folder.repeat("why")
     folder.note("begun", 1, "block-01")
@@ -134,7 +134,7 @@ def test_a_block_is_repeated_while_it_goes_on_or_once_it_is_done(begun):
     assert folder.repeat("shoes untied") == 1
     folder.note("done", 1, "block-01")
     assert (folder.runs(), folder.next_block()) == ({}, 1)
-    with pytest.raises(SessionError, match="block 1 is not done"):  # it is the next one already
+    with pytest.raises(SessionError, match="block 1 is not done"):  # it is already the next block
         folder.repeat("again")
     folder.note("begun", 1, "block-01_run-2")
     folder.note("done", 1, "block-01_run-2")
@@ -145,13 +145,13 @@ def test_a_block_is_repeated_while_it_goes_on_or_once_it_is_done(begun):
         folder.repeat("it broke")
 
 
-def test_a_session_tells_how_it_stands(begun):
-    folder = begun()
-    told = []
+def test_a_session_reports_its_state(begin):
+    folder = begin()
+    states = []
 
     def note(*entry, **text):
         folder.note(*entry, **text)
-        told.append((folder.standing(), folder.paused))
+        states.append((folder.standing(), folder.paused))
 
     note("begun", 1, "block-01")
     note("pause", 2, text="tired")
@@ -160,7 +160,7 @@ def test_a_session_tells_how_it_stands(begun):
     note("rest", 2, text="600 s")
     note("begun", 2, "block-02")
     note("done", 2, "block-02")
-    assert told == [
+    assert states == [
         ("block 1 of 2 (faster)", None),
         ("block 1 of 2 (faster), then a pause: tired", "tired"),
         ("paused before block 2 of 2 (slower): tired", "tired"),
@@ -171,19 +171,19 @@ def test_a_session_tells_how_it_stands(begun):
     ]
 
 
-def test_a_rest_is_no_longer_for_a_clock_that_was_set_back(begun):
-    folder = begun()
+def test_a_clock_that_was_set_back_does_not_lengthen_a_rest(begin):
+    folder = begin()
     with (folder.path / "ledger.tsv").open("a") as file:
         file.write("2126-11-26T10:00:00+00:00\trest\t1\t\t600 s\n")
     assert folder.standing() == "rest before block 1 of 2 (faster): 600 s"
 
 
-def test_a_blinded_session_stands_by_numbers(begun):
-    assert begun(BLIND).standing() == "next: block 1 of 2"
+def test_a_blinded_session_reports_block_numbers_only(begin):
+    assert begin(BLIND).standing() == "next: block 1 of 2"
 
 
-def test_a_sealed_session_tells_no_name_before_it_is_unblinded(begun, tmp_path):
-    folder = begun(BLIND)
+def test_a_sealed_session_reveals_no_name_before_it_is_unblinded(begin, tmp_path):
+    folder = begin(BLIND)
     assert folder.names() == ["block 1", "block 2"]
     assert folder.plan["blocks"] is None
     assert "faster" not in (folder.path / "session.json").read_text()
@@ -199,14 +199,14 @@ def test_a_sealed_session_tells_no_name_before_it_is_unblinded(begun, tmp_path):
     assert [entry.what for entry in folder.ledger] == ["unblinded"]
 
 
-def test_no_two_keys_have_the_same_hash(begun, write, tmp_path):
-    first = begun(BLIND).plan["key"]
+def test_no_two_keys_have_the_same_hash(begin, write, tmp_path):
+    first = begin(BLIND).plan["key"]
     again = SessionFolder.begin(tmp_path / "again", read_session(write(BLIND)))
     assert again.plan["key"] != first
 
 
-def test_a_key_that_is_not_the_sealed_one_is_refused(begun):
-    folder = begun(BLIND)
+def test_a_key_that_is_not_the_sealed_one_is_refused(begin):
+    folder = begin(BLIND)
     key = folder.path / "key.json"
     content = json.loads(key.read_text())
     content["blocks"].reverse()
@@ -221,17 +221,17 @@ def test_a_key_that_is_not_the_sealed_one_is_refused(begun):
         folder.unblind()
 
 
-def test_a_bag_that_names_another_key_is_told(done):
-    folder = done(BLIND)  # of bags that name none
+def test_a_bag_with_another_key_is_reported(done):
+    folder = done(BLIND)  # its bags name no key
     with pytest.raises(SessionError, match=r"but .*block-01 has none;"):
         folder.unblind()
 
 
-def test_a_session_that_is_not_blinded_has_no_seal(begun):
+def test_a_session_that_is_not_blinded_has_no_seal(begin):
     with pytest.raises(SessionError, match="not blinded"):
-        begun().unblind()
+        begin().unblind()
 
 
-def test_what_is_no_session_is_told(tmp_path):
+def test_a_folder_that_is_not_a_session_is_reported(tmp_path):
     with pytest.raises(SessionError, match=r"not a session: no readable session.json"):
         SessionFolder(tmp_path).next_block()

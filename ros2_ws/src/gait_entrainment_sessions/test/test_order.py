@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Orders of blocks: balanced as a Williams design is, the same for the same seed."""
+"""Block orders: balanced like a Williams design, the same for the same seed."""
 
 from collections import Counter
 from itertools import pairwise
@@ -22,11 +22,11 @@ def orders(kind, count, persons, seed=3):
 
 
 @pytest.mark.parametrize("count", range(1, 10))
-def test_each_block_has_each_place_and_follows_each_other_one_equally_often(count):
+def test_each_block_has_each_place_and_follows_each_other_block_equally_often(count):
     rows = williams(count)
     assert len(rows) == (count if count % 2 == 0 or count == 1 else 2 * count)
     assert all(sorted(row) == list(range(count)) for row in rows)
-    places = Counter((place, one) for row in rows for place, one in enumerate(row))
+    places = Counter((place, block) for row in rows for place, block in enumerate(row))
     assert len(places) == count**2
     assert len(set(places.values())) == 1
     pairs = Counter(pair for row in rows for pair in pairwise(row))
@@ -34,7 +34,7 @@ def test_each_block_has_each_place_and_follows_each_other_one_equally_often(coun
     assert len(set(pairs.values())) <= 1
 
 
-def test_persons_take_the_rows_one_after_the_other():
+def test_persons_take_the_rows_in_turn():
     found = orders("balanced", 4, 8)
     assert len({tuple(row) for row in found[:4]}) == 4
     assert found[4:] == found[:4]
@@ -50,7 +50,7 @@ def test_a_permutation_is_the_same_for_the_same_seed_person_and_session(count, p
     assert sorted(given_twice[0]) == list(range(count))
 
 
-def test_persons_and_seeds_differ():
+def test_persons_and_seeds_get_different_orders():
     assert len({tuple(row) for row in orders("permuted", 6, 20)}) > 15
     assert orders("permuted", 6, 20, seed=4) != orders("permuted", 6, 20)
     assert orders("written", 3, 2) == [[0, 1, 2]] * 2

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The plan of a study, against what must be and what the Monte Carlo of the verdict measured."""
+"""A study's plan, checked against known results and the Monte Carlo of the verdict."""
 
 import numpy as np
 import pytest
@@ -14,10 +14,10 @@ from gait_entrainment_sessions.power import Power, PowerPlan, enough_of, power, 
 from gait_entrainment_studies.cohort.population import step_noise
 
 
-def test_steady_walks_are_judged_right_as_soon_as_they_can_be():
+def test_steady_walks_are_judged_correctly_as_soon_as_possible():
     plan = PowerPlan(variation=0.001, gain=0.9, trials=20)
     found = power(plan, -0.05, [10, 60])
-    assert [(one.pulses, one.wrongly.value) for one in found] == [(10, 0.0), (60, 0.0)]
+    assert [(row.pulses, row.wrongly.value) for row in found] == [(10, 0.0), (60, 0.0)]
     assert found[0].drifting.value == 0.0
     assert (found[1].entrained.value, found[1].drifting.value) == (1.0, 1.0)
 
@@ -31,7 +31,7 @@ def test_chances_are_those_of_the_monte_carlo_in_docs_analysis():
     assert found.wrongly.low < 0.008 < found.wrongly.high
 
 
-def test_the_slope_lets_more_walkers_pass_that_ignore_the_pulses_than_the_verdict():
+def test_the_slope_passes_more_walkers_that_ignore_the_pulses_than_the_verdict():
     plan = PowerPlan(variation=0.03, hurst=0.85, stride=1.934)
     slopes_pass = verdicts_pass = 0
     noise = step_noise(0, 15 + 52, 100, plan.hurst).T
@@ -49,12 +49,12 @@ def test_the_slope_lets_more_walkers_pass_that_ignore_the_pulses_than_the_verdic
     ("chances", "enough"),
     [((0.5, 0.8, 0.9), 20), ((0.8, 0.7, 0.9), 30), ((0.9, 0.9, 0.7), None), ((1, 1, 1), 10)],
 )
-def test_enough_is_what_more_pulses_are_not_too_few_for(chances, enough):
-    told = [statistics.Estimate(chance, 0, 1) for chance in chances]
-    found = [Power(10 * n, one, one, one) for n, one in enumerate(told, start=1)]
+def test_enough_pulses_means_that_any_more_are_also_enough(chances, enough):
+    estimates = [statistics.Estimate(chance, 0, 1) for chance in chances]
+    found = [Power(10 * n, e, e, e) for n, e in enumerate(estimates, start=1)]
     assert enough_of(found, 0.8) == enough
 
 
-def test_an_offset_at_which_nobody_locks_is_refused():
+def test_an_offset_at_which_no_walker_locks_is_refused():
     with pytest.raises(UsageError, match=r"period_offset: -0.2 s; allowed: within 0.088 s"):
         power(PowerPlan(), -0.2)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A rehearsal walks any block that a session may have; its command tells what it found."""
+"""A rehearsal walks any block that a session may have; its command reports the findings."""
 
 import json
 
@@ -24,12 +24,12 @@ ANY = (
 )
 
 
-def test_each_subject_walks_what_the_simulation_does(write):
+def test_each_subject_walks_as_in_the_simulation(write):
     session = read_session(write(ANY, ("side: left", "side: left\n  driver: odrive_can")))
     walker = session.blocks[0].protocol.walker
     subjects = Subjects((walker, walker), np.array([0.02, 0.01]), 0)
     runs = list(rehearse(session, subjects, seed=0, hurst=0.5, jobs=2))
-    walked = {(one.place.person, one.place.name): one.run for one in runs}
+    walked = {(r.place.person, r.place.name): r.run for r in runs}
     assert walked.keys() == {(s, b) for s in ("S01", "S02") for b in ("faster", "slower")}
     for run in walked.values():
         assert run.protocol.side is Side.LEFT
@@ -40,11 +40,11 @@ def test_each_subject_walks_what_the_simulation_does(write):
     assert by_phase.train.pulses[2].torque == 0
     assert by_phase.train.pulses[3].shape is Shape.HALF_SINE
     assert len({run.protocol.seed for run in walked.values()}) == 4
-    study = StudyFindings.of([found for one in runs for found in Findings.of(one)])
+    study = StudyFindings.of([found for placed in runs for found in Findings.of(placed)])
     assert len(study.persons) == 2
 
 
-def test_a_subject_who_must_not_get_a_pulse_is_named(write):
+def test_a_subject_who_must_not_receive_a_pulse_is_named(write):
     session = read_session(write())
     large = WalkerParameters(mass=160.0, ankle_stiffness=174.6)
     subjects = Subjects((session.blocks[0].protocol.walker, large), np.full(2, 0.01), 0)
@@ -52,7 +52,7 @@ def test_a_subject_who_must_not_get_a_pulse_is_named(write):
         list(rehearse(session, subjects, seed=0, hurst=0.5, jobs=1))
 
 
-def test_the_command_tells_what_would_have_been_found(write, tmp_path, capsys):
+def test_the_command_reports_what_would_have_been_found(write, tmp_path, capsys):
     path, out = write(ANY), tmp_path / "out"
     arguments = ["cohort", str(path), "--subjects", "3", "--jobs", "1", "--out", str(out)]
     assert main([*arguments, "--json"]) == 0

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Session files: what is said twice, what follows from the person, each mistake in a line."""
+"""Session files: what blocks override, what follows from the person, mistakes in one line."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from gait_entrainment_sessions.session_file import SessionError, read_session
 ROOT = Path(__file__).parents[4]
 
 
-def test_what_a_block_says_replaces_what_all_have(write):
+def test_values_of_a_block_replace_the_common_ones(write):
     faster, slower = read_session(write()).blocks
     assert (faster.name, faster.rest, slower.rest) == ("faster", 30.0, 20.0)
     assert faster.protocol.pulses == PulsePlan(
@@ -36,7 +36,7 @@ def test_the_walker_has_the_persons_size_in_the_papers_proportions(write):
     assert read_session(write(heavy)).blocks[0].protocol.walker.mass == 75
 
 
-def test_a_protocol_may_be_a_file_beside_the_session(write):
+def test_a_protocol_may_be_a_file_next_to_the_session(write):
     path = write(("{pulses: {period: 1.9, torque_fraction: 0.1}}", "slower.yaml"))
     (path.parent / "slower.yaml").write_text("pulses:\n  period: 1.9\n  width: 0.2\n")
     pulses = read_session(path).blocks[1].protocol.pulses
@@ -49,7 +49,7 @@ def test_a_protocol_may_be_a_file_beside_the_session(write):
 SLOWER = "{pulses: {period: 1.9, torque_fraction: 0.1}}"
 
 
-def test_a_protocol_may_have_blocks_and_lists_of_its_own(write):
+def test_a_protocol_may_have_its_own_blocks_and_lists(write):
     shaped = "{pulses: {period: 1.9, shape: samples, samples: [0, 1, 0], catch_pulses: [3, 5]}}"
     pulses = read_session(write((SLOWER, shaped))).blocks[1].protocol.pulses
     assert (pulses.samples, pulses.catch_pulses) == ("0, 1, 0", "3, 5")
@@ -101,7 +101,7 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(("old", "new", "line", "message"), MISTAKES)
-def test_a_mistake_is_one_line_with_file_line_and_field(write, old, new, line, message):
+def test_a_mistake_is_one_message_with_file_line_and_field(write, old, new, line, message):
     path = write((old, new))
     with pytest.raises(SessionError) as error:
         read_session(path)
@@ -120,7 +120,7 @@ def test_a_real_robot_needs_limits_for_the_person(write):
 
 
 @pytest.mark.parametrize("text", ["", "# nothing\n", "- a\n", "study: x\n", "\xff"])
-def test_what_is_no_session_is_one_line(tmp_path, text):
+def test_a_file_that_is_not_a_session_is_reported_in_one_line(tmp_path, text):
     path = tmp_path / "session.yaml"
     path.write_text(text, encoding="latin-1")
     with pytest.raises(SessionError) as error:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Statistics against closed forms, other implementations, and how often their intervals hold."""
+"""Statistics, checked against closed forms, other implementations and nominal coverage."""
 
 import math
 from itertools import pairwise
@@ -21,17 +21,17 @@ PHASES = st.lists(st.floats(0.0, 1.0, exclude_max=True), min_size=1, max_size=30
 
 
 def pulses_with(lags, skip=()):
-    """Return a pulse a stride with these lags; those to skip are missing."""
+    """Return one pulse per stride with these lags, without the pulses to skip."""
     numbered = enumerate(lags, start=1)
     return [PulsePhase(n, 0, n, 0.5, lag, lag, 0) for n, lag in numbered if n not in skip]
 
 
 def rate_of(holds, trials=400, seed=1):
-    """Return how often something holds of independent generators."""
+    """Return the share of independent generators for which a condition holds."""
     return sum(map(holds, np.random.default_rng(seed).spawn(trials))) / trials
 
 
-def test_slope_is_that_of_the_normal_equations_and_its_interval_that_of_student():
+def test_slope_solves_the_normal_equations_and_has_students_interval():
     x, y = np.arange(10.0), np.array([1, 3, 2, 5, 4, 7, 6, 9, 8, 8.5])
     design = np.column_stack([np.ones(10), x])
     solved = np.linalg.solve(design.T @ design, design.T @ y)
@@ -43,7 +43,7 @@ def test_slope_is_that_of_the_normal_equations_and_its_interval_that_of_student(
     assert found.value - found.low == pytest.approx(found.high - found.value)
 
 
-def test_slope_of_too_little_cannot_be_told():
+def test_slope_of_too_little_data_is_nan():
     assert math.isnan(statistics.slope([1, 2], [1, 2]).value)
     assert math.isnan(statistics.slope([3, 3, 3], [1, 2, 3]).value)
     assert statistics.slope([1, 2, 3, 4], [0.1] * 4) == (0, 0, 0)
@@ -60,7 +60,7 @@ def test_direction_turns_with_the_phases(phases, turn):
 
 
 @pytest.mark.parametrize("resultant", [0.2, 0.6, 0.95])
-def test_kappa_solves_the_equation_of_its_likelihood(resultant):
+def test_kappa_solves_the_likelihood_equation(resultant):
     half = math.acos(resultant) / (2 * math.pi)  # of two phases this far from their mean
     found = statistics.direction([0.3 - half, 0.3 + half])
     assert found.phase == pytest.approx(0.3)
@@ -71,7 +71,7 @@ def test_kappa_solves_the_equation_of_its_likelihood(resultant):
     assert found.kappa == pytest.approx(vonmisesmle(angles)[1], rel=0.06)  # an approximation
 
 
-def test_direction_of_equal_phases_and_of_none():
+def test_direction_of_equal_phases_and_of_no_phases():
     found = statistics.direction([0.25] * 7)
     assert (found.phase, found.resultant, found.kappa) == (pytest.approx(0.25), 1.0, math.inf)
     assert math.isnan(statistics.direction([]).phase)
@@ -88,7 +88,7 @@ def test_an_exponential_approach_is_found_exactly_and_nothing_else_is():
     assert math.isnan(statistics.convergence(n, [*np.exp(-n[:39]), math.nan]).value)
 
 
-def test_interval_of_the_time_constant_holds_it_as_often_as_it_says():
+def test_interval_of_the_time_constant_has_its_nominal_coverage():
     n = np.arange(50)
 
     def holds(rng):
@@ -104,12 +104,12 @@ def test_interval_of_the_time_constant_holds_it_as_often_as_it_says():
     assert rate_of(claims) < 0.06
 
 
-def test_locked_spans_are_those_near_where_most_lags_lie_also_across_the_wrap():
+def test_locked_spans_are_those_near_most_lags_even_across_the_wrap():
     lags = [0.3, 0.2, *[-0.05] * 6, 0.4, *[-0.049] * 4]
     found = statistics.locking(pulses_with(lags), 1.0)
     assert found.lag == pytest.approx(-0.0496)
     assert (found.share, found.runs) == (pytest.approx(10 / 13), (6, 4))
-    # A pulse that is missing ends a span.
+    # A missing pulse ends a span.
     assert statistics.locking(pulses_with([0.1] * 9, skip={4}), 1.0).runs == (3, 5)
     around_the_wrap = pulses_with([0.49, -0.49, 0.495, -0.495])
     assert statistics.locking(around_the_wrap, 1.0).share == 1.0
@@ -139,7 +139,7 @@ def test_border_lies_between_two_offsets_that_were_tried(offsets, sign, found):
     assert statistics.border(offsets, sign) == found
 
 
-def test_share_is_wilsons_by_its_formula():
+def test_share_has_wilsons_interval():
     z, n, p = 1.959963985, 19, 18 / 19
     middle = (p + z * z / (2 * n)) / (1 + z * z / n)
     half = z / (1 + z * z / n) * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
@@ -148,7 +148,7 @@ def test_share_is_wilsons_by_its_formula():
     assert math.isnan(statistics.share(0, 0).value)
 
 
-def test_intervals_of_mean_and_deviation_hold_as_often_as_they_say():
+def test_intervals_of_mean_and_deviation_have_their_nominal_coverage():
     def mean_holds(rng):
         found = statistics.mean(rng.normal(6.7, 3.6, 9))
         return found.low < 6.7 < found.high
@@ -164,11 +164,11 @@ def test_intervals_of_mean_and_deviation_hold_as_often_as_they_say():
 
 
 @pytest.mark.parametrize("count", [5, 12, 40])
-def test_rayleigh_by_another_approximation_and_by_chance(count):
+def test_rayleigh_agrees_with_another_approximation_and_with_chance(count):
     phases = [0.02 * n for n in range(count)]
     other = rayleightest(2 * np.pi * np.array(phases))
     assert statistics.rayleigh(phases) == pytest.approx(other, abs=0.005)
-    # Of ten persons close together the series of that library is negative.
+    # For ten persons close together, that library's series is negative.
     assert 0 < statistics.rayleigh([0.65 + phase / count for phase in phases]) < 0.01
     assert 0.02 < rate_of(lambda rng: statistics.rayleigh(rng.uniform(size=count)) < 0.05) < 0.09
     assert math.isnan(statistics.rayleigh([0.5]))
@@ -176,4 +176,4 @@ def test_rayleigh_by_another_approximation_and_by_chance(count):
 
 def test_estimates_are_ordered():
     found = [statistics.share(3, 8), statistics.mean([1, 2, 4]), statistics.deviation([1, 2, 4])]
-    assert all(a < b for one in found for a, b in pairwise((one.low, one.value, one.high)))
+    assert all(a < b for f in found for a, b in pairwise((f.low, f.value, f.high)))

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Tables over runs say what the analysis says, with units, and words instead of numbers."""
+"""Tables of runs contain what the analysis found, with units, and words instead of numbers."""
 
 import csv
 import json
@@ -34,7 +34,7 @@ def bag(request):
     return request.path.parents[4] / "bags/paper_example"
 
 
-def test_tables_are_what_the_analysis_says(bag, tmp_path):
+def test_tables_contain_the_results_of_the_analysis(bag, tmp_path):
     run = read_run(bag)
     paths = write_tables(read_runs(bag), tmp_path)
     assert [path.name for path in paths] == [f"{name}.tsv" for name in TABLES]
@@ -57,7 +57,7 @@ def test_tables_are_what_the_analysis_says(bag, tmp_path):
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_each_column_is_explained_beside_and_in_parquet(bag, tmp_path, name):
+def test_each_column_is_described_in_json_and_in_parquet(bag, tmp_path, name):
     runs = list(read_runs(bag))
     write_tables(runs, tmp_path)
     write_tables(runs, tmp_path, "parquet")
@@ -66,18 +66,18 @@ def test_each_column_is_explained_beside_and_in_parquet(bag, tmp_path, name):
     texts = rows(tmp_path / f"{name}.tsv")
     assert list(about) == table.column_names == list(texts[0])
     for field in table.schema:
-        told = about[field.name]
+        entry = about[field.name]
         metadata = field.metadata
-        assert metadata[b"description"].decode() == told["Description"]
-        assert metadata.get(b"unit", b"").decode() == told.get("Units", "")
-        words = told.get("Levels")
+        assert metadata[b"description"].decode() == entry["Description"]
+        assert metadata.get(b"unit", b"").decode() == entry.get("Units", "")
+        words = entry.get("Levels")
         assert not words or {row[field.name] for row in texts} <= set(words)
     for row, text in zip(table.to_pylist(), texts, strict=True):
         shown = ["n/a" if value is None else str(value) for value in row.values()]
         assert shown == list(text.values())
 
 
-def test_runs_of_a_study_come_by_person_session_and_block(done, tmp_path):
+def test_runs_of_a_study_are_ordered_by_person_session_and_block(done, tmp_path):
     done()
     done(("code: P01, number: 2", "code: P02, number: 3"))
     found = [(p.person, p.session, p.block, p.name) for p in places_in(tmp_path / "study")]
@@ -95,7 +95,7 @@ def test_runs_of_a_study_come_by_person_session_and_block(done, tmp_path):
         assert place.sealed
 
 
-def test_of_a_sealed_run_no_table_tells_the_pulses(done, tmp_path):
+def test_no_table_reveals_the_pulses_of_a_sealed_run(done, tmp_path):
     sealed = done(("rest: 30", "blind: true"))
     write_tables(read_runs(sealed.path), tmp_path)
     events, strides = (rows(tmp_path / f"{name}.tsv") for name in ("events", "strides"))
@@ -106,7 +106,7 @@ def test_of_a_sealed_run_no_table_tells_the_pulses(done, tmp_path):
         assert rows(tmp_path / f"{name}.tsv") == []
 
 
-def test_each_block_of_a_protocol_has_a_row_of_its_own_and_its_parts(tmp_path):
+def test_each_block_of_a_protocol_has_its_own_row_and_parts(tmp_path):
     slower = "{name: slower, pulses: {period: 1.95, width: 0.2, torque: 5, catch_pulses: 1}}"
     protocol = read_protocol(f"blocks:\n- {{name: faster, rest: 5}}\n- {slower}")
     placed = PlacedRun(Place(tmp_path), simulate(protocol))
@@ -124,7 +124,7 @@ def test_each_block_of_a_protocol_has_a_row_of_its_own_and_its_parts(tmp_path):
         ("slower", "1"),
     ]
     assert [row["torque"] for row in pulses[50:52]] == ["0.0", "5.0"]
-    # Weaker pulses, as those of a sham, say nothing about the basin of the others.
+    # Weaker pulses, like those of a sham, say nothing about the basin of the stronger ones.
     (person,) = StudyFindings.of(Findings.of(placed)).persons
     assert (person.entrained, person.testable, person.slower.beyond) == (1, 2, math.inf)
     found = rows(tmp_path / "out/blocks.tsv")
@@ -138,24 +138,24 @@ def test_each_block_of_a_protocol_has_a_row_of_its_own_and_its_parts(tmp_path):
 @pytest.mark.parametrize(
     ("given", "finding"), [(0, "none was requested"), (1, "1 of 1 pulses compared")]
 )
-def test_torque_is_compared_where_some_was_asked_for(bag, given, finding):
+def test_torque_is_compared_only_if_some_was_requested(bag, given, finding):
     run = read_run(bag)
     sham = [(side, replace(timing, torque=0.0)) for side, timing in run.delivered]
     run = replace(run, delivered=tuple(sham[given:]) + run.delivered[:given])
     with BagReader(bag) as reader:
-        (check,) = (one for one in checks_of(run, reader) if one.name == "torque")
+        (check,) = (c for c in checks_of(run, reader) if c.name == "torque")
     assert (check.state, check.finding.endswith(finding)) == ("good", True)
 
 
 @pytest.mark.parametrize("text", ["pulses: {count: 0}\n", "baseline: 1\npulses: {period: 1.8}\n"])
-def test_what_cannot_be_told_is_not_told_as_a_number(text, tmp_path):
+def test_an_unknown_statistic_is_not_shown_as_a_number(text, tmp_path):
     (found,) = Findings.of(PlacedRun(Place(tmp_path), simulate(read_protocol(text))))
-    told = " ".join(value for _, value in page.statistics_of(found))
-    assert "cannot be told" in told
-    assert not re.search("nan|million", told)
+    shown = " ".join(value for _, value in page.statistics_of(found))
+    assert "cannot be told" in shown
+    assert not re.search("nan|million", shown)
 
 
-def test_a_folder_without_runs_is_told(done, tmp_path):
+def test_a_folder_without_runs_is_reported(done, tmp_path):
     with pytest.raises(BagError, match="no recorded run; give a bag, a session"):
         places_in(tmp_path)
     folder = done()

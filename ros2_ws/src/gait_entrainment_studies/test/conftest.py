@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Lets these tests import the walker's step-to-step function from the tests of the core."""
+"""Lets these tests import the step-to-step function from the tests of the core."""
 
 import sys
 from pathlib import Path

@@ -23,7 +23,7 @@ WIDTH = NANOSECONDS_PER_SECOND // 10
     torque=st.floats(-15, 30),
     onset=st.integers(0, 2 * NANOSECONDS_PER_SECOND),
 )
-def test_a_walk_gives_the_bits_of_the_walker(period, torque, onset):
+def test_a_walk_equals_that_of_the_walker_bit_for_bit(period, torque, onset):
     onsets = onset + np.array([nanoseconds(n * period) for n in range(4)])
     found = walk(make_model(TABLE_1), 6, Pulses(onsets, WIDTH, torque))
     walker = Walker(TABLE_1)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The bag that comes with the project holds what was recorded live over the nodes."""
+"""The bag that comes with the project contains what the nodes recorded live."""
 
 import json
 import re
@@ -28,28 +28,28 @@ def entrain(capsys, *arguments):
     return code, *capsys.readouterr()
 
 
-def test_the_outcome_is_that_of_the_simulation(capsys):
+def test_the_outcome_equals_that_of_the_simulation(capsys):
     code, out, err = entrain(capsys, "analyze", BAG, "--json")
     assert (code, err) == (0, "")
-    told = json.loads(out)
+    outcome = json.loads(out)
     simulated = json.loads(entrain(capsys, "simulate", "--json")[1])
-    assert {key: told[key] for key in simulated} == simulated
-    assert told["as_published_live"] is True
-    assert told["differences"] == []
+    assert {key: outcome[key] for key in simulated} == simulated
+    assert outcome["as_published_live"] is True
+    assert outcome["differences"] == []
     with BagReader(BAG) as bag:
-        assert (told["messages"], told["lost"]) == (bag.message_count, 0)
+        assert (outcome["messages"], outcome["lost"]) == (bag.message_count, 0)
     assert "the same to the last bit" in entrain(capsys, "analyze", BAG)[1]
 
 
-def copy(out, keep, told=None, renamed=("", ""), again=()):
+def copy(out, keep, custom=None, renamed=("", ""), again=()):
     """
-    Copy the bag; `keep` may change the bytes of a message, or leave it out with None.
+    Copy the bag; `keep` returns the bytes of a message, perhaps changed, or None to drop it.
 
-    It may be there `again`. `told` replaces custom data; a field of a topic is `renamed`.
+    `again`: topics to write twice; `custom`: new custom data; `renamed`: topic and its field.
     """
     with (
         BagReader(BAG) as bag,
-        BagWriter(out, ros_distro="jazzy", custom_data=bag.custom_data | (told or {})) as writer,
+        BagWriter(out, ros_distro="jazzy", custom_data=bag.custom_data | (custom or {})) as writer,
     ):
         for topic in bag.topics.values():
             name, field = renamed
@@ -73,26 +73,26 @@ def test_one_changed_bit_of_a_result_is_found(capsys, tmp_path):
 
     bag = copy(tmp_path / "changed", changed)
     code, out, _ = entrain(capsys, "analyze", bag, "--json")
-    told = json.loads(out)
-    assert (code, told["as_published_live"]) == (0, False)
-    (difference,) = told["differences"]
+    outcome = json.loads(out)
+    assert (code, outcome["as_published_live"]) == (0, False)
+    (difference,) = outcome["differences"]
     assert difference.startswith("gait/pulse_phases: ")
     assert "message 18" in difference
 
 
-def test_deleted_events_are_analyzed_as_they_are(capsys, tmp_path):
+def test_a_bag_with_deleted_events_is_analyzed(capsys, tmp_path):
     bag = copy(
         tmp_path / "gaps",
         lambda topic, n, data: None if topic == "/gait_events" and n in (100, 101) else data,
     )
     code, out, _ = entrain(capsys, "analyze", bag, "--json")
-    told = json.loads(out)
+    outcome = json.loads(out)
     assert code == 0
-    assert len(told["stride_period"]) in (78, 79)
-    assert told["as_published_live"] is False
+    assert len(outcome["stride_period"]) in (78, 79)
+    assert outcome["as_published_live"] is False
 
 
-def test_what_no_profile_covers_is_a_hole_up_to_the_end(capsys, tmp_path):
+def test_missing_profiles_are_a_hole_up_to_the_end(capsys, tmp_path):
     def half(topic, number, data):
         return data if topic in NEEDED and (topic == NEEDED[0] or number < 42) else None
 
@@ -102,7 +102,7 @@ def test_what_no_profile_covers_is_a_hole_up_to_the_end(capsys, tmp_path):
     assert "longer than the run" not in out
 
 
-def test_a_rescued_bag_is_analyzed_up_to_where_it_ends(capsys, tmp_path):
+def test_a_rescued_bag_is_analyzed_up_to_its_end(capsys, tmp_path):
     shutil.copytree(BAG, tmp_path / "cut")
     file = tmp_path / "cut" / "paper_example_0.mcap"
     file.write_bytes(file.read_bytes()[:600_000])
@@ -115,7 +115,7 @@ def test_a_rescued_bag_is_analyzed_up_to_where_it_ends(capsys, tmp_path):
     assert 10 < len(json.loads(out)["stride_period"]) < 80
 
 
-def test_torque_is_read_where_figures_need_it(tmp_path, capsys):
+def test_torque_is_read_only_where_figures_need_it(tmp_path, capsys):
     assert len(read_run(BAG, torques=False).torques.stamps) == 0
     torques = read_run(BAG).torques
     assert 0 < len(torques.stamps) < 0.5 * 7700
@@ -156,7 +156,7 @@ def test_the_bag_follows_every_rule_and_opens_without_ros_and_message_packages()
         ('messages_lost={"/a": 1e400}', 1, "allowed: a JSON object"),
     ],
 )
-def test_what_cannot_be_analyzed_is_one_line(capsys, tmp_path, name, expected, words):
+def test_an_unusable_bag_is_reported_in_one_line(capsys, tmp_path, name, expected, words):
     with BagWriter(tmp_path / "foreign", ros_distro="jazzy"):
         pass
     (tmp_path / "text").write_text("hello")
@@ -164,9 +164,9 @@ def test_what_cannot_be_analyzed_is_one_line(capsys, tmp_path, name, expected, w
         for topic in NEEDED:
             writer.add_topic(TopicInfo(topic, "std_msgs/msg/Byte", "byte data"))
             writer.write(topic, b"\0\1\0\0\7", 1, 1)
-    key, told, value = name.partition("=")
-    if told:  # what somebody else's tool has written into the custom data
-        name = "told"
+    key, separator, value = name.partition("=")
+    if separator:  # another tool has written this into the custom data
+        name = "edited"
         copy(
             tmp_path / name, lambda topic, _, data: data if topic in NEEDED else None, {key: value}
         )
@@ -177,31 +177,31 @@ def test_what_cannot_be_analyzed_is_one_line(capsys, tmp_path, name, expected, w
 
 
 def with_numbers(data, place, value):
-    """Change four bytes behind the header of a message: its run at 0, then its own fields."""
+    """Change four bytes after a message's header: its run number at 0, then its own fields."""
     begin = 20 + place
     return data[:begin] + value.to_bytes(4, "little") + data[begin + 4 :]
 
 
 def test_a_second_run_in_a_bag_is_refused(capsys, tmp_path):
-    def begun_again(topic, number, data):
+    def restarted(topic, number, data):
         first = (topic, number) == ("/perturbation/torque_profile", 60)
         return (with_numbers(data, 4, 0) if first else data) if topic in NEEDED else None
 
-    code, out, err = entrain(capsys, "analyze", copy(tmp_path / "two", begun_again))
+    code, out, err = entrain(capsys, "analyze", copy(tmp_path / "two", restarted))
     assert (code, out) == (1, "")
     assert "holds more than one run (run 1, then run 1)" in err
 
 
-def test_what_was_recorded_twice_counts_once(capsys, tmp_path):
+def test_messages_recorded_twice_count_once(capsys, tmp_path):
     twice = copy(tmp_path / "twice", lambda t, _, d: d if t in NEEDED else None, again=NEEDED)
     code, out, _ = entrain(capsys, "analyze", twice, "--json")
-    told = json.loads(out)
-    assert (code, told["entrained_since_stride"], told["holes"]) == (0, 29, [])
-    assert told["gait_events"]["repeated"] == 324
+    outcome = json.loads(out)
+    assert (code, outcome["entrained_since_stride"], outcome["holes"]) == (0, 29, [])
+    assert outcome["gait_events"]["repeated"] == 324
 
 
 @pytest.mark.parametrize("lost", NEEDED)
-def test_of_a_topic_that_is_announced_all_may_be_lost(tmp_path, lost):
+def test_all_messages_of_an_announced_topic_may_be_lost(tmp_path, lost):
     bag = copy(tmp_path / "bag", lambda topic, _, data: None if topic == lost else data)
     (found,) = check(bag)
     (hole,) = recover(bag, tmp_path / "rescued").losses
@@ -211,7 +211,7 @@ def test_of_a_topic_that_is_announced_all_may_be_lost(tmp_path, lost):
     assert len({*read_run(bag).analysis.holes}) == len(read_run(bag).analysis.holes)
 
 
-def test_what_the_analyzer_does_not_take_is_left_out_and_counted(capsys, tmp_path):
+def test_messages_that_the_analyzer_rejects_are_left_out_and_counted(capsys, tmp_path):
     def strange(topic, number, data):
         if (topic, number) == ("/gait_events", 100):
             return with_numbers(data, 0, 7)  # of another run
@@ -221,12 +221,12 @@ def test_what_the_analyzer_does_not_take_is_left_out_and_counted(capsys, tmp_pat
             return data[:28] + b"\7" + data[29:]  # on an unknown side
         return data if topic in NEEDED else None
 
-    # A protocol of no text is none.
+    # An empty text is not a protocol.
     bag = copy(tmp_path / "strange", strange, {"protocol": " "})
-    told = json.loads(entrain(capsys, "analyze", bag, "--json")[1])
-    assert (told["left_out"], told["gait_events"]["accepted"]) == (3, 322)
-    assert "which pulses began" in [hole["missing"] for hole in told["holes"]]
-    assert told["parameters"] is None
+    outcome = json.loads(entrain(capsys, "analyze", bag, "--json")[1])
+    assert (outcome["left_out"], outcome["gait_events"]["accepted"]) == (3, 322)
+    assert "which pulses began" in [hole["missing"] for hole in outcome["holes"]]
+    assert outcome["parameters"] is None
     assert "3 left out" in entrain(capsys, "analyze", bag)[1]
 
 
@@ -239,7 +239,7 @@ def test_what_the_analyzer_does_not_take_is_left_out_and_counted(capsys, tmp_pat
         ("/gait/strides", "number"),
     ],
 )
-def test_messages_of_another_version_are_named(capsys, tmp_path, renamed):
+def test_messages_of_another_version_are_reported(capsys, tmp_path, renamed):
     topics = {*NEEDED, renamed[0]}
     bag = copy(
         tmp_path / "old", lambda topic, _, data: data if topic in topics else None, {}, renamed
@@ -252,7 +252,7 @@ def test_messages_of_another_version_are_named(capsys, tmp_path, renamed):
 
 @pytest.fixture(scope="module")
 def foreign(tmp_path_factory):
-    """Give the bag as `rosbags` writes it: by the time of reception, without custom data."""
+    """Write the bag with `rosbags`: in order of reception, without custom data."""
     folder = tmp_path_factory.mktemp("foreign") / "bag"
     with (
         BagReader(BAG) as bag,
@@ -270,39 +270,39 @@ def foreign(tmp_path_factory):
     return folder
 
 
-def test_the_bag_of_another_recorder_is_an_equal(capsys, foreign):
+def test_the_bag_of_another_recorder_gives_the_same_outcome(capsys, foreign):
     ours = json.loads(entrain(capsys, "analyze", BAG, "--json")[1])
     code, out, err = entrain(
         capsys, "analyze", foreign, "--protocol", BAG / "protocol.yaml", "--json"
     )
     assert (code, err) == (0, "")
-    # Such a file does not say when a message was published, nor what was lost.
-    told = json.loads(out) | {
+    # Such a file does not record when a message was published or what was lost.
+    outcome = json.loads(out) | {
         key: ours[key] for key in ("bag", "messages", "lost", "real_time_factor")
     }
-    assert told == ours
+    assert outcome == ours
 
 
-def test_without_a_protocol_the_rest_is_still_told(capsys, foreign, tmp_path):
+def test_without_a_protocol_the_rest_is_still_reported(capsys, foreign, tmp_path):
     ours = json.loads(entrain(capsys, "analyze", BAG, "--json")[1])
     code, out, err = entrain(capsys, "analyze", foreign, "--json")
     assert (code, err) == (0, "")
-    told = json.loads(out)
-    assert told["parameters"] is None
-    assert (told["side"], told["as_published_live"]) == ("right", True)
-    assert told["stride_period"][:80] == ours["stride_period"]
+    outcome = json.loads(out)
+    assert outcome["parameters"] is None
+    assert (outcome["side"], outcome["as_published_live"]) == ("right", True)
+    assert outcome["stride_period"][:80] == ours["stride_period"]
     for key in ("unperturbed_stride_period", "perturbation_period"):
-        assert told[key] == pytest.approx(ours[key], abs=1e-9)
+        assert outcome[key] == pytest.approx(ours[key], abs=1e-9)
     for key in ("pulses", "verdict", "entrained_since_stride", "final_phase_lag", "holes"):
-        assert told[key] == ours[key]
+        assert outcome[key] == ours[key]
     code, out, _ = entrain(capsys, "analyze", foreign, "--figures", tmp_path)
     assert (code, out.count(".png")) == (0, 3)
     assert "entrained since stride 29" in out
 
 
-def test_another_leg_than_the_recorded_one_can_be_analyzed(capsys, foreign):
-    told = json.loads(entrain(capsys, "analyze", foreign, "--side", "left", "--json")[1])
-    assert (told["side"], told["as_published_live"]) == ("left", True)
+def test_a_leg_other_than_the_recorded_one_can_be_analyzed(capsys, foreign):
+    outcome = json.loads(entrain(capsys, "analyze", foreign, "--side", "left", "--json")[1])
+    assert (outcome["side"], outcome["as_published_live"]) == ("left", True)
     # The pulses settle in the other leg's double stance: half a stride away from its own.
-    assert told["entrained"]
-    assert abs(told["final_phase_lag"]) > 0.5
+    assert outcome["entrained"]
+    assert abs(outcome["final_phase_lag"]) > 0.5

@@ -32,14 +32,14 @@ def entrain(capsys, *arguments):
     return code, *capsys.readouterr()
 
 
-def test_info_tells_topics_times_and_custom_data(capsys, bag):
+def test_info_prints_topics_times_and_custom_data(capsys, bag):
     code, out, err = entrain(capsys, "info", bag)
     assert (code, err) == (0, "")
     for words in ("2.000 s", "messages   3", "/a p/msg/C", "seed: 7", "    side: left", "jazzy"):
         assert words in out
-    told = json.loads(entrain(capsys, "info", bag, "--json")[1])
-    assert told["topics"] == [{"name": "/a", "type": "p/msg/C", "messages": 3}]
-    assert (told["start"], told["duration"]) == (10**9, 2 * 10**9)
+    answer = json.loads(entrain(capsys, "info", bag, "--json")[1])
+    assert answer["topics"] == [{"name": "/a", "type": "p/msg/C", "messages": 3}]
+    assert (answer["start"], answer["duration"]) == (10**9, 2 * 10**9)
 
 
 def test_check_prints_a_line_per_rule_and_fails_for_errors_only(capsys, bag, tmp_path):
@@ -50,13 +50,13 @@ def test_check_prints_a_line_per_rule_and_fails_for_errors_only(capsys, bag, tmp
     code, out, _ = entrain(capsys, "check", bag, broken)
     assert code == 1
     assert [line.split(": ")[:2] for line in out.splitlines()[1:]] == [["error", "metadata-file"]]
-    told = [
+    answer = [
         json.loads(line)
         for line in entrain(capsys, "check", bag, broken, "--json")[1].split("\n")[:2]
     ]
-    assert [entry["bag"] for entry in told] == [str(bag), str(broken)]
-    assert told[0]["findings"] == []
-    assert told[1]["findings"][0]["rule"] == "metadata-file"
+    assert [entry["bag"] for entry in answer] == [str(bag), str(broken)]
+    assert answer[0]["findings"] == []
+    assert answer[1]["findings"][0]["rule"] == "metadata-file"
     with BagWriter(tmp_path / "unhashed", ros_distro="jazzy") as writer:
         writer.add_topic(TopicInfo("/a", "p/msg/C", TEXT))
     code, out, _ = entrain(capsys, "check", tmp_path / "unhashed")
@@ -64,7 +64,7 @@ def test_check_prints_a_line_per_rule_and_fails_for_errors_only(capsys, bag, tmp
     assert out.startswith("warning: type-hash")
 
 
-def test_recover_says_what_is_missing(capsys, bag, tmp_path):
+def test_recover_reports_what_is_missing(capsys, bag, tmp_path):
     file = bag / "walk_0.mcap"
     content = file.read_bytes()
     file.write_bytes(content[: len(content) // 3])
@@ -73,12 +73,12 @@ def test_recover_says_what_is_missing(capsys, bag, tmp_path):
     assert "messages rescued into" in out
     assert "missing: " in out
     assert entrain(capsys, "check", tmp_path / "whole")[0] == 0
-    told = json.loads(entrain(capsys, "recover", bag, tmp_path / "again", "--json")[1])
-    assert 0 <= told["messages"] < 3
-    assert told["losses"]
+    answer = json.loads(entrain(capsys, "recover", bag, tmp_path / "again", "--json")[1])
+    assert 0 <= answer["messages"] < 3
+    assert answer["losses"]
 
 
-def test_export_makes_tables(capsys, bag, tmp_path):
+def test_export_writes_tables(capsys, bag, tmp_path):
     pytest.importorskip("pyarrow")
     code, out, err = entrain(capsys, "export", bag, tmp_path / "tables")
     assert (code, err) == (0, "")
@@ -102,7 +102,7 @@ def test_export_makes_tables(capsys, bag, tmp_path):
         (["recover", "EMPTY", "OUT"], 1, "is empty"),
     ],
 )
-def test_what_cannot_be_done_is_one_line(capsys, bag, tmp_path, arguments, expected, words):
+def test_each_failure_is_reported_in_one_line(capsys, bag, tmp_path, arguments, expected, words):
     if arguments[0] == "export":
         pytest.importorskip("pyarrow")
     (tmp_path / "empty.mcap").touch()
@@ -142,7 +142,7 @@ def test_a_topic_that_cannot_be_decoded_does_not_stop_the_others(capsys, tmp_pat
 
 
 @pytest.mark.parametrize("form", [(), ("--json",)])
-def test_nothing_rescued_is_no_success(capsys, tmp_path, form):
+def test_rescuing_nothing_is_a_failure(capsys, tmp_path, form):
     with BagWriter(tmp_path / "empty", ros_distro="") as writer:
         writer.add_topic(CLOCK)
     code, out, _ = entrain(capsys, "recover", tmp_path / "empty", tmp_path / "rescued", *form)

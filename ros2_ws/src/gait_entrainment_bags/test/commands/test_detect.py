@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""entrain detect, and entrain analyze of tables: runs that this project did not record."""
+"""entrain detect, and entrain analyze on tables: runs that this project did not record."""
 
 import json
 
@@ -26,7 +26,7 @@ def simulation():
 
 @pytest.fixture
 def tables(simulation, tmp_path):
-    """The paper's run as somebody else would keep it: no step numbers, other clocks."""
+    """Write the paper's run as another tool would: no step numbers, another clock."""
     events, pulses = tmp_path / "events.tsv", tmp_path / "pulses.tsv"
     rows = [
         f"{100 + e.stamp / 1e9:.9f}\t{e.kind.name.lower()}\t{e.side.name.lower()}"
@@ -38,13 +38,13 @@ def tables(simulation, tmp_path):
     return "--events", events, "--pulses", pulses
 
 
-def test_a_run_from_tables_has_the_outcome_of_the_same_run(capsys, tables, simulation):
+def test_a_run_from_tables_has_the_outcome_of_the_simulated_run(capsys, tables, simulation):
     code, out, err = entrain(capsys, "analyze", *tables, "--side", "right", "--json")
     assert (code, err) == (0, "")
-    told = json.loads(out)
-    assert (told["verdict"], told["entrained_since_stride"]) == ("entrained", 29)
+    answer = json.loads(out)
+    assert (answer["verdict"], answer["entrained_since_stride"]) == ("entrained", 29)
     lag = simulation.analysis.pulses[-1].phase_lag
-    assert told["final_phase_lag"] == pytest.approx(lag, abs=1e-6)
+    assert answer["final_phase_lag"] == pytest.approx(lag, abs=1e-6)
     late = entrain(capsys, "analyze", *tables, "--side=right", "--toe-off-bias=0.01", "--json")[1]
     assert json.loads(late)["final_phase_lag"] == pytest.approx(lag + 0.01, abs=1e-6)
 
@@ -57,14 +57,14 @@ def test_a_run_from_tables_has_the_outcome_of_the_same_run(capsys, tables, simul
         (["bag", "--events", "e.tsv", "--pulses", "p.tsv", "--side", "left"], "--side; not both"),
     ],
 )
-def test_a_bag_or_tables_and_the_leg(capsys, words, message):
+def test_analyze_needs_a_bag_or_tables_with_the_leg(capsys, words, message):
     code, out, err = entrain(capsys, "analyze", *words)
     assert (code, out) == (2, "")
     assert message in err
 
 
 def test_tables_that_do_not_fit_together_are_refused(capsys, tables):
-    """Milliseconds, another leg's events alone, another clock."""
+    """Only the other leg's events; pulses in milliseconds and on another clock."""
     _, events, _, pulses = tables
     rows = events.read_text()
     events.write_text("\n".join(line for line in rows.splitlines() if "right" not in line))
@@ -78,7 +78,7 @@ def test_tables_that_do_not_fit_together_are_refused(capsys, tables):
     assert "column onset: 0.1 to 1.7 s; allowed: some in the strides, 100 to" in err
 
 
-def test_detect_writes_beside_the_file_and_prints(capsys, tmp_path):
+def test_detect_writes_next_to_the_file_and_prints(capsys, tmp_path):
     def load(n):
         return 800 if n % 110 < 68 else 0
 
@@ -87,9 +87,9 @@ def test_detect_writes_beside_the_file_and_prints(capsys, tmp_path):
     path.write_text("\n".join(["time,left_force_z,right_force_z", *rows]))
     code, out, err = entrain(capsys, "detect", path, "--json")
     assert (code, err) == (0, "")
-    told = json.loads(out)
-    assert told["detector"] == "vertical_force"
-    assert told["counts"]["left_heel_strike"] >= 9
+    answer = json.loads(out)
+    assert answer["detector"] == "vertical_force"
+    assert answer["counts"]["left_heel_strike"] >= 9
     assert (tmp_path / "walk_events.tsv").exists()
     code, _, err = entrain(capsys, "detect", path)
     assert code == 2
@@ -111,7 +111,7 @@ def test_detect_writes_beside_the_file_and_prints(capsys, tmp_path):
         (["FILE"], "holds no gait event that could be detected: it lasts 0"),
     ],
 )
-def test_what_is_refused_is_one_line(capsys, tmp_path, words, message):
+def test_wrong_usage_is_reported_in_one_line(capsys, tmp_path, words, message):
     path = tmp_path / "walk.csv"
     path.write_text("time,left_force_z\n0,0\n0.01,0\n")
     code, out, err = entrain(capsys, "detect", *(str(path) if w == "FILE" else w for w in words))
@@ -120,7 +120,7 @@ def test_what_is_refused_is_one_line(capsys, tmp_path, words, message):
     assert err.count("\n") == 1
 
 
-def test_the_signals_of_a_bag_in_any_namespace(capsys, tmp_path, topic, typestore, joint_state):
+def test_signals_of_a_bag_may_be_in_any_namespace(capsys, tmp_path, topic, typestore, joint_state):
     def wrench(stamp, force):
         types = typestore.types
         vectors = [types["geometry_msgs/msg/Vector3"](0.0, 0.0, z) for z in (float(force), 0.0)]

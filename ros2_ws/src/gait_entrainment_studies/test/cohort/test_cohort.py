@@ -18,11 +18,11 @@ from gait_entrainment_studies.locking.pulsed_gait import PulsedGait
 
 
 def table_1_subjects(count, variation):
-    """Subjects that are all the walker of Table 1: what noise alone does."""
+    """Return subjects that are all the walker of Table 1, to see what noise alone does."""
     return Subjects((WalkerParameters(),) * count, np.full(count, variation), 0)
 
 
-def test_without_variability_the_trial_is_the_experiment_of_entrain_simulate():
+def test_a_trial_without_variability_equals_the_run_of_entrain_simulate():
     study = run_study(table_1_subjects(2, 1e-9), StudyPlan(torque=13.3))
     trial = study.trials[0]
     simulation = simulate(Protocol(pulses=PulsePlan(torque=13.3, torque_fraction=None)))
@@ -59,7 +59,7 @@ def test_subjects_that_cannot_walk_with_their_variation_are_reported():
     assert sum(found.values()) == 6
 
 
-def test_a_trial_is_the_same_whatever_other_periods_are_asked_for():
+def test_a_trial_is_the_same_whatever_other_periods_are_requested():
     subjects = table_1_subjects(3, 0.02)
     alone = run_study(subjects, StudyPlan(period_offsets=(-0.05,))).trials
     among = run_study(subjects, StudyPlan(period_offsets=(-0.08, -0.05))).trials
@@ -67,14 +67,14 @@ def test_a_trial_is_the_same_whatever_other_periods_are_asked_for():
     assert among[0].measured_period != among[3].measured_period
 
 
-def test_basins_are_those_of_the_solved_borders_and_only_where_they_hold():
+def test_basins_are_those_of_the_solved_borders_and_only_where_these_apply():
     study = run_study(table_1_subjects(2, 1e-9), StudyPlan(torque=13.3464))
     assert study.basins[0] == pytest.approx([-4.1045, 0.0], abs=1e-4)
     assert study.basin_widths == pytest.approx([4.1045] * 2, abs=1e-4)
     assert run_study(table_1_subjects(2, 1e-9), StudyPlan(slope=-0.01)).basins.shape == (0, 2)
 
 
-def test_subjects_are_drawn_from_what_is_stated_and_by_seed():
+def test_subjects_are_drawn_from_the_given_distributions_and_seed():
     distributions = SubjectDistributions(mass=(70.0, 5.0))
     subjects = draw_subjects(distributions, 400, 1)
     masses = np.array([walker.mass for walker in subjects.walkers])
@@ -93,7 +93,7 @@ def test_command_counts_every_subject_in_its_denominators(tmp_path, capsys):
         "-0.05",
         "--period-offset",
         "0.02",
-        # The same again is the same trials.
+        # A repeated offset adds no trials.
         "--period-offset",
         "-0.05",
     ]
@@ -118,7 +118,7 @@ def test_command_counts_every_subject_in_its_denominators(tmp_path, capsys):
         (["--peak-torque", "0.9", "0.001"], "hardly any subject drawn has a gait"),
     ],
 )
-def test_wrong_usage_is_one_line(arguments, message, capsys):
+def test_wrong_usage_is_reported_in_one_line(arguments, message, capsys):
     assert main(["cohort", *arguments]) == 2
     error = capsys.readouterr().err
     assert message in error

@@ -27,7 +27,7 @@ PERIOD = 1.9332295304390836
 
 # Onsets of the reference are whole nanoseconds; unloading has a kink within the quadrature.
 @pytest.mark.parametrize(("fraction", "tolerance"), [(0.1, 5e-9), (-0.1, 1e-6)])
-def test_without_noise_it_is_the_walker_of_the_paper(fraction, tolerance):
+def test_without_noise_the_walk_is_that_of_the_papers_walker(fraction, tolerance):
     offsets = np.array([-0.05, -0.07, 0.02, 0.06, -0.1])
     torque = fraction * TABLE_1.peak_torque
     count = offsets.size
@@ -43,8 +43,8 @@ def test_without_noise_it_is_the_walker_of_the_paper(fraction, tolerance):
 
 
 @pytest.mark.parametrize("slope", [-0.03, 0.0, 0.02])
-def test_a_step_on_a_slope_is_that_of_the_equations_of_motion(slope):
-    """Lagrange's equation in the angle theta, gravity leaned by the slope; no code shared."""
+def test_a_step_on_a_slope_solves_the_equations_of_motion(slope):
+    """Lagrange's equation in the angle theta, gravity tilted by the slope; shares no code."""
     p = TABLE_1
     d = 2 * p.leg_length * math.sin(p.leg_angle) - p.foot_length
 
@@ -151,12 +151,12 @@ def test_values_out_of_range_are_refused(make, message):
 
 
 @pytest.mark.parametrize(("slope", "asymmetry"), [(-0.02, 0.0), (0.02, 0.0), (0.0, 0.04)])
-def test_a_walk_begins_in_the_gait_of_its_slope_and_legs(slope, asymmetry):
+def test_a_walk_starts_in_the_periodic_gait_of_its_slope_and_asymmetry(slope, asymmetry):
     periods = Population([TABLE_1], slope, asymmetry).walk(np.zeros((20, 1))).stride_periods
     assert periods == pytest.approx(np.full_like(periods, periods[-1]), abs=1e-8)
 
 
-def test_the_coefficient_of_variation_on_a_slope_is_that_asked_for():
+def test_the_coefficient_of_variation_on_a_slope_is_the_requested_one():
     # Little variation: a transient from the level gait would outweigh it.
     population = Population([TABLE_1] * 8, 0.02)
     noise = noise_for(population, np.full(8, 0.002), 1)
@@ -164,7 +164,7 @@ def test_the_coefficient_of_variation_on_a_slope_is_that_asked_for():
     assert periods.std(axis=0, ddof=1) / periods.mean(axis=0) == pytest.approx(0.002, rel=0.02)
 
 
-def test_a_walker_outlives_a_pulse_under_which_it_would_fall_if_it_lasted():
+def test_a_walker_survives_a_pulse_that_would_make_it_fall_if_it_lasted():
     onset = np.array([0.02, 0.16, -0.01, 0.1, -0.134])
     torque = np.array([-100.0, -75.0, -95.0, -160.0, 60.0])
     population = Population([TABLE_1] * 5)
@@ -172,7 +172,7 @@ def test_a_walker_outlives_a_pulse_under_which_it_would_fall_if_it_lasted():
     trains = PulseTrains(PERIOD / 2 + onset, np.full(5, PERIOD), 1, torque, 0.1)
     walk = population.walk(np.zeros((2, 5)), trains)
     reference = step_to_step(TABLE_1, TABLE_1.speed_after_collision, onset, 0.1, torque)
-    # The last has ended before heel strike, where it would lift the leading leg.
+    # The last pulse ends before heel strike, when it would lift the leading leg.
     assert [walk.endings[index] for index in (0, 1, 2, 4)] == [None] * 4
     duration = np.diff(walk.heel_strikes, axis=0)[1]
     assert duration == pytest.approx(reference.duration, abs=1e-5, nan_ok=True)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The commands that ask about locking: lock, phase-response, existence."""
+"""The commands about locking: lock, phase-response, existence."""
 
 import csv
 import json
@@ -34,7 +34,7 @@ def test_lock_reports_walks_that_slip(capsys):
     assert outcome["walked"] == {"slipping": 4}
 
 
-def test_lock_has_no_number_where_there_is_no_gait(capsys):
+def test_lock_prints_no_number_where_there_is_no_gait(capsys):
     arguments = ["lock", "--torque-fraction", "-2", "--width", "0.2", "--phases", "1"]
     branches = printed(capsys, *arguments)["branches"]
     assert any(branch["first"]["period"] is None for branch in branches)
@@ -55,7 +55,7 @@ def test_phase_response_writes_curve_and_csv(capsys, tmp_path):
 def test_phase_response_reports_pulses_that_the_walker_does_not_survive(capsys):
     assert main(["phase-response", "--torque", "60", "--points", "9"]) == 0
     line = capsys.readouterr().out.splitlines()[2]
-    # Early in double stance they lift the leading leg; 2 points stand for swing at either end.
+    # Early in double stance they lift the leading leg; 2 points at each end are in swing.
     assert line == "falls or flies off at 10 of 31 phases, between 0.4556 and 0.5156"
 
 
@@ -86,7 +86,7 @@ def test_existence_gives_the_range_and_the_map(capsys, tmp_path):
         (["existence", "--foot-length", "-1"], "foot_length: '-1'; allowed: above 0"),
     ],
 )
-def test_a_users_mistake_is_one_line_and_exit_code_2(arguments, message, capsys):
+def test_a_users_mistake_gives_one_line_and_exit_code_2(arguments, message, capsys):
     assert main(arguments) == 2
     error = capsys.readouterr().err
     assert message in error

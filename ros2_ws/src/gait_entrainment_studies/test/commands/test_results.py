@@ -10,7 +10,7 @@ COMMANDS = results.COMMAND.findall(results.TEMPLATE.read_text())
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_of_the_page_is_understood(command):
+def test_every_command_on_the_page_is_understood(command):
     arguments = command.split()
     make_parser(arguments[0]).parse_args([*arguments, "--out", "folder"])
 

@@ -20,7 +20,7 @@ TABLE_1 = WalkerParameters()
 
 
 def walked(parameters):
-    """A step of the walker, sampled: slowest angular velocity, least force, and where."""
+    """Return slowest angular velocity, least force, samples, and the index of the least force."""
     walker = Walker(parameters, Side.RIGHT)
     for side in Side:
         walker.extend_torque(side, [], [], 10**11)
@@ -63,7 +63,7 @@ def test_the_leading_leg_nearly_lifts_off_at_the_upper_end(leg_angle):
     assert samples.double_stance[index] == (found.flies_off_at is Limit.HEEL_STRIKE)
 
 
-def test_map_covers_the_leg_angles_with_a_linkage_and_leaves_the_stiffness_out():
+def test_map_covers_the_leg_angles_with_a_linkage_and_ignores_the_stiffness():
     ranges = existence_map(TABLE_1, 40)
     assert [r.leg_angle for r in ranges] == sorted(r.leg_angle for r in ranges)
     assert ranges == existence_map(replace(TABLE_1, ankle_stiffness=100.0), 40)

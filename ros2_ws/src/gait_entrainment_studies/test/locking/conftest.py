@@ -4,5 +4,5 @@
 import sys
 from pathlib import Path
 
-# Tests are imported by path; what they share lies beside them.
+# Tests are imported by path; the module that they share is next to them.
 sys.path.insert(0, str(Path(__file__).parent))

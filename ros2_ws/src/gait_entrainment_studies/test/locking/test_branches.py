@@ -40,7 +40,7 @@ def test_early_double_stance_locks_between_a_corner_and_a_fold():
     assert early.least_period.border is Border.START_AT_HEEL_STRIKE
     assert early.least_period.onset == pytest.approx(0.0, abs=1e-12)
     assert early.greatest_period.border is Border.FOLD
-    # At a fold the period is greatest: beside it, by a plain scan, it is nowhere longer.
+    # At a fold the period is greatest: a plain scan around it finds none longer.
     scan = GAIT.gaits(Place.INSIDE, np.linspace(early.first.angle, early.last.angle + 0.1, 1001))
     assert scan.period.max() == pytest.approx(early.greatest_period.period, abs=1e-9)
     assert scan.period.max() <= early.greatest_period.period + 1e-14
@@ -67,7 +67,7 @@ def test_the_simulated_experiment_ends_in_the_solved_lock(initial_phase):
     last = run(-0.05, initial_phase, 80)[-1]
     stable = [g for g in locked_gaits(GAIT, GAIT.unperturbed_period - 0.05) if g.stable]
     assert len(stable) == 1
-    # Pulse instants are whole nanoseconds.
+    # Pulse onsets are whole nanoseconds.
     assert last.phase_lag == pytest.approx(stable[0].lag, abs=5e-9)
     assert last.phase == pytest.approx(stable[0].phase, abs=5e-9)
 
@@ -93,7 +93,7 @@ def test_a_pulse_longer_than_double_stance_has_no_branch_inside_it():
     assert places == {Place.EARLY, Place.LATE}
 
 
-def test_dorsiflexion_pulses_lock_to_longer_periods_where_they_are_solved_to():
+def test_dorsiflexion_pulses_lock_to_longer_periods_as_solved():
     gait = PulsedGait(TABLE_1, -0.1 * TABLE_1.peak_torque, 0.1)
     period = gait.unperturbed_period + 0.05
     stable = [lock for lock in locked_gaits(gait, period) if lock.stable]
@@ -101,7 +101,7 @@ def test_dorsiflexion_pulses_lock_to_longer_periods_where_they_are_solved_to():
     _, drawn = shares_of(gait, period, stable, 8)
     assert list(drawn.values()) == [1.0]
     walk = walk_under_pulses(gait, period, 0.3, 200)
-    # To the end of the walk, though its strides are longer than the unperturbed ones.
+    # Pulses last to the end of the walk, though its strides are longer than the unperturbed ones.
     assert walk.lags[-1] == pytest.approx(stable[0].lag, abs=5e-9)
 
 
@@ -120,7 +120,7 @@ def test_beyond_the_flip_every_other_stride_is_alike():
 
 
 @pytest.mark.parametrize("fraction", [0.1, 0.2, -0.1])
-def test_every_border_is_where_the_walkers_poincare_map_has_it(fraction):
+def test_every_border_agrees_with_the_walkers_poincare_map(fraction):
     torque = fraction * TABLE_1.peak_torque
     gait = PulsedGait(TABLE_1, torque, 0.1)
     for piece in pieces_of(gait):
@@ -139,7 +139,7 @@ def test_a_walk_with_a_pulse_or_two_is_not_called_locked():
         assert walk.outcome() in (Outcome.CENSORED, Outcome.SLIPPING)
 
 
-def test_a_pulse_that_acts_nowhere_is_not_a_lock():
+def test_a_pulse_without_effect_is_not_a_lock():
     # At the unperturbed period the branches end in such pulses, whatever the torque.
     for fraction in (0.1, -0.1, 0.3):
         gait = PulsedGait(TABLE_1, fraction * TABLE_1.peak_torque, 0.1)
@@ -147,7 +147,7 @@ def test_a_pulse_that_acts_nowhere_is_not_a_lock():
 
 
 def test_a_flip_close_to_a_corner_is_not_overlooked():
-    # The stable stretch between the two is a hundredth of the branch, or less.
+    # The stable interval between the two is a hundredth of the branch, or less.
     walker = WalkerParameters(
         leg_length=0.8446,
         foot_length=0.0961,

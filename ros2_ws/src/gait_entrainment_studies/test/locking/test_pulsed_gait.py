@@ -14,7 +14,7 @@ TABLE_1 = WalkerParameters()
 
 
 def gaits_of(gait):
-    """Six gaits on each branch, away from the corners."""
+    """Return six gaits on each branch, away from the corners."""
     inner = np.linspace(0.08, 0.92, 6)
     struck, off = gait.heel_strike, gait.toe_off
     return {
@@ -52,7 +52,7 @@ def test_jacobian_is_the_derivative_of_the_walkers_stride(torque, branch):
         return np.array([rate**2 - strike_gain, onset - duration])
 
     def derivative(function, step):
-        # Sixth order; the onsets that it takes are whole nanoseconds.
+        # Sixth order; its onsets are whole nanoseconds.
         weights = {1: 45 / 60, 2: -9 / 60, 3: 1 / 60}
         return sum(
             w * (function(i * step) - function(-i * step)) / step for i, w in weights.items()
@@ -63,7 +63,7 @@ def test_jacobian_is_the_derivative_of_the_walkers_stride(torque, branch):
     assert np.column_stack([by_apex, by_onset]) == pytest.approx(one.jacobian, abs=2e-8)
 
 
-def test_walkers_whose_double_stance_takes_more_nodes_have_their_gaits_too():
+def test_gaits_are_found_if_double_stance_needs_more_nodes():
     # A stance foot a third of the leg: an integrand that 24 nodes do not resolve.
     walker = WalkerParameters(
         leg_length=0.695,
@@ -129,7 +129,7 @@ def test_gaits_of_any_walker_are_walked(leg_angle, push, fraction, width, place,
 
 
 def existence(leg_angle):
-    """Stiffness range with a gait, from the parameters' own refusal at an absurd stiffness."""
+    """Return the stiffness range with a gait, from the error for an absurd stiffness."""
     try:
         WalkerParameters(leg_angle=leg_angle, ankle_stiffness=1e6)
     except ParameterError as error:

@@ -15,7 +15,7 @@ TORQUE, WIDTH = 0.1 * TABLE_1.peak_torque, 0.1
 
 
 def heel_strikes(onset, torque):
-    """Right heel strikes of 12 strides with one pulse on the right leg; number 0 included."""
+    """Return 12 right heel strikes, from number 0 on, with one pulse on the right leg."""
     walker = Walker(TABLE_1, Side.RIGHT)
     walker.extend_torque(Side.LEFT, [], [], 10**11)
     begin = round(onset * 1e9)
@@ -27,7 +27,7 @@ def heel_strikes(onset, torque):
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_the_curve_is_that_of_the_walker_with_and_without_a_pulse(sign):
+def test_the_curve_matches_walks_with_and_without_a_pulse(sign):
     response = phase_response(PulsedGait(TABLE_1, sign * TORQUE, WIDTH), 9)
     period = response.stride_period
     plain = heel_strikes(1.0, 0.0)
@@ -35,7 +35,7 @@ def test_the_curve_is_that_of_the_walker_with_and_without_a_pulse(sign):
     for i in range(response.phase.size):
         if not 0 < response.phase[i] < 1:
             continue
-        # In the second stride after heel strike 0, so that an early onset has room.
+        # In the second stride after heel strike 0, to leave room for an early onset.
         pulsed = heel_strikes(period * (1 + response.phase[i]), sign * TORQUE)
         # Onsets are whole nanoseconds.
         assert plain[-1] - pulsed[-1] == pytest.approx(response.shift[i], abs=3e-9)
@@ -50,11 +50,11 @@ def test_a_pulse_in_swing_or_on_the_leading_leg_does_nothing():
     assert (response.shift[~outside] > 0).all()
 
 
-def test_prediction_is_good_to_what_a_pulse_leaves_for_the_next_stride():
+def test_prediction_error_is_what_a_pulse_carries_over_to_the_next_stride():
     small, large = (
         predictions(PulsedGait(TABLE_1, fraction * TORQUE, WIDTH), np.array([fraction * -0.05]))[0]
         for fraction in (0.2, 1.0)
     )
     assert abs(large.lag_error) < 1e-3
-    # The neglected part is a product of two responses: it falls faster than the response.
+    # The neglected term is a product of two responses, so it shrinks faster than the response.
     assert abs(small.lag_error) < 0.25 * abs(large.lag_error)

@@ -3,5 +3,5 @@
 
 from importlib.util import find_spec
 
-# A sweep is kept as Parquet: pip install pyarrow.
+# Sweeps are stored as Parquet, which needs pyarrow: pip install pyarrow.
 collect_ignore = [] if find_spec("pyarrow") else ["test_sweep.py"]

@@ -47,7 +47,7 @@ def same(left, right):
         np.testing.assert_array_equal(left[name], right[name])
 
 
-def test_a_cell_is_what_its_walks_are():
+def test_a_cell_summarizes_its_walks():
     row = sweep_row(plan_of(), 1)
     period = 1.9332295304390836 - 0.05
     gait = PulsedGait(TABLE_1, row["torque"][2], 0.1)
@@ -59,15 +59,15 @@ def test_a_cell_is_what_its_walks_are():
     assert row["median_lag"][2] == pytest.approx(-0.056994, abs=1e-6)
 
 
-def test_solved_and_walked_maps_agree_where_walking_can_tell():
+def test_solved_and_walked_maps_agree_where_no_walk_is_censored():
     plan = plan_of(period_offsets=Axis(-0.085, 0.035, 9), strides=300)
-    told = 0
+    compared = 0
     for index in range(3):
         row = sweep_row(plan, index)
         for i in np.flatnonzero(row["share_censored"] == 0):
             assert (row["stable_locks"][i] > 0) == (row["share_locked"][i] > 0)
-            told += 1
-    assert told > 20
+            compared += 1
+    assert compared > 20
 
 
 def test_cells_outside_the_models_domain_are_reported_one_by_one():
@@ -81,20 +81,20 @@ def test_cells_outside_the_models_domain_are_reported_one_by_one():
     assert fast["share_flew_off"][1:].max() > 0
 
 
-def test_the_unperturbed_period_itself_is_not_asked():
+def test_the_unperturbed_period_itself_is_reported_as_a_problem():
     row = sweep_row(plan_of(period_offsets=Axis(-0.05, 0.05, 3)), 0)
     assert row["problem"][1].startswith("the stride period itself")
 
 
-def test_borders_at_zero_torque_are_none_and_grow_with_it():
+def test_borders_are_missing_at_zero_torque_and_grow_with_torque():
     borders = exact_borders(TABLE_1, np.array([0.0, 0.1, 0.2]), 0.1)
-    late = [one for one in borders if one.place == "pulse outlasts double stance"]
-    assert [one.torque_fraction for one in late] == [0.1, 0.2]
+    late = [b for b in borders if b.place == "pulse outlasts double stance"]
+    assert [border.torque_fraction for border in late] == [0.1, 0.2]
     assert late[0].shortest == pytest.approx(-0.0793496, abs=1e-7)
     assert late[1].shortest < late[0].shortest
 
 
-def test_processes_make_the_same_rows_as_one():
+def test_two_processes_compute_the_same_rows_as_one():
     plan = plan_of()
     alone = dict(by_processes(partial(sweep_row, plan), range(3), 1))
     together = dict(by_processes(partial(sweep_row, plan), range(3), 2))
@@ -102,7 +102,7 @@ def test_processes_make_the_same_rows_as_one():
         same(alone[index], together[index])
 
 
-def test_a_killed_process_is_named():
+def test_a_killed_process_is_reported():
     plan = plan_of(torque_fractions=Axis(0.05, 0.15, 60))
     rows = by_processes(partial(sweep_row, plan), range(60), 2)
     next(rows)
@@ -112,7 +112,7 @@ def test_a_killed_process_is_named():
         list(rows)
 
 
-def test_dask_makes_the_same_rows_on_a_cluster_of_two_workers():
+def test_dask_computes_the_same_rows_on_a_cluster_of_two_workers():
     distributed = pytest.importorskip("distributed")
     plan = plan_of()
     with distributed.LocalCluster(
@@ -126,7 +126,7 @@ def test_dask_makes_the_same_rows_on_a_cluster_of_two_workers():
         same(made[index], sweep_row(plan, index))
 
 
-def test_rows_that_a_cluster_cannot_make_are_named():
+def test_rows_that_a_cluster_cannot_compute_are_reported():
     distributed = pytest.importorskip("distributed")
     plan = plan_of(torque_fractions=Axis(0.05, 0.15, 60), strides=400)
     with distributed.LocalCluster(
@@ -159,7 +159,7 @@ def test_a_scheduler_that_does_not_answer_is_named(service, tmp_path, capsys, mo
 def test_a_sweep_is_resumed_only_with_its_own_plan(tmp_path):
     plan = plan_of()
     store = SweepStore(tmp_path, plan)
-    SweepStore(tmp_path, plan_of(strides=98))  # nothing was made with the first plan
+    SweepStore(tmp_path, plan_of(strides=98))  # no row was computed with the first plan
     store = SweepStore(tmp_path, plan)
     store.add(1, sweep_row(plan, 1))
     assert SweepStore(tmp_path, plan).missing() == [0, 2]
@@ -168,7 +168,7 @@ def test_a_sweep_is_resumed_only_with_its_own_plan(tmp_path):
 
 
 @pytest.mark.parametrize("size", [0, 100])
-def test_a_damaged_row_is_made_again(size, tmp_path):
+def test_a_damaged_row_is_computed_again(size, tmp_path):
     plan = plan_of()
     store = SweepStore(tmp_path, plan)
     for index in range(3):
@@ -192,7 +192,7 @@ def test_the_table_carries_plan_and_versions(tmp_path):
 OPTIONS = ["--torque-fractions", "0.02", "0.2", "12", "--period-offsets", "-0.1", "0.01", "12"]
 
 
-def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path, capsys):
+def test_an_interrupted_sweep_continues_where_it_stopped(tmp_path, capsys):
     out = tmp_path / "sweep"
     command = [
         sys.executable,
@@ -204,11 +204,11 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path, capsys):
         command,
         stderr=subprocess.PIPE,
         env=dict(os.environ),
-        # A shell's background job, such as this test's own process, ignores the interrupt.
+        # A shell starts its background jobs, perhaps this test, with the interrupt ignored.
         preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
     )
     parts = out / "parts"
-    # Until the first parts are there; a sweep that makes none ends by itself and fails below.
+    # Until the first parts are there; a sweep that writes none ends by itself and fails below.
     while process.poll() is None and not (parts.exists() and len(list(parts.iterdir())) > 2):
         time.sleep(0.01)
     process.send_signal(signal.SIGINT)
@@ -237,6 +237,6 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path, capsys):
         (["--ankle-stiffness", "200"], "the walker flies off"),
     ],
 )
-def test_wrong_usage_is_one_line(arguments, message, tmp_path, capsys):
+def test_wrong_usage_is_reported(arguments, message, tmp_path, capsys):
     assert main(["sweep", "--out", str(tmp_path / "s"), *arguments]) == 2
     assert message in capsys.readouterr().err
