@@ -89,7 +89,7 @@ def test_forces_balance_foot_and_mass(psi, torque):
     direction = ((mass[0] - toe[0]) / reach, (mass[1] - toe[1]) / reach)
     lever = (toe[0] - ankle[0]) * direction[1] - (toe[1] - ankle[1]) * direction[0]
     assert force * lever == pytest.approx(torque, rel=1e-9, abs=1e-12)
-    # The part of F_A along the leading leg is what that leg need not carry.
+    # The part of F_A along the leading leg is the force that this leg need not carry.
     along = (direction[0] * mass[0] + direction[1] * mass[1]) / L
     arm = geometry.unloading_arm(BODY, math.sin(psi), sine(psi))
     assert arm * torque == pytest.approx(force * along, rel=1e-9, abs=1e-12)

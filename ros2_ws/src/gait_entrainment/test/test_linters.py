@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-The ament linters, as `colcon test` expects them; those that are not installed are skipped.
+The ament linters, as `colcon test` expects them; any that is not installed is skipped.
 
 `ruff` decides on style (`make lint`): rules that its formatter breaks are switched off here.
 ament_copyright is not run: it does not know the SPDX lines with which each file begins.
@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).parents[1]
-# Of pycodestyle and pyflakes alone: a full install adds plugins that ask for single quotes.
+# Only pycodestyle and pyflakes: a full install adds plugins that demand single quotes.
 FLAKE8 = (
     "[flake8]\nselect = E,F,W\nignore = E203,E501,E704,W503\nper-file-ignores = __init__.py:F401\n"
 )

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The paper's numbers, and what makes parameters impossible."""
+"""The paper's numbers, and impossible parameters."""
 
 import math
 from dataclasses import fields
@@ -52,10 +52,10 @@ def test_energy_at_the_barrier_and_force_vanish_at_the_limits():
     assert strong.least_leading_force == pytest.approx(0, abs=1e-8)
 
 
-def test_message_says_by_how_much_the_walker_falls():
+def test_message_gives_the_energy_that_a_falling_walker_lacks():
     with pytest.raises(ParameterError) as refused:
         WalkerParameters(ankle_stiffness=60)
-    # Below k_C each N m/rad lacks angle^2 / 2 of work, over the share that a collision takes.
+    # Each N m/rad below k_C costs angle^2 / 2 of work, divided by the share a collision takes.
     angle = math.pi / 6 + 2.576 - math.pi / 2
     missing = (67.4792 - 60) * angle**2 / 2 / 0.75
     assert f"because it lacks {missing:.3g} J" in str(refused.value)
@@ -63,7 +63,7 @@ def test_message_says_by_how_much_the_walker_falls():
     assert "\n" not in str(refused.value)
 
 
-def test_message_says_by_how_much_the_walker_flies_off():
+def test_message_gives_the_force_missing_when_the_walker_flies_off():
     with pytest.raises(ParameterError, match=r"would have to pull with [\d.]+ N; allowed"):
         WalkerParameters(ankle_stiffness=120)
 
@@ -75,7 +75,7 @@ def test_late_toe_off_counts_the_apex_in_double_stance():
     at_apex = 2 * p.mass * p.gravity * p.leg_length * (1 - math.cos(p.leg_angle))
     angle = p.leg_angle + p.max_plantarflexion - math.pi / 2
     eq_9 = at_apex * (1 - p.floquet_multiplier) / angle**2
-    # The spring has not done all of its work at the apex: more stiffness is needed than by Eq. 9.
+    # The spring has not done all of its work at the apex, so Eq. 9 gives too little stiffness.
     assert p.just_vault_over_stiffness > eq_9 * 1.2
 
 
@@ -100,7 +100,7 @@ def test_each_field_must_be_a_positive_number(name, value):
         ({"leg_angle": 0.7, "max_plantarflexion": 1.2}, "leg_angle"),
     ],
 )
-def test_impossible_walkers_are_refused_by_the_field_to_change(changed, name):
+def test_refusals_of_impossible_walkers_name_the_field_to_change(changed, name):
     with pytest.raises(ParameterError, match=f"^{name}: ") as refused:
         WalkerParameters(**changed)
     assert "\n" not in str(refused.value)
@@ -114,7 +114,7 @@ def test_impossible_walkers_are_refused_by_the_field_to_change(changed, name):
         {"gravity": 1e200, "mass": 1e200, "leg_length": 1e50, "foot_length": 1e49},
     ],
 )
-def test_values_beyond_floating_point_are_refused_too(changed):
+def test_values_beyond_floating_point_are_refused(changed):
     with pytest.raises(ParameterError):
         WalkerParameters(**changed)
 
@@ -136,7 +136,7 @@ def test_scaling_lengths_masses_and_gravity_scales_the_limits(scale, weight, pul
         assert getattr(other, limit) == pytest.approx(getattr(p, limit) * stiffness, rel=1e-9)
 
 
-def test_every_field_says_what_it_means():
-    for told in settings_of(WalkerParameters).values():
-        assert told.meaning
-        assert told.unit
+def test_every_field_has_a_meaning_and_a_unit():
+    for setting in settings_of(WalkerParameters).values():
+        assert setting.meaning
+        assert setting.unit

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the package offers at its top level, loaded only when it is asked for."""
+"""The package's top-level names, which are loaded only when used."""
 
 import subprocess
 import sys
@@ -17,7 +17,7 @@ def test_the_default_experiment_in_two_lines():
     assert [stride.number for stride in strides[:4]] == [1, 2, 3, 4]
 
 
-def test_nothing_is_loaded_before_it_is_asked_for():
+def test_nothing_is_loaded_before_it_is_used():
     code = (
         "import gait_entrainment, sys; gait_entrainment.WalkerParameters;"
         "print(sorted({'numba', 'numpy', 'yaml'} & set(sys.modules)))"
@@ -26,6 +26,6 @@ def test_nothing_is_loaded_before_it_is_asked_for():
     assert done.stdout.strip() == "[]"
 
 
-def test_a_name_that_is_not_there():
+def test_an_unknown_name_is_refused():
     with pytest.raises(AttributeError, match="has no attribute walk"):
         gait_entrainment.walk  # noqa: B018

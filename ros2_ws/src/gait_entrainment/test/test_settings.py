@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What can be set: what is taken, and what the answer to a mistake says."""
+"""Settings: which values are accepted, and the messages about mistakes."""
 
 import math
 from dataclasses import dataclass
@@ -58,14 +58,14 @@ def test_settings_are_the_fields_that_can_be_set():
         ({"armed": 1}, "armed: 1; allowed: true, false"),
     ],
 )
-def test_a_mistake_is_told_in_one_line(values, message):
+def test_a_mistake_is_reported_in_one_line(values, message):
     with pytest.raises(SettingError) as refused:
         Example(**values)
     assert str(refused.value) == message
     assert refused.value.exit_code == 2
 
 
-def test_numbers_become_numbers_of_their_kind():
+def test_numbers_are_converted_to_the_type_of_the_setting():
     example = Example(width=1, torque=np.float64(2.5))
     assert (type(example.width), type(example.torque)) == (float, float)
     assert example.phase == 0.0
@@ -81,7 +81,7 @@ def test_numbers_become_numbers_of_their_kind():
         ("name", "1", "1"),
     ],
 )
-def test_texts_are_read(name, text, value):
+def test_text_is_parsed(name, text, value):
     assert settings_of(Example)[name].parse(name, text) == value
 
 
@@ -95,14 +95,14 @@ def test_texts_are_read(name, text, value):
         ("armed", "1", "true, false"),
     ],
 )
-def test_texts_that_stand_for_nothing_allowed(name, text, allowed):
+def test_text_that_is_not_an_allowed_value_is_refused(name, text, allowed):
     with pytest.raises(SettingError) as refused:
         settings_of(Example)[name].parse(name, text)
     assert str(refused.value) == f"{name}: {text!r}; allowed: {allowed}"
 
 
 def test_a_setting_without_bounds_allows_every_finite_number():
-    told = Setting("torque", unit="N m")
-    assert told.check("torque", -1e9) == -1e9
+    torque = Setting("torque", unit="N m")
+    assert torque.check("torque", -1e9) == -1e9
     with pytest.raises(SettingError, match="any finite number N m"):
-        told.check("torque", math.inf)
+        torque.check("torque", math.inf)

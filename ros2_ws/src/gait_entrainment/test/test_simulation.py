@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The experiment in one process: the paper's example entrains, and its mirror image likewise."""
+"""The experiment in one process: the paper's example entrains, and so does its mirror image."""
 
 import pytest
 from hypothesis import given, settings
@@ -29,7 +29,7 @@ def test_the_papers_example_entrains_at_the_end_of_double_stance(default):
     strides = [s for s in default.analysis.strides if s.number <= 80]
     assert len(strides) == 80
     assert default.pulse_period == default.measured_period - 0.05
-    # Locked: the stride takes as long as the pulses' period, to the nanosecond's rounding.
+    # Locked: the stride period equals the pulse period, up to rounding to nanoseconds.
     locked = [s.period for s in strides if 55 <= s.number <= 64]
     assert locked == pytest.approx([default.pulse_period] * len(locked), abs=2e-9)
     # The pulse meets toe-off: it begins before, and would end after it.
@@ -40,13 +40,13 @@ def test_the_papers_example_entrains_at_the_end_of_double_stance(default):
 
 
 @pytest.mark.parametrize("irregular", [{"jitter": 0.8}, {"sweep": -0.9}])
-def test_pulses_that_are_planned_irregularly_are_one_train_without_holes(irregular):
+def test_pulses_planned_irregularly_are_one_train_without_holes(irregular):
     plan = PulsePlan(count=40, period_offset=0.0, **irregular)
     run = simulate(Protocol(pulses=plan))
     assert [pulse.number for pulse in run.analysis.pulses] == list(range(1, 41))
-    assert {one.stretch for one in run.analysis.entrainments} == {1}
+    assert {e.stretch for e in run.analysis.entrainments} == {1}
     assert run.analysis.holes == ()
-    alone = analyze(run.events, run.onsets, Side.RIGHT)  # nobody knows the plan
+    alone = analyze(run.events, run.onsets, Side.RIGHT)  # without the plan
     assert alone.entrainments[-1].stretch > 1
 
 
@@ -81,7 +81,7 @@ def test_events_alternate_and_are_numbered(default):
     offset=st.floats(-0.07, -0.02),
     part=st.integers(1, 10),
 )
-def test_the_same_as_one_walk_over_the_whole_torque(phase, offset, part):
+def test_a_run_equals_one_uncut_walk_under_the_same_torque(phase, offset, part):
     """Cutting into grants and requests changes nothing: one uncut walk gives the same stamps."""
     import numpy as np
 
@@ -109,7 +109,7 @@ def test_the_same_as_one_walk_over_the_whole_torque(phase, offset, part):
     ]
 
 
-def test_a_torque_beyond_the_device_is_refused_before_anything_moves():
+def test_torque_beyond_the_limits_is_refused_before_anything_moves():
     with pytest.raises(LimitError, match=r"torque: 45 N m.*-30 to 30"):
         simulate(Protocol(pulses=PulsePlan(torque=45.0, torque_fraction=None)))
 
@@ -129,7 +129,7 @@ def test_a_walk_that_ends_by_itself_is_reported():
     assert len(simulation.analysis.strides) < protocol.strides
 
 
-def test_the_same_seed_walks_the_same_and_another_does_not():
+def test_the_same_seed_gives_the_same_walk_and_another_does_not():
     runs = [
         simulate(Protocol(driver="emulated", seed=seed, pulses=PulsePlan(count=30)))
         for seed in (7, 7, 8)
@@ -138,7 +138,7 @@ def test_the_same_seed_walks_the_same_and_another_does_not():
     assert runs[0].events != runs[2].events
 
 
-def test_a_device_of_the_real_world_cannot_be_simulated():
+def test_a_real_device_cannot_be_simulated():
     with pytest.raises(LimitError, match="real time only"):
         simulate(Protocol(driver="ak_mit_can"))
 

@@ -19,12 +19,12 @@ from gait_entrainment.experiment import Conductor, GaitError, Part
 from gait_entrainment.gait import GaitEvent, GaitLimits
 from gait_entrainment.protocol import Block, Protocol, ProtocolError, PulsePlan
 
-# These gaits are to be any that a mathematician can think of.
+# For gaits of any kind, however implausible.
 ANY_GAIT = GaitLimits(
     stride_least=1e-6, stride_most=1e6, stride_change=1.0, silence=10.0, baseline_spread=1.0
 )
 
-# A person's, who does not walk evenly.
+# For a person who does not walk evenly.
 UNSTEADY = GaitLimits(baseline_spread=1.0)
 
 
@@ -58,7 +58,7 @@ def conduct(conductor, events):
             conductor.add_event(rest.pop(0))
         while train := conductor.due(reached):
             trains.append(train)
-            assert train.onsets[0] >= reached, "an onset inside what was promised"
+            assert train.onsets[0] >= reached, "an onset within what was promised"
 
 
 @settings(derandomize=True, deadline=None, max_examples=150)
@@ -80,7 +80,7 @@ def test_no_promise_covers_an_onset_that_is_not_planned(baseline, periods, phase
     train = conductor.block.train
     assert conductor.block.measured_period == pytest.approx(measured, abs=2e-9)
     # The definition, from the strike that starts the last baseline stride, in exact arithmetic:
-    # later by a nanosecond at most, and a rounding error.
+    # at most a nanosecond late, plus a rounding error.
     mean = Fraction(strikes[baseline - 1] - strikes[0], baseline - 1)
     late = train.onsets[0] - strikes[baseline - 1] - (1 + Fraction(phase)) * mean
     assert 0 < late < 1.01
@@ -92,7 +92,7 @@ def test_no_promise_covers_an_onset_that_is_not_planned(baseline, periods, phase
     periods=st.lists(st.floats(1.0, 1.4), min_size=9, max_size=9),
     longest=st.sampled_from([0.05, 0.21, 0.7]),
 )
-def test_the_end_lies_behind_everything_promised_and_behind_the_last_stride(periods, longest):
+def test_the_end_comes_after_every_promise_and_after_the_last_stride(periods, longest):
     protocol = Protocol(baseline=2, washout=2, pulses=PulsePlan(count=3))
     conductor = Conductor(protocol, longest, ANY_GAIT)
     events = walk(periods)
@@ -129,7 +129,7 @@ def test_an_absolute_period_needs_no_measurement():
     assert conductor.block.pulse_period == 1.5
 
 
-def test_phases_follow_the_plan():
+def test_parts_follow_the_plan():
     protocol = Protocol(baseline=2, washout=1, pulses=PulsePlan(count=2))
     conductor = Conductor(protocol)
     events = walk([1.2] * 6)
@@ -147,10 +147,10 @@ def test_phases_follow_the_plan():
     assert conductor.part(train.end) is Part.FINISHED
 
 
-def test_a_baseline_without_a_complete_stride_says_so():
+def test_a_baseline_without_a_complete_stride_is_reported():
     conductor = Conductor(Protocol(baseline=2, pulses=PulsePlan(count=2)))
     events = walk([1.2] * 4)
-    # The strikes of stride 2 and 3 are missing: the baseline is over before a stride was closed.
+    # The strikes of stride 2 and 3 are missing: the baseline is over before any stride ends.
     conductor.add_event(events[0])
     third = [e for e in events if e.kind is EventKind.HEEL_STRIKE and e.step == 6]
     with pytest.raises(ProtocolError, match="no complete stride"):
@@ -182,13 +182,13 @@ def test_a_pulse_by_phase_lies_where_the_mean_of_five_strides_predicts(
     assert horizons[-1].last
     strikes = strikes_of(events)
     walked = [(b - a) / 1e9 for a, b in itertools.pairwise(strikes)]
-    # One that comes too soon after its own strike is planned at the strike before.
+    # A pulse too soon after its own strike is planned at the strike before.
     early = phase < 0.05
     expected = [
         strikes[n] + round((early + phase) * statistics.fmean(walked[max(n - 5, 0) : n]) * 1e9)
         for n in range(baseline - early, baseline - early + 6)
     ]
-    # Two may be requested at once.
+    # Two may be requested together.
     assert [onset for train in trains for onset in train.onsets] == expected
     assert conductor.block.train.onsets == tuple(expected)
     assert conductor.block.end == strikes[baseline + 6 + 1]
@@ -215,7 +215,7 @@ def test_blocks_follow_each_other_each_with_its_own_baseline(periods, longest):
     strikes = strikes_of(events)
     first, second, third = conductor.blocks
     assert (first.start, second.end) == (0, third.start)
-    # The first ends with its strides, or with its pulses if these take longer.
+    # The first block ends with its strides, or with its pulses if these take longer.
     assert first.end == max(strikes[9], next(s for s in strikes if s >= first.train.end))
     assert second.start == next(s for s in strikes if s >= first.end + 5 * 10**9)
     for block in conductor.blocks:
@@ -228,7 +228,7 @@ def test_blocks_follow_each_other_each_with_its_own_baseline(periods, longest):
     assert strikes.index(third.end) - strikes.index(third.start) == 5
 
 
-def test_a_rest_may_be_stood_through():
+def test_a_person_may_stand_still_during_a_rest():
     conductor = Conductor(Protocol(blocks=BLOCKS))
     for event in walk([1.2] * 10):
         conductor.add_event(event)
@@ -236,7 +236,7 @@ def test_a_rest_may_be_stood_through():
     assert not conductor.horizon(60 * 10**9).last, "silence for longer than any stride"
 
 
-def test_a_baseline_goes_on_until_its_time_and_until_the_gait_is_steady():
+def test_a_baseline_lasts_until_its_time_is_over_and_the_gait_is_steady():
     strides = [1.2, 1.3] * 8 + [1.25] * 14
     strikes = strikes_of(walk(strides))
     for more, first in (
@@ -276,7 +276,7 @@ def test_many_pulses_are_requested_in_parts_each_before_a_promise_reaches_it(
     requested = [onset for train in trains for onset in train.onsets]
     assert list(block.train.onsets) == requested == onsets[: len(requested)]
     assert {len(train.pulses) for train in trains} <= {part, 40 % part or part}
-    # All that is promised is requested, and what is far off is not yet.
+    # All promised pulses are requested; those far ahead are not yet.
     promised = sum(onset < horizons[-1].until for onset in onsets)
     assert promised <= len(requested) <= promised + 2 * part
     assert block.pulses_end == onsets[-1] + 10**8

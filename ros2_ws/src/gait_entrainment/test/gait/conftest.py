@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Lets these tests import the synthetic gait beside them, which is also a command by itself."""
+"""Lets these tests import the modules next to them, of which monte_carlo.py is also a command."""
 
 import sys
 from pathlib import Path

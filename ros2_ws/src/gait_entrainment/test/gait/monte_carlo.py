@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Monte Carlo of the entrainment verdict on noisy walkers that are known to lock, or not to.
+Monte Carlo of the entrainment verdict on noisy walkers that are known to lock or not to lock.
 
 Prints the tables of docs/analysis.md: python monte_carlo.py [TRIALS]
 """
@@ -61,7 +61,7 @@ class Outcome:
     trials: int = 0
     ever_entrained: int = 0  # trials in which any stride was called entrained
     final: Counter[Verdict] = field(default_factory=Counter)  # verdicts at the last pulse
-    slipped: Counter[Verdict] = field(default_factory=Counter)  # of those that slipped, in truth
+    slipped: Counter[Verdict] = field(default_factory=Counter)  # of walkers that really slipped
     since: list[int] = field(default_factory=list)  # entrained_since_stride, if at the last pulse
 
     def __str__(self) -> str:
@@ -74,11 +74,11 @@ class Outcome:
 
     @property
     def followed(self) -> Counter[Verdict]:
-        """Verdicts at the last pulse of the walkers that answered one pulse a stride, in truth."""
+        """Verdicts at the last pulse of the walkers that really answered one pulse per stride."""
         return self.final - self.slipped
 
     def in_truth(self) -> str:
-        """Return how many slipped, and how many of the others and of them are called entrained."""
+        """Return how many slipped, and how many of the rest and of these are called entrained."""
         cells = [rate(self.slipped.total(), self.trials)]
         for verdicts in (self.followed, self.slipped):
             total, entrained = verdicts.total(), verdicts[Verdict.ENTRAINED]
@@ -110,7 +110,7 @@ def run(case: Case, trials: int, seed: int = 2012) -> Outcome:
 def run_recorded(
     response: Response, least: float = 0.0, below: float = 1.0, seed: int = 2012
 ) -> Outcome:
-    """Let a walker respond on each recorded stretch with a CV of at least ``least``, ``below``."""
+    """Let a walker respond on each recorded stretch with a CV from ``least`` to ``below``."""
     strides = recorded_strides()
     rngs = np.random.default_rng(seed).spawn(len(strides))
     return outcome_of(
@@ -136,7 +136,7 @@ def outcome_of(walks: Iterable[Walk]) -> Outcome:
 
 
 def coverage(rng: np.random.Generator, trials: int) -> float:
-    """Return how often the interval over 20 strides holds an indifferent walker's drift."""
+    """Return how often the interval over 20 strides contains an indifferent walker's drift."""
     covered, numbers = 0, list(range(20))
     for _ in range(trials):
         lags = np.cumsum(0.02 + 0.04 * rng.standard_normal(20)).tolist()
@@ -146,7 +146,7 @@ def coverage(rng: np.random.Generator, trials: int) -> float:
 
 
 def outcomes(trials: int) -> Iterator[tuple[str, Outcome]]:
-    """Yield the rows of the tables: who walks, with which noise, and what came of it."""
+    """Yield the rows of the tables: the walker with its noise, and the outcome."""
     for response in (ignores, follows_partly, slips, locks, locks_within_80_ms):
         for variation in (0.03, 0.02, 0.01):
             for noise in NOISES:

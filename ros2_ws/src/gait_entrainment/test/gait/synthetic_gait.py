@@ -84,10 +84,10 @@ def long_range(rng: np.random.Generator, n: int) -> Floats:
 
 def recorded_strides(strides: int = 80) -> list[Floats]:
     """
-    Return stretches of stride periods [s] that people walked, from PhysioNet's gait-maturation-db.
+    Return stretches of people's stride periods [s] from PhysioNet's gait-maturation-db.
 
-    Without a stop or a missed step: every stride is within a quarter of its stretch's median. The
-    database is looked for in shared/data beside the repository; returns none if it is not there.
+    None has a stop or a missed step: every stride is within a quarter of its stretch's median. The
+    database is searched for in shared/data next to the repository; without it, none are returned.
     """
     folders = (parent / "shared" / "data" / "gait_maturation" for parent in Path(__file__).parents)
     folder = next((folder for folder in folders if folder.is_dir()), None)
@@ -192,7 +192,7 @@ def ignores(_lag: float) -> float:
 
 
 def locks(lag: float) -> float:
-    """Walker that makes good half of its lag in each stride, without a limit: it locks."""
+    """Walker that makes up half of its lag in each stride, without a limit: it locks."""
     return 0.5 * (lag + 0.1)
 
 
@@ -202,7 +202,7 @@ def locks_within_80_ms(lag: float) -> float:
 
 
 def follows_partly(_lag: float) -> float:
-    """Walker that takes over half of the offset whatever the lag: it drifts slowly."""
+    """Walker that adopts half of the offset whatever the lag: it drifts slowly."""
     return 0.5 * OFFSET
 
 

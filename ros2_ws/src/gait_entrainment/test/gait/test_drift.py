@@ -29,7 +29,7 @@ def test_slope_is_that_of_ordinary_least_squares(noise: list[float], slope: floa
     assert math.isclose(found.slope, scipy.stats.linregress(x, y).slope, abs_tol=1e-9)
 
 
-def test_interval_holds_the_drift_of_an_indifferent_walker() -> None:
+def test_interval_contains_the_drift_of_an_indifferent_walker() -> None:
     assert 0.93 < coverage(np.random.default_rng(1), 4000) < 0.97
 
 
@@ -51,11 +51,11 @@ def test_scatter_is_that_of_the_strides_whatever_the_drift() -> None:
 
 def test_scatter_does_not_look_across_a_missing_pulse() -> None:
     lags = [0.0, 0.1, 0.0, 0.1, 5.0, 5.1, 5.0, 5.1]
-    whole = drift_of(list(range(8)), [1, 2, 3, 4, 9, 10, 11, 12], lags)
-    assert math.isclose(whole.scatter, math.sqrt(math.pi) / 2 * 0.2)
+    found = drift_of(list(range(8)), [1, 2, 3, 4, 9, 10, 11, 12], lags)
+    assert math.isclose(found.scatter, math.sqrt(math.pi) / 2 * 0.2)
 
 
-def test_what_comes_to_rest_does_not_creep() -> None:
+def test_a_lag_that_comes_to_rest_does_not_creep() -> None:
     assert not drift([0.5**k for k in range(20)]).creeps
     assert drift([1.1**k for k in range(20)]).creeps
     assert not drift([0.0] * 20).creeps

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The analyzer: when results come out, and that nothing but events and onsets decides them."""
+"""The analyzer: when it gives results, and that only events and onsets determine them."""
 
 import dataclasses
 import itertools
@@ -31,7 +31,7 @@ STRIDE = 2 * SECOND  # toe-off at 1.36 s
 FOREVER = 10**6 * SECOND
 
 
-def strides_numbers(results: list[Result]) -> list[int]:
+def stride_numbers(results: list[Result]) -> list[int]:
     return [r.number for r in results if isinstance(r, Stride)]
 
 
@@ -47,19 +47,19 @@ def test_none_one_and_two_pulses_in_a_stride() -> None:
         (2, 3, 0.5),
         (3, 5, 0.25),
     ]
-    # Nearest toe-offs at 3.36, 5.36 and, a tie would be at 8.36, 9.36.
+    # Nearest toe-offs at 3.36, 5.36 and 9.36; a tie would be at 8.36.
     assert [p.toe_off for p in analysis.pulses] == [3_360_000_000, 5_360_000_000, 9_360_000_000]
     assert [p.phase_lag for p in analysis.pulses] == [0.64, -0.36, -0.86]
-    assert [e.stride for e in analysis.entrainments] == [3, 5]  # asked where there are pulses
+    assert [e.stride for e in analysis.entrainments] == [3, 5]  # only strides with pulses
     assert analysis.pulse_counts.placed == 3
 
 
-def test_strides_come_out_at_once_and_pulses_once_promised() -> None:
+def test_strides_are_given_immediately_and_pulses_once_promised() -> None:
     events = regular_walk([STRIDE] * 3)
     analyzer = GaitAnalyzer(Side.RIGHT)
     assert analyzer.add_promise([3 * SECOND], 3 * SECOND) == []
     results = [result for event in events[:9] for result in analyzer.add_event(event)]
-    assert strides_numbers(results) == [1, 2]
+    assert stride_numbers(results) == [1, 2]
     assert pulses_of(results) == []  # another pulse might still come in stride 2
     assert analyzer.add_promise([], 4 * SECOND - 1) == []
     pulse, entrainment = analyzer.add_promise([], 4 * SECOND)
@@ -123,7 +123,7 @@ def test_stop_withdraws_announced_pulses_and_the_promise() -> None:
     assert [p.onset for p in pulses_of(later)] == [7 * SECOND]
 
 
-def test_finish_resolves_what_waits_and_counts_what_follows() -> None:
+def test_finish_resolves_waiting_pulses_and_counts_later_ones() -> None:
     analyzer = GaitAnalyzer(Side.RIGHT)
     analyzer.add_promise([3 * SECOND, 3_900_000_000, 4_500_000_000], 3 * SECOND)
     for event in regular_walk([STRIDE] * 2):
@@ -136,7 +136,7 @@ def test_finish_resolves_what_waits_and_counts_what_follows() -> None:
 
 
 def disturb(events: list[GaitEvent], data: st.DataObject) -> list[GaitEvent]:
-    """Lose, double and displace events."""
+    """Drop, duplicate and displace events."""
     disturbed: list[GaitEvent] = []
     for event in events:
         copies = data.draw(st.sampled_from([1] * 8 + [0, 2]))
@@ -154,7 +154,7 @@ def test_interleaving_of_events_and_promises_does_not_matter(data, response, see
     events = disturb(events, data)
     rule = VerdictSettings(window=5, successive=2)
     expected = analyze(events, onsets, Side.RIGHT, rule)
-    # Cut the onsets into adjoining promises, and deal them among the events at will.
+    # Cut the onsets into adjoining promises, and insert these anywhere among the events.
     end = onsets[-1] + 20 * SECOND
     cuts = sorted(data.draw(st.lists(st.integers(0, end), max_size=12)))
     edges = [-1, *cuts, end]
@@ -171,7 +171,7 @@ def test_interleaving_of_events_and_promises_does_not_matter(data, response, see
         if i < len(events):
             results += analyzer.add_event(events[i])
     results += analyzer.finish()
-    # As text: the missing figures are NaN, which equals nothing.
+    # Compared as text, because missing figures are NaN, which equals nothing.
     for kind, wanted in (
         (Stride, expected.strides),
         (PulsePhase, expected.pulses),
@@ -211,7 +211,7 @@ def test_only_differences_of_stamps_count(shift: int, seed: int) -> None:
 
 
 def test_unperturbed_period_is_exact_in_nanoseconds() -> None:
-    # 1,000,000,007 and neighbours: mean and standard error of 3 integers, exactly representable.
+    # The mean of these three is an integer, and their standard error is sqrt(3) ns.
     periods = [1_999_999_998, 2_000_000_001, 2_000_000_004]
     start = 10**18
     onset = start + sum(periods) + SECOND
@@ -235,7 +235,7 @@ def test_a_lag_is_as_uncertain_as_its_toe_off() -> None:
 
 
 def test_without_toe_offs_lags_count_from_heel_strikes() -> None:
-    """A detector may find none: the gait is locked or not at any event of the stride."""
+    """A detector may find no toe-offs; a gait is locked, or not, at any event of the stride."""
     events, onsets, _ = noisy_walk(np.random.default_rng(3), locks, white, 0.01)
     strikes = [
         dataclasses.replace(e, uncertainty=0.05) for e in events if e.kind is EventKind.HEEL_STRIKE
@@ -250,7 +250,7 @@ def test_without_toe_offs_lags_count_from_heel_strikes() -> None:
         assert (pulse.toe_off, pulse.phase_lag_uncertainty) == (None, 0.05)
 
 
-def test_toe_offs_that_go_missing_after_the_first_pulse_leave_lags_unknown() -> None:
+def test_toe_offs_missing_after_the_first_pulse_leave_lags_unknown() -> None:
     events = regular_walk([STRIDE] * 8)
     found = [e for e in events if e.kind is EventKind.HEEL_STRIKE or e.stamp < 6 * SECOND]
     pulses = analyze(found, [4 * SECOND, 9 * SECOND], Side.RIGHT).pulses

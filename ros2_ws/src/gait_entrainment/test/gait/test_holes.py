@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A hole in the record is told; no lag is followed and no verdict is formed across it."""
+"""A hole in the record is reported; no lag is followed and no verdict is formed across it."""
 
 import dataclasses
 import itertools
@@ -26,7 +26,7 @@ def judged(
     onsets: Sequence[int] = ONSETS,
     unknown: Sequence[tuple[int, int]] = (),
 ) -> Analysis:
-    """Analyze a locked gait; whatever is missing of it, it must never be called another."""
+    """Analyze a locked gait; whatever is missing, it must never be called drifting or lost."""
     analysis = analyze(events, onsets, Side.RIGHT, None, unknown)
     verdicts = {e.verdict for e in analysis.entrainments}
     assert verdicts <= {Verdict.UNDECIDED, Verdict.ENTRAINED, Verdict.UNTESTABLE}
@@ -34,7 +34,7 @@ def judged(
 
 
 def cut(first: int, last: int) -> Analysis:
-    """Analyze what is left without a span [ns] of the record."""
+    """Analyze the record without a span [ns] of it."""
     return judged(
         [e for e in EVENTS if not first <= e.stamp < last],
         [o for o in ONSETS if not first <= o < last],
@@ -43,10 +43,10 @@ def cut(first: int, last: int) -> Analysis:
 
 
 @pytest.mark.parametrize("lost", range(2, PULSES - 1, 7))
-def test_one_lost_onset_is_told_and_the_others_keep_their_numbers(lost: int) -> None:
+def test_one_lost_onset_is_reported_and_the_others_keep_their_numbers(lost: int) -> None:
     analysis = judged(onsets=ONSETS[:lost] + ONSETS[lost + 1 :])
-    whole = judged()
-    assert list(analysis.pulses)[:lost] == list(whole.pulses)[:lost]
+    complete = judged()
+    assert list(analysis.pulses)[:lost] == list(complete.pulses)[:lost]
     kept = [p.number for p in analysis.pulses]
     assert kept == [n for n in range(1, PULSES + 1) if n != lost + 1]
     (hole,) = analysis.holes
@@ -54,7 +54,7 @@ def test_one_lost_onset_is_told_and_the_others_keep_their_numbers(lost: int) -> 
     assert hole.missing == "1 pulse(s)"
 
 
-def test_a_hole_begins_the_verdict_anew_and_says_so() -> None:
+def test_a_hole_restarts_the_verdict_and_is_given_as_the_reason() -> None:
     analysis = judged(onsets=ONSETS[:40] + ONSETS[42:])
     before, after = (
         [e for e in analysis.entrainments if e.stretch == stretch] for stretch in (1, 2)
@@ -69,15 +69,15 @@ def test_a_hole_begins_the_verdict_anew_and_says_so() -> None:
 def test_two_seconds_cut_out(begin: int) -> None:
     analysis = cut(begin, begin + 2000 * MS)
     assert analysis.holes
-    lost = {p.onset: p for p in analysis.pulses}
-    whole = judged().pulses
-    assert all(p.number == lost[p.onset].number for p in whole if p.onset in lost)
+    kept = {p.onset: p for p in analysis.pulses}
+    complete = judged().pulses
+    assert all(p.number == kept[p.onset].number for p in complete if p.onset in kept)
     for stretch in {e.stretch for e in analysis.entrainments}:
         strides = [e.stride for e in analysis.entrainments if e.stretch == stretch]
-        assert strides == list(range(strides[0], strides[-1] + 1)), "no window spans the gap"
+        assert strides == list(range(strides[0], strides[-1] + 1)), "a window spans the gap"
 
 
-def test_the_first_part_missing_leaves_nothing_to_compare_with() -> None:
+def test_without_a_baseline_the_verdict_is_untestable() -> None:
     analysis = cut(0, 30 * T)
     assert {e.verdict for e in analysis.entrainments[1:]} == {Verdict.UNTESTABLE}
     assert analysis.entrainments[-1].reason == Reason.BASELINE_UNKNOWN
@@ -85,12 +85,12 @@ def test_the_first_part_missing_leaves_nothing_to_compare_with() -> None:
 
 
 def test_strides_after_an_unknown_span_are_not_taken_for_unperturbed_ones() -> None:
-    # The record lacks the end of the baseline and the first ten pulses.
+    # The record lacks the end of the baseline and the first 13 pulses.
     analysis = cut(8 * T, 8 * T + 15 * P)
     assert analysis.entrainments[-1].unperturbed_period == 2.0
 
 
-def test_a_hole_in_the_baseline_or_after_the_pulses_does_not_touch_the_verdict() -> None:
+def test_a_hole_in_the_baseline_or_after_the_pulses_does_not_affect_the_verdict() -> None:
     after = EVENTS[-1].stamp
     for first, last in ((3 * T, 4 * T), (after - 3 * T, after - 2 * T)):
         analysis = cut(first, last)
@@ -99,7 +99,7 @@ def test_a_hole_in_the_baseline_or_after_the_pulses_does_not_touch_the_verdict()
         assert analysis.entrainments[-1].stretch == 1
 
 
-def test_trains_are_told_apart_and_each_is_judged_by_itself() -> None:
+def test_trains_are_told_apart_and_judged_separately() -> None:
     # Locked to the first train; the second, after a pause and at another period, is ignored.
     pause, second = 7 * T + 900 * MS, 1930 * MS
     walk = regular_walk([T] * BASELINE + [P] * 40 + [T] * 60)
@@ -112,7 +112,7 @@ def test_trains_are_told_apart_and_each_is_judged_by_itself() -> None:
     assert [p.number for p in analysis.pulses] == list(range(1, 81))
 
 
-def test_numbers_of_irregular_pulses_are_their_order() -> None:
+def test_irregular_pulses_are_numbered_in_order() -> None:
     numbers = PulseNumbers()
     steps = (0, 100, 350, 351, 352, 353, 900)
     assert [numbers.place(at, 1e-7) for at in itertools.accumulate(steps)][:3] == [0, 0, None]
@@ -133,7 +133,7 @@ def moved(event: GaitEvent, **changes: int) -> GaitEvent:
         {"stamp": -3600 * 1000 * MS},
     ],
 )
-def test_one_wrong_event_neither_silences_nor_moves_what_follows(
+def test_one_wrong_event_neither_hides_nor_renumbers_later_strides(
     place: int, changes: dict[str, int]
 ) -> None:
     event = EVENTS[place]
@@ -142,8 +142,8 @@ def test_one_wrong_event_neither_silences_nor_moves_what_follows(
     assert analysis.event_counts.implausible + analysis.event_counts.contradictory >= 1
     numbers = {s.number: s.period for s in analysis.strides}
     assert len(numbers) >= BASELINE + PULSES + 5 - (4 if place == 0 else 2)
-    whole = {s.number: s.period for s in judged().strides}
-    assert numbers.items() <= whole.items()
+    complete = {s.number: s.period for s in judged().strides}
+    assert numbers.items() <= complete.items()
     assert analysis.event_counts.missing <= 14
 
 
@@ -156,7 +156,7 @@ def test_a_pause_in_the_gait_is_a_hole() -> None:
     assert max(s.period for s in analysis.strides) == 2.0
 
 
-def test_a_toe_off_alone_missing_is_no_hole() -> None:
+def test_a_missing_toe_off_alone_is_not_a_hole() -> None:
     lost = [e for e in EVENTS if not (e.kind is EventKind.TOE_OFF and e.step == 60)]
     analysis = judged(lost)
     assert not analysis.holes
@@ -165,7 +165,7 @@ def test_a_toe_off_alone_missing_is_no_hole() -> None:
 
 
 @pytest.mark.parametrize("stride", range(1, BASELINE - 1))
-def test_a_pause_in_the_baseline_does_not_touch_the_unperturbed_period(stride: int) -> None:
+def test_a_pause_in_the_baseline_does_not_affect_the_unperturbed_period(stride: int) -> None:
     begin, pause = stride * T + T // 4, 7000 * MS
     events = [e if e.stamp < begin else moved(e, stamp=e.stamp + pause) for e in EVENTS]
     last = judged(events, [o + pause for o in ONSETS]).entrainments[-1]

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Only what can be a stride is believed; nobody who stands still gets torque."""
+"""Only plausible strides are believed; a person who stands still gets no torque."""
 
 import math
 
@@ -40,7 +40,7 @@ def watch(*periods):
         ((6.0,), [False]),
     ],
 )
-def test_strides_that_cannot_be_are_not_believed(periods, believed):
+def test_implausible_strides_are_not_believed(periods, believed):
     assert watch(*periods)[1] == believed
 
 
@@ -55,18 +55,18 @@ def test_strides_that_cannot_be_are_not_believed(periods, believed):
         (0.25, 1.9, False),
     ],
 )
-def test_of_several_strides_or_a_part_of_one_the_mean_counts(strides, seconds, believed):
+def test_several_strides_or_part_of_one_are_judged_by_their_mean(strides, seconds, believed):
     found, _, _ = watch(1.1, 1.1, 1.1)
     assert found.believes(strides, round(seconds * SECOND)) == believed
 
 
-def test_nobody_walks_after_one_and_a_half_strides_without_a_strike():
+def test_the_gait_has_stopped_after_one_and_a_half_strides_without_a_strike():
     found, _, now = watch(1.1, 1.1, 1.1)
     assert found.stopped(now + round(1.649 * SECOND)) == ""
     assert "1.66 s; allowed: 1.5 strides of 1.1 s" in found.stopped(now + round(1.66 * SECOND))
 
 
-def test_before_a_stride_is_known_the_longest_counts():
+def test_before_a_stride_is_known_the_longest_allowed_one_counts():
     found = GaitWatch(Side.RIGHT, GaitLimits())
     assert found.stopped(10**15) == ""
     found.add(0, None)
@@ -111,13 +111,13 @@ def test_stray_strikes_do_not_enter_the_measured_period():
     assert conductor.block.measured_period == pytest.approx(STRIDE / SECOND)
 
 
-def test_a_baseline_of_strays_ends_the_run_before_the_first_pulse_with_the_figures():
+def test_a_baseline_of_strays_ends_the_run_before_the_first_pulse_and_gives_figures():
     conductor = Conductor(Protocol())
     with pytest.raises(GaitError, match=r"baseline: .* of .* strides are implausible"):
         gait(conductor, 17, stray=range(2, 15))
 
 
-def test_an_unsteady_baseline_ends_the_run_with_the_figures():
+def test_an_unsteady_baseline_ends_the_run_and_gives_figures():
     conductor = Conductor(Protocol(), limits=GaitLimits(stride_change=1.0, baseline_spread=0.05))
     with pytest.raises(GaitError, match=r"strides of 0\.825 to 1\.1 s, which vary by"):
         gait(conductor, 17, stray=range(1, 15, 3), short=0.75)
@@ -147,7 +147,7 @@ def test_one_wrong_event_neither_ends_an_experiment_nor_keeps_it_from_ending(ste
 
 def test_an_implausible_gait_under_pulses_ends_the_torque():
     conductor = Conductor(Protocol())
-    # Twice as fast, which others may walk, and this person did not.
+    # Twice as fast: plausible for others, but not for this person.
     stamp = gait(conductor, 20, stray=range(17, 30), short=0.5)
     with pytest.raises(GaitError, match="the gait has stopped"):
         conductor.horizon(stamp)

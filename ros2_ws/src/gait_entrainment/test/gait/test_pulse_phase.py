@@ -26,19 +26,19 @@ OWN = stride(2, 200, 400, 330)
 AFTER = stride(3, 400, 600, 430)
 
 
-def test_toe_off_of_the_own_stride() -> None:
+def test_toe_off_of_the_same_stride() -> None:
     assert nearest_toe_off(300, OWN, BEFORE, AFTER) == (330, 2)
     assert nearest_toe_off(330, OWN, BEFORE, AFTER) == (330, 2)
     assert nearest_toe_off(365, OWN, BEFORE, None) == (330, 2)  # as near to the heel strike
 
 
-def test_toe_off_of_the_stride_before_and_the_tie_goes_to_it() -> None:
+def test_toe_off_of_the_previous_stride_wins_a_tie() -> None:
     assert nearest_toe_off(229, OWN, BEFORE, AFTER) == (130, 1)
     assert nearest_toe_off(230, OWN, BEFORE, AFTER) == (130, 1)  # 100 from both
     assert nearest_toe_off(231, OWN, BEFORE, AFTER) == (330, 2)
 
 
-def test_toe_off_of_the_stride_after_and_the_tie_does_not_go_to_it() -> None:
+def test_toe_off_of_the_next_stride_loses_a_tie() -> None:
     assert nearest_toe_off(380, OWN, BEFORE, AFTER) == (330, 2)  # 50 from both
     assert nearest_toe_off(381, OWN, BEFORE, AFTER) == (430, 3)
 

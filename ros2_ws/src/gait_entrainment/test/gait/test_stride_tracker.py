@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Strides from gait events that are missing, doubled, late or contradictory."""
+"""Strides from gait events that are missing, repeated, late or contradictory."""
 
 import math
 from dataclasses import replace
@@ -60,7 +60,7 @@ def test_strides_of_the_leg_that_strikes_first() -> None:
 
 @settings(derandomize=True, deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 20), st.integers(1, 10**13), st.integers(0, 40))))
-def test_what_is_stamped_ahead_of_now_changes_nothing(wrong: list[tuple[int, int, int]]) -> None:
+def test_events_stamped_ahead_of_now_change_nothing(wrong: list[tuple[int, int, int]]) -> None:
     tracker, strides = StrideTracker(Side.RIGHT), []
     for position, event in enumerate(walk(10)):
         for at, ahead, step in wrong:
@@ -73,7 +73,7 @@ def test_what_is_stamped_ahead_of_now_changes_nothing(wrong: list[tuple[int, int
 
 
 @pytest.mark.parametrize(("later", "steps"), [(100 * SECOND, 0), (-7 * SECOND, 20)])
-def test_numbers_or_a_clock_that_begin_anew_leave_the_strides_that_were_told(
+def test_restarted_numbers_or_clocks_leave_earlier_strides_unchanged(
     later: int, steps: int
 ) -> None:
     again = [replace(e, stamp=e.stamp + later, step=e.step + steps) for e in walk(40)]
@@ -98,7 +98,7 @@ def test_steps_of_unequal_length() -> None:
     assert strides[0].toe_off is None
 
 
-def test_stride_comes_out_with_its_closing_heel_strike() -> None:
+def test_stride_is_given_at_its_closing_heel_strike() -> None:
     tracker = StrideTracker(Side.RIGHT)
     results = [tracker.add(event) for event in walk(2)]
     assert [result is not None for result in results] == [False, False, False, False, True]
@@ -127,7 +127,7 @@ def test_missing_first_strike_changes_no_number() -> None:
     assert counts.missing == 1
 
 
-def test_joining_late_counts_what_was_missed() -> None:
+def test_joining_late_counts_the_missed_events() -> None:
     events = walk(24)
     strides, counts = track(events[37:])  # from toe-off 19 on; first own strike: 20
     assert [s.number for s in strides] == [11, 12]

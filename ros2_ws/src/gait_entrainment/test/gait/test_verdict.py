@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The verdict: each rule of the definitions by an example, and a second implementation."""
+"""The verdict: an example for each rule of its definition, and a second implementation."""
 
 import math
 import statistics
@@ -67,7 +67,7 @@ def test_walker_that_gives_up_is_lost() -> None:
 
 def test_washout_does_not_change_the_verdict() -> None:
     short, long = (experiment([P] * 40, 40, washout=w) for w in (1, 60))
-    # As text, which is exact: NaN does not equal itself.
+    # Compared as text, which is exact, because NaN does not equal itself.
     assert repr(short.entrainments) == repr(long.entrainments)
     assert long.entrainments[-1].stride == BASELINE + 40
     assert len(long.strides) == BASELINE + 40 + 60
@@ -142,9 +142,9 @@ def creep(rate: Callable[[int], float], pulses: int = 60) -> Analysis:
 
 
 @pytest.mark.parametrize("growth", [1.0, 1.03, 1.1, 0.98])
-def test_slow_passage_is_not_entrained_and_says_that_the_lag_creeps(growth: float) -> None:
-    # Slower than a quarter of the 50 ms for the whole of it: away from an unstable lock, or
-    # towards the ghost of a lock that has just ceased to exist.
+def test_slow_passage_is_undecided_because_the_lag_creeps(growth: float) -> None:
+    # Always slower than a quarter of the 50 ms: away from an unstable lock, or towards the ghost
+    # of a lock that has just ceased to exist.
     analysis = creep(lambda n: 4 * growth ** (n - (50 if growth > 1 else 0)))
     assert set(verdicts(analysis)) == {Verdict.UNDECIDED}
     assert analysis.entrainments[-1].reason == Reason.CREEPING
@@ -155,7 +155,7 @@ def test_approach_that_comes_to_rest_is_entrained() -> None:
     assert analysis.entrainments[-1].verdict == Verdict.ENTRAINED
 
 
-def test_every_verdict_that_claims_nothing_says_why() -> None:
+def test_every_inconclusive_verdict_gives_a_reason() -> None:
     few = experiment([P] * 18, 18).entrainments[-1]
     assert (few.verdict, few.reason) == (Verdict.UNDECIDED, Reason.FEW_PULSES)
     close = experiment([T] * 30, 30, T + MS).entrainments[-1]
@@ -165,12 +165,12 @@ def test_every_verdict_that_claims_nothing_says_why() -> None:
 
 
 @pytest.mark.parametrize("period", [T // 2, T // 2 - 25 * MS, 2 * T, 3 * T // 2])
-def test_pulses_at_another_rate_than_one_a_stride_are_untestable(period: int) -> None:
+def test_pulses_at_a_rate_other_than_one_per_stride_are_untestable(period: int) -> None:
     last = experiment([T] * 60, 40, period).entrainments[-1]
     assert (last.verdict, last.reason) == (Verdict.UNTESTABLE, Reason.NOT_ONE_TO_ONE)
 
 
-def test_failing_once_starts_the_five_strides_anew() -> None:
+def test_failing_once_restarts_the_five_strides() -> None:
     lags = [0] * 50
     lags[22] = 400 * MS  # in the windows of pulses 23 to 42
     entrained, passing = (
@@ -184,7 +184,7 @@ def test_failing_once_starts_the_five_strides_anew() -> None:
     assert entrained == [s for s in passing if all(s - i in passing for i in range(5))]
 
 
-def test_entrained_since_the_lag_has_come_within_ten_milliseconds_for_good() -> None:
+def test_entrained_since_the_lag_stays_within_ten_milliseconds() -> None:
     # A lag of 0.3 s that shrinks by 0.7 a stride: 0.3 * 0.7^9 = 12 ms, 0.3 * 0.7^10 = 8.5 ms.
     lags = [round(300 * MS * 0.7**n) for n in range(50)]
     assert lags[9] > 10 * MS > lags[10]
@@ -229,7 +229,7 @@ def reference(analysis: Analysis, rule: VerdictSettings) -> list[tuple[Verdict, 
         if passed >= rule.successive:
             verdict, entrained_before = Verdict.ENTRAINED, True
             tolerance = max(0.010, 2 * np.std(u, ddof=1))
-            since = stride  # where even the latest pulse is an outlier
+            since = stride  # if even the latest pulse is an outlier
             for p in reversed(every):
                 if abs(p.unwrapped_lag - np.median(u)) > tolerance:
                     break
@@ -259,15 +259,15 @@ def test_agrees_with_a_second_implementation(response, noise, seed, variation) -
 
 @pytest.mark.parametrize("name", settings_of(VerdictSettings))
 def test_setting_out_of_range_is_refused_by_name(name: str) -> None:
-    told = settings_of(VerdictSettings)[name]
-    assert told.meaning
-    assert told.unit
-    assert told.least <= getattr(VerdictSettings, name) <= told.most
-    for bad in (told.least - 1, told.most + 1, math.nan):
+    setting = settings_of(VerdictSettings)[name]
+    assert setting.meaning
+    assert setting.unit
+    assert setting.least <= getattr(VerdictSettings, name) <= setting.most
+    for bad in (setting.least - 1, setting.most + 1, math.nan):
         with pytest.raises(ValueError, match=f"^{name}: .*; allowed: "):
             VerdictSettings(**{name: bad})  # type: ignore[arg-type]
 
 
-def test_count_that_is_not_whole_is_refused() -> None:
+def test_fractional_count_is_refused() -> None:
     with pytest.raises(ValueError, match=r"^window: 20.5; allowed: a whole number from 5 to 1000"):
         VerdictSettings(window=20.5)  # type: ignore[arg-type]

@@ -45,7 +45,7 @@ def test_locked_walker_is_called_entrained(noise: Noise, variation: float) -> No
 @pytest.mark.parametrize(("least", "below"), [(0.0, STEADY), (STEADY, 1.0)])
 def test_recorded_strides(least: float, below: float) -> None:
     if not recorded_strides():
-        pytest.skip("gait-maturation-db of PhysioNet is not in shared/data beside the repository")
+        pytest.skip("PhysioNet's gait-maturation-db is not in shared/data next to the repository")
     indifferent = run_recorded(ignores, least, below)
     assert indifferent.final[Verdict.ENTRAINED] <= 0.015 * indifferent.trials
     locking = run_recorded(locks, least, below)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Protocol files: what reads back, and what is refused with which words."""
+"""Protocol files: what reads back the same, and the messages about what is refused."""
 
 import math
 
@@ -140,7 +140,7 @@ def test_what_is_written_reads_back_the_same(
         ("seed: 1\nseed: 2", ("seed", "twice")),
     ],
 )
-def test_a_mistake_is_named_with_its_line(line, words):
+def test_a_mistake_is_reported_with_its_line(line, words):
     text = "# a protocol\nname: mine\n" if not line.startswith("name") else "# a protocol\n\n"
     with pytest.raises(ProtocolError) as refused:
         read_protocol(text + line + "\n")
@@ -173,7 +173,7 @@ def test_an_empty_file_is_the_default(tmp_path):
     assert read_protocol(tmp_path / "empty.yaml") == DEFAULT_PROTOCOL
 
 
-def test_an_option_replaces_the_file_and_its_alternative():
+def test_an_option_replaces_the_files_value_and_its_alternative():
     protocol = read_protocol(
         "pulses: {torque: 5, period: 2.0}\n\n",
         {"pulses.torque_fraction": (0.2, "--torque-fraction")},
@@ -194,7 +194,7 @@ def test_options_that_contradict_each_other_are_refused():
         read_protocol(None, both)
 
 
-def test_a_text_is_taken_as_it_is_written():
+def test_text_is_taken_as_written():
     protocol = read_protocol("name: 2012\npulses: {catch_pulses: 5}\nseed: 07\n")
     assert protocol.seed == 7
     assert (protocol.name, protocol.pulses.heights(1.0, (0, 1))[4]) == ("2012", 0.0)
@@ -227,7 +227,7 @@ blocks:
 """
 
 
-def test_what_is_said_beside_the_blocks_holds_for_each_that_does_not_say_otherwise():
+def test_fields_outside_the_blocks_are_the_defaults_of_each_block():
     protocol = read_protocol(BLOCKS)
     fast, other = protocol.blocks
     assert (fast.name, fast.baseline, fast.washout, fast.rest) == ("fast", 15, 3, 20.0)
@@ -242,20 +242,20 @@ def test_what_is_said_beside_the_blocks_holds_for_each_that_does_not_say_otherwi
     assert read_protocol(write_protocol(protocol)) == protocol
 
 
-def test_an_option_replaces_what_each_block_says():
+def test_an_option_replaces_the_value_in_every_block():
     overrides = {"pulses.count": (7, "--pulses"), "name": ("mine", "--name")}
     protocol = read_protocol(BLOCKS, overrides)
     assert protocol.name == "mine"
     assert [block.pulses.count for block in protocol.blocks] == [7, 7]
 
 
-def test_a_block_at_fault_is_named_with_its_line():
+def test_a_mistake_in_a_block_is_reported_with_its_line():
     text = BLOCKS + "  - baseline: 1\n"
     with pytest.raises(ProtocolError, match=r"^protocol:11: baseline: 1 leaves no complete"):
         read_protocol(text)
 
 
-def test_the_text_of_a_protocol_without_what_came_later_is_as_it_always_was():
+def test_fields_added_later_are_not_written_at_their_defaults():
     text = write_protocol(DEFAULT_PROTOCOL)
     fields = [line.partition(":")[0].strip() for line in text.splitlines()]
     assert fields == [

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A driver that notes every call, and can be told to misbehave."""
+"""A driver that records every call and can be made to misbehave."""
 
 import math
 import threading
@@ -17,10 +17,10 @@ class NoOptions:
 
 class RecordingRobot(AnkleRobot):
     """
-    Notes calls in ``calls``.
+    Records calls in ``calls``.
 
-    ``raises`` maps a call's name to what it raises; ``torques`` are delivered by the next
-    promises, one each; ``faults`` come with the next states.
+    ``raises`` maps a call's name to the exception that it raises. The next promises deliver
+    ``torques``, one each, and the next states report ``faults``.
     """
 
     Options = NoOptions
@@ -35,44 +35,44 @@ class RecordingRobot(AnkleRobot):
         self.stopped = threading.Event()
         self.promised = 0
 
-    def _note(self, name):
+    def _record(self, name):
         self.calls.append(name)
         if name in self.raises:
             raise self.raises[name]
 
     def configure(self):
-        self._note("configure")
+        self._record("configure")
 
     def activate(self):
-        self._note("activate")
+        self._record("activate")
 
     def begin(self, start):
-        self._note("begin")
+        self._record("begin")
         self.promised = start
 
     def schedule(self, train):
-        self._note("schedule")
+        self._record("schedule")
         self.train = train
 
     def cancel(self):
-        self._note("cancel")
+        self._record("cancel")
 
     def promise(self, until):
-        self._note("promise")
+        self._record("promise")
         begin, self.promised = self.promised, until
         torque = self.torques.pop(0) if self.torques else 0.0
         return TorqueProfile(self.side, (begin,), (torque,), (), until)
 
     def read(self):
-        self._note("read")
+        self._record("read")
         return [RobotState(self.promised, 0.0, 0.0, math.nan, self.faults)]
 
     def stop(self):
         self.stopped.set()
-        self._note("stop")
+        self._record("stop")
 
     def deactivate(self):
-        self._note("deactivate")
+        self._record("deactivate")
 
     def close(self):
-        self._note("close")
+        self._record("close")

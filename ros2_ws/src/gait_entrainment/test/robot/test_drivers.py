@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Drivers by name: found without being loaded, options checked, one line for a mistake."""
+"""Drivers by name: found without being loaded, options checked, mistakes reported in one line."""
 
 import subprocess
 import sys
@@ -25,11 +25,11 @@ from gait_entrainment.robot.drivers import join_options, split_options
 from gait_entrainment.robot.ideal import IdealAnkleRobot
 
 
-def test_the_drivers_of_this_package_are_there():
+def test_the_drivers_of_this_package_are_found():
     assert {"ideal", "emulated"} <= set(driver_names())
 
 
-def test_naming_drivers_loads_none():
+def test_listing_drivers_does_not_load_them():
     code = (
         "import sys; from gait_entrainment.robot import driver_names, find_driver;"
         "driver_names(); find_driver('ideal');"
@@ -46,7 +46,7 @@ def test_options_reach_the_driver():
     assert driver.make(Side.LEFT).capabilities.peak_torque == 7.5
 
 
-def test_each_ankle_has_a_robot_with_options_of_its_own():
+def test_each_ankle_has_a_robot_with_its_own_options():
     text = "emulated:left.delay=0.1,peak_torque=7.5,right.delay=0.2"
     robots = make_robots(text, (Side.RIGHT, Side.LEFT), DeviceLimits())
     assert [(s, robot.side) for s, robot in robots.items()] == [(s, s) for s in (1, 0)]
@@ -66,7 +66,7 @@ def test_options_of_any_text_read_back_the_same(parts, value):
     assert split_options(join_options(parts)) == parts
 
 
-def test_only_a_comma_and_a_backslash_before_one_need_a_backslash():
+def test_only_commas_and_backslashes_before_commas_need_a_backslash():
     text = r"channel=/dev/ttyACM0,path=C:\x,list=1\,2,ends=\\,more=1"
     assert split_options(text) == [
         "channel=/dev/ttyACM0", r"path=C:\x", "list=1,2", "ends=\\", "more=1"
@@ -89,13 +89,13 @@ def test_only_a_comma_and_a_backslash_before_one_need_a_backslash():
         ("emulated:state_rate=300", "state_rate: 300 Hz; allowed: a divisor of 1000"),
     ],
 )
-def test_a_mistake_is_told_in_one_line(text, words):
+def test_a_mistake_is_reported_in_one_line(text, words):
     with pytest.raises(LimitError, match=words) as error:
         find_driver(text)
     assert "\n" not in str(error.value)
 
 
-def test_a_driver_that_cannot_be_loaded_says_what_is_missing(monkeypatch):
+def test_the_error_of_a_failed_import_names_the_missing_module(monkeypatch):
     from gait_entrainment.robot import drivers
 
     monkeypatch.setitem(drivers.OWN_DRIVERS, "absent", "no_such_package:Robot")
@@ -121,22 +121,20 @@ class Optionless(IdealAnkleRobot):
         (Optionless, "TypeError.*dataclass"),
     ],
 )
-def test_whatever_somebody_elses_driver_does_when_loaded_is_told(
-    monkeypatch, tmp_path, text, words
-):
+def test_any_failure_to_load_a_third_party_driver_is_reported(monkeypatch, tmp_path, text, words):
     from gait_entrainment.robot import drivers
 
     if isinstance(text, str):
-        (tmp_path / "of_somebody.py").write_text(text)
+        (tmp_path / "third_party.py").write_text(text)
         monkeypatch.syspath_prepend(tmp_path)
     else:
-        monkeypatch.setitem(sys.modules, "of_somebody", SimpleNamespace(Robot=text))
-    monkeypatch.setitem(drivers.OWN_DRIVERS, "odd", "of_somebody:Robot")
+        monkeypatch.setitem(sys.modules, "third_party", SimpleNamespace(Robot=text))
+    monkeypatch.setitem(drivers.OWN_DRIVERS, "odd", "third_party:Robot")
     with pytest.raises(DeviceError, match=rf"odd .*cannot be loaded: .*{words}"):
         find_driver("odd")
 
 
-def test_what_is_no_driver_is_refused(monkeypatch):
+def test_a_class_that_is_not_a_driver_is_refused(monkeypatch):
     from gait_entrainment.robot import drivers
 
     monkeypatch.setitem(drivers.OWN_DRIVERS, "wrong", "pathlib:Path")

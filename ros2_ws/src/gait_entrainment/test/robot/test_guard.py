@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The safety envelope: nothing reaches a driver past it, and every way out ends in zero torque."""
+"""The safety envelope: nothing reaches a driver around it, and every exit ends in zero torque."""
 
 import itertools
 import math
@@ -109,25 +109,25 @@ def test_a_train_at_its_limits_is_accepted(limits):
     assert guard.train is not None
 
 
-def test_the_devices_peak_and_the_end_of_what_is_promised_are_allowed():
+def test_peak_torque_right_at_the_end_of_the_promise_is_allowed():
     guard, _ = ready()
     guard.promise(SECOND)
     guard.schedule(train(torque=-20.0, first_onset=SECOND))
     assert guard.train is not None
 
 
-def test_a_train_comes_after_the_one_before_until_it_is_cancelled_or_the_run_begins_anew():
+def test_an_overlapping_train_is_refused_until_a_cancel_or_a_new_run():
     guard, driver = ready()
-    for over in (guard.cancel, lambda: guard.begin(0)):
+    for clear in (guard.cancel, lambda: guard.begin(0)):
         guard.schedule(train())
         with pytest.raises(LimitError, match="overlap"):
             guard.schedule(train())
-        over()
+        clear()
         assert guard.train is None
     assert driver.calls.count("schedule") == 2
 
 
-def test_limits_hold_although_a_train_is_cancelled():
+def test_limits_still_hold_after_a_train_is_cancelled():
     limits = {"pulses_per_minute": 60.0, "impulse": 1.5}
     guard, _ = ready(DeviceLimits(**limits))
     guard.schedule(train(first_onset=SECOND, count=2))
@@ -146,7 +146,7 @@ def test_limits_hold_although_a_train_is_cancelled():
     guard.schedule(train(first_onset=SECOND, count=1))
 
 
-def test_limits_hold_over_the_border_of_two_trains():
+def test_limits_hold_across_two_trains():
     guard, _ = ready(DeviceLimits(impulse=1.5, duty=1.0))
     guard.schedule(train(count=1))
     with pytest.raises(LimitError, match=r"impulse: 2\.6 N m s within 1 s"):
@@ -155,7 +155,7 @@ def test_limits_hold_over_the_border_of_two_trains():
     assert guard.train.onsets == (3 * SECOND, 4 * SECOND + 1)
 
 
-def test_pulses_asked_for_one_by_one_rise_as_those_of_one_train():
+def test_pulses_requested_one_by_one_rise_like_those_of_one_train():
     guard, _ = ready(DeviceLimits(rising=2))
     onsets = [n * SECOND for n in (3, 5, 7, 9, 20)]  # the last one after a pause
     for onset in onsets:
@@ -163,7 +163,7 @@ def test_pulses_asked_for_one_by_one_rise_as_those_of_one_train():
     assert [pulse.torque for pulse in guard.train.pulses] == [4.0, 8.0, 12.0, 12.0, 4.0]
 
 
-def test_a_flank_is_held_against_the_rate_whatever_the_shape():
+def test_a_flank_is_checked_against_the_rate_whatever_the_shape():
     limits = DeviceLimits(rate=300.0)
     limits.check_pulse(Pulse(0, 9.5, 0.1, Shape.HALF_SINE))
     for pulse in (
@@ -175,7 +175,7 @@ def test_a_flank_is_held_against_the_rate_whatever_the_shape():
             limits.check_pulse(pulse)
 
 
-def test_each_activation_and_each_run_begins_anew():
+def test_a_robot_is_activated_once_and_then_needs_a_new_run():
     guard, driver = ready()
     with pytest.raises(DeviceError, match="already active; deactivate"):
         guard.activate()
@@ -187,7 +187,7 @@ def test_each_activation_and_each_run_begins_anew():
         guard.schedule(train())
 
 
-def test_a_single_pulse_is_held_against_the_impulse_before_anything_moves():
+def test_a_single_pulse_is_checked_against_the_impulse_before_anything_moves():
     limits = DeviceLimits(impulse=1.2)
     limits.check_pulse(Pulse(0, -11.9, 0.1))
     with pytest.raises(LimitError, match=r"impulse: 1\.3 N m s"):
@@ -195,7 +195,7 @@ def test_a_single_pulse_is_held_against_the_impulse_before_anything_moves():
 
 
 @pytest.mark.parametrize("torque", [-13.0, 13.0])
-def test_a_rate_makes_ramps(torque):
+def test_a_rate_limit_turns_flanks_into_ramps(torque):
     guard, driver = ready(DeviceLimits(rate=520.0))
     guard.schedule(train(torque=torque))
     flanks = {(pulse.shape, pulse.rise, pulse.fall) for pulse in driver.train.pulses}
@@ -203,7 +203,7 @@ def test_a_rate_makes_ramps(torque):
 
 
 @pytest.mark.parametrize("call", ["activate", "arm", "begin", "schedule", "promise"])
-def test_nothing_is_commanded_before_its_turn(call):
+def test_calls_in_the_wrong_order_command_nothing(call):
     driver = RecordingRobot(Side.LEFT)
     guard = GuardedRobot(driver, Side.LEFT)
     arguments = {"begin": (0,), "schedule": (train(),), "promise": (1,)}.get(call, ())
@@ -212,7 +212,7 @@ def test_nothing_is_commanded_before_its_turn(call):
     assert driver.calls == []
 
 
-def test_a_device_outside_simulation_needs_arming():
+def test_a_real_device_needs_arming():
     guard, driver = ready(simulated=False)
     with pytest.raises(DeviceError, match="not armed"):
         guard.schedule(train())
@@ -241,7 +241,7 @@ def test_arming_expires(monkeypatch):
     guard.close()
 
 
-def test_the_dose_goes_on_from_run_to_run_and_from_robot_to_robot():
+def test_the_dose_carries_over_between_runs_and_robots():
     dose = Dose()
 
     def next_robot():
@@ -263,11 +263,11 @@ def test_the_dose_goes_on_from_run_to_run_and_from_robot_to_robot():
         next_robot().schedule(train())
     robot = next_robot()
     robot.schedule(train(count=2))
-    with pytest.raises(LimitError, match="session_pulses: 11"):  # those to come count as well
+    with pytest.raises(LimitError, match="session_pulses: 11"):  # scheduled pulses count too
         robot.schedule(train(first_onset=20 * SECOND, count=1))
 
 
-def test_only_the_pulses_of_the_protocol_are_asked_for():
+def test_only_the_protocols_own_pulses_may_be_requested():
     planned = PlannedPulses(torque=13.0, duration=0.1, count=4)
     planned.check(train(), 0)
     planned.check(train(torque=-13.0, count=1), 3)
@@ -290,7 +290,7 @@ STATE = RobotState(SECOND, 0.0, 0.0, math.nan)
         (None, "the driver failed: TypeError"),
     ],
 )
-def test_states_that_cannot_be_end_the_torque(monkeypatch, states, words, simulated):
+def test_impossible_states_end_the_torque(monkeypatch, states, words, simulated):
     guard, driver = ready(simulated=simulated)
     guard.promise(2 * SECOND)
     monkeypatch.setattr(driver, "read", lambda: states)
@@ -302,7 +302,7 @@ def test_states_that_cannot_be_end_the_torque(monkeypatch, states, words, simula
 
 
 @pytest.mark.parametrize(("simulated", "faults"), [(True, []), (False, ["torque_exceeded"])])
-def test_more_torque_in_a_state_than_the_limit_latches_but_for_an_emulated_sensor(
+def test_measured_torque_above_the_limit_latches_except_for_an_emulated_sensor(
     monkeypatch, simulated, faults
 ):
     guard, driver = ready(DeviceLimits(torque=10.0, overshoot=0.2), simulated)
@@ -321,7 +321,7 @@ def test_more_torque_in_a_state_than_the_limit_latches_but_for_an_emulated_senso
     [(0.0, 2.5, 0.17, True), (0.0, 2.3, 9.0, False), (0.0, -2.5, 0.14, False),
      (2.0, 9.0, 9.0, False)],
 )  # fmt: skip
-def test_torque_that_nobody_asked_for_ends_in_time_whatever_the_driver(
+def test_unrequested_torque_ends_in_time_whatever_the_driver(
     monkeypatch, simulated, commanded, measured, seconds, ends
 ):
     guard, driver = ready(simulated=simulated)
@@ -336,12 +336,12 @@ def test_torque_that_nobody_asked_for_ends_in_time_whatever_the_driver(
     guard.close()
 
 
-def test_one_reading_that_comes_late_is_no_torque_that_nobody_asked_for(monkeypatch):
-    """A pulse ends while nothing is read; what comes first then was measured before its end."""
+def test_a_single_late_reading_is_not_unrequested_torque(monkeypatch):
+    """A pulse ends while nothing is read, so the next reading was taken before its end."""
     guard, driver = ready(simulated=False)
     guard.promise(60 * SECOND)
-    told = [(1.0, 5.0, 5.0), (1.3, 0.0, 5.0), (1.31, 0.0, 0.0), (1.6, 0.0, 5.0)]
-    states = [RobotState(round(at * SECOND), *torques, math.nan) for at, *torques in told]
+    readings = [(1.0, 5.0, 5.0), (1.3, 0.0, 5.0), (1.31, 0.0, 0.0), (1.6, 0.0, 5.0)]
+    states = [RobotState(round(at * SECOND), *torques, math.nan) for at, *torques in readings]
     monkeypatch.setattr(driver, "read", lambda: states)
     guard.read()
     assert guard.faults == ()
@@ -350,12 +350,12 @@ def test_one_reading_that_comes_late_is_no_torque_that_nobody_asked_for(monkeypa
 
 @pytest.mark.parametrize("name", ["peak_torque", "torque_rate", "torque_bandwidth"])
 @pytest.mark.parametrize("value", [math.nan, -1.0])
-def test_a_device_says_what_it_can_do(name, value):
+def test_invalid_capabilities_are_refused(name, value):
     with pytest.raises(LimitError, match=rf"capabilities\.{name}: .*; allowed: "):
         replace(find_driver("emulated").make(Side.LEFT).capabilities, **{name: value})
 
 
-def test_a_stop_latches_until_closed_and_configured():
+def test_a_stop_latches_until_the_robot_is_closed_and_configured():
     guard, driver = ready()
     guard.schedule(train())
     guard.stop()
@@ -373,7 +373,7 @@ def test_a_stop_latches_until_closed_and_configured():
     guard.schedule(train())
 
 
-def test_more_delivered_torque_than_allowed_latches_and_is_told_all_the_same():
+def test_excess_delivered_torque_latches_and_is_still_reported():
     guard, driver = ready(DeviceLimits(torque=10.0, overshoot=0.1))
     driver.torques = [10.9, -11.1]
     guard.promise(SECOND // 10)
@@ -407,13 +407,13 @@ def test_the_impulse_of_any_stride_is_watched(heights, limit, window):
     for k in range(1, len(heights) + 1):
         guard.promise(k * 50_000_000)
         ends = range(1, 50 * k + 1)
-        # Windows are looked at where a piece of torque ends.
+        # Windows are checked at the end of each piece of torque.
         largest = max(sums[e] - sums[max(e - window, 0)] for e in ends if e % 50 == 0)
         if abs(largest - limit * 10) > 1e-6:
             assert bool(guard.faults) == (largest > limit * 10)
 
 
-def test_a_fault_that_the_device_reports_latches():
+def test_a_fault_reported_by_the_device_latches():
     guard, driver = ready()
     guard.schedule(train())
     driver.faults = (OVERHEATED,)
@@ -445,7 +445,7 @@ def test_an_exception_in_the_users_code_closes_the_robot():
     assert driver.calls[-2:] == ["deactivate", "close"]
 
 
-def test_a_failing_deactivation_stops_and_closes_all_the_same():
+def test_a_failing_deactivation_still_stops_and_closes():
     guard, driver = ready()
     driver.raises = {"deactivate": OSError("bus gone"), "stop": OSError("bus gone")}
     guard.close()
@@ -467,35 +467,35 @@ def test_a_device_that_does_not_answer_is_released_and_can_be_configured_later()
     guard.activate()
 
 
-def test_a_stop_that_meets_a_schedule_wins():
+def test_a_stop_during_a_schedule_wins():
     guard, driver = ready()
-    driver.schedule = lambda _: guard.stop()  # as if from another thread, in the midst of it
+    driver.schedule = lambda _: guard.stop()  # as if another thread stopped it midway
     with pytest.raises(DeviceError, match="latched"):
         guard.schedule(train())
     assert driver.calls[-1] == "stop"
     assert guard.train is None
 
 
-@pytest.mark.parametrize("told", ["nothing", "one state", "old states", "no torque", "all"])
-def test_a_device_that_reports_nothing_new_is_a_fault(monkeypatch, told):
+@pytest.mark.parametrize("states", ["nothing", "one state", "old states", "no torque", "all"])
+def test_a_device_that_reports_nothing_new_is_a_fault(monkeypatch, states):
     guard, driver = ready(DeviceLimits(silence=0.5), simulated=False)
     guard.arm()
-    steady, begun = time.monotonic(), time.time_ns()
-    if told == "no torque":
-        nothing = TorqueProfile(guard.side, (begun,), (0.0,), (), begun)
+    steady, start = time.monotonic(), time.time_ns()
+    if states == "no torque":
+        nothing = TorqueProfile(guard.side, (start,), (0.0,), (), start)
         monkeypatch.setattr(driver, "promise", lambda _: nothing)
-    guard.begin(begun)
+    guard.begin(start)
     guard.schedule(train(first_onset=guard.promised_until + 60 * SECOND))
     for tenth in range(8):
-        now = begun + tenth * SECOND // 10
-        stamps = {"nothing": [], "one state": [begun], "old states": [now // 2]}.get(told, [now])
+        now = start + tenth * SECOND // 10
+        stamps = {"nothing": [], "one state": [start], "old states": [now // 2]}.get(states, [now])
         monkeypatch.setattr(driver, "read", lambda s=stamps: [replace(STATE, stamp=i) for i in s])
         monkeypatch.setattr("time.monotonic", lambda t=tenth: steady + t / 10)
         monkeypatch.setattr("time.monotonic_ns", lambda n=now: n - guard._offset)
         guard.heard()
         guard.promise(now)
         guard.read()
-    assert guard.faults == (() if told == "all" else (READINGS_OLD,))
+    assert guard.faults == (() if states == "all" else (READINGS_OLD,))
     guard.close()
 
 
@@ -525,7 +525,7 @@ def test_a_driver_that_does_not_return_is_stopped_and_named(call):
     guard.close()
 
 
-def test_what_stops_one_ankle_stops_both_and_the_dose_is_of_both():
+def test_whatever_stops_one_ankle_stops_both_and_they_share_a_dose():
     limits, dose = DeviceLimits(session_pulses=11), Dose()
     drivers = {side: RecordingRobot(side) for side in Side}
     left, right = (GuardedRobot(driver, s, limits, dose) for s, driver in drivers.items())

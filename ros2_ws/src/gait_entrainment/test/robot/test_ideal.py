@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The ideal ankle robot: its promises tell the commanded pulses, however they are cut."""
+"""The ideal ankle robot: its promises give the commanded pulses, however they are cut."""
 
 import itertools
 import math
@@ -36,14 +36,14 @@ def ideal_robot(start=0, limits=None):
     return robot
 
 
-def torque_at(profiles, instant):
-    """Torque that adjoining profiles promise for an instant, straight from their definition."""
+def torque_at(profiles, stamp):
+    """Torque that adjoining profiles promise for a stamp, straight from their definition."""
     for profile in profiles:
-        if profile.times[0] <= instant < profile.valid_until:
+        if profile.times[0] <= stamp < profile.valid_until:
             return [
                 torque
                 for time, torque in zip(profile.times, profile.torques, strict=True)
-                if time <= instant
+                if time <= stamp
             ][-1]
     raise AssertionError("not promised")
 
@@ -56,7 +56,7 @@ def torque_at(profiles, instant):
     duration=st.floats(0.001, 0.1),
     probes=st.lists(st.integers(0, 12 * SECOND - 1), min_size=5, max_size=20),
 )
-def test_promises_tell_the_pulses_however_they_are_cut(cuts, first, period, duration, probes):
+def test_promises_give_the_pulses_however_they_are_cut(cuts, first, period, duration, probes):
     robot = ideal_robot(limits=DeviceLimits(duty=1.0, impulse=1e3))
     pulses = train(first_onset=first, period=period, duration=duration)
     robot.schedule(pulses)
@@ -68,11 +68,11 @@ def test_promises_tell_the_pulses_however_they_are_cut(cuts, first, period, dura
         )
         for n in range(4)
     ]
-    # Both sides of every edge, where a cut could go wrong, and instants anywhere.
+    # Both sides of every edge, where a cut could go wrong, and stamps anywhere.
     edges = [edge + d for span in spans for edge in span for d in (-1, 0)]
-    for instant in [*probes, *(e for e in edges if 0 <= e < 12 * SECOND)]:
-        on = any(begin <= instant < end for begin, end in spans)
-        assert torque_at(profiles, instant) == (13.0 if on else 0.0)
+    for stamp in [*probes, *(e for e in edges if 0 <= e < 12 * SECOND)]:
+        on = any(begin <= stamp < end for begin, end in spans)
+        assert torque_at(profiles, stamp) == (13.0 if on else 0.0)
     promised = [onset for profile in profiles for onset in profile.onsets]
     assert promised == [begin for begin, _ in spans if begin < 12 * SECOND]
     for before, after in itertools.pairwise(profiles):
@@ -101,7 +101,7 @@ def test_onsets_are_rounded_from_the_first_one():
         ({"first_onset": 1}, "already promised"),
     ],
 )
-def test_what_it_must_not_deliver_is_refused_and_changes_nothing(changes, words):
+def test_a_forbidden_train_is_refused_and_changes_nothing(changes, words):
     robot = ideal_robot()
     robot.promise(SECOND)
     with pytest.raises(LimitError, match=words):
@@ -117,7 +117,7 @@ def test_first_pulses_rise_in_equal_steps():
     assert heights == [-3.0, -6.0, -9.0, -12.0, -12.0, -12.0]
 
 
-def test_a_train_follows_another():
+def test_one_train_follows_another():
     robot, first, second = ideal_robot(), train(), train(first_onset=11 * SECOND, torque=6.0)
     robot.schedule(first)
     with pytest.raises(LimitError, match="overlap"):
@@ -129,7 +129,7 @@ def test_a_train_follows_another():
     assert [torque for torque in profile.torques if torque] == [13.0] * 2 + [6.0] * 4
 
 
-def test_nothing_is_delivered_after_cancelling():
+def test_nothing_is_delivered_after_a_cancel():
     robot = ideal_robot()
     robot.schedule(train())
     robot.promise(3 * SECOND + 1)

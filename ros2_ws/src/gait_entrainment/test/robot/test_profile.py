@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A torque profile: its pieces, and how it breaks its contract."""
+"""A torque profile: its pieces, and breaches of its contract."""
 
 import math
 

@@ -33,7 +33,7 @@ SHAPES = st.one_of(
 )
 
 
-def made(torque, duration, shape):
+def make_pulse(torque, duration, shape):
     """A pulse at 0; the flanks of a trapezoid are given as shares of its duration."""
     scaled = {k: v * duration if k in ("rise", "fall") else v for k, v in shape.items()}
     return Pulse(0, torque, duration, **scaled)
@@ -54,7 +54,7 @@ def definition(pulse, t):
 @settings(derandomize=True, deadline=None, max_examples=60)
 @given(shape=SHAPES, torque=st.sampled_from([-8.0, 13.0]), duration=st.floats(0.02, 0.4))
 def test_torque_impulse_and_slope_are_those_of_the_shape(shape, torque, duration):
-    pulse = made(torque, duration, shape)
+    pulse = make_pulse(torque, duration, shape)
     stamps = np.linspace(0, pulse.end - 1, 4001).astype(int)
     torques = np.array([pulse.torque_at(int(stamp)) for stamp in stamps])
     assert torques == pytest.approx(definition(pulse, stamps / 1e9), abs=1e-6 * abs(torque))
@@ -76,16 +76,16 @@ def test_the_ideal_robot_keeps_the_bounds_of_its_steps(shape, duration, rate, cu
     robot.configure()
     robot.activate()
     robot.begin(0)
-    pulse = made(10.0, duration, shape)
+    pulse = make_pulse(10.0, duration, shape)
     robot.schedule(PulseTrain(Side.LEFT, (pulse,)))
     pieces = [p for until in (cut, 500 * MS) for p in robot.promise(until).pieces]
     for begin, end, torque in pieces:
         fine = np.linspace(begin, min(end, begin + round(1e9 / rate)), 7)[:-1] / 1e9
-        asked = np.where(fine < duration, definition(pulse, fine), 0.0)
-        assert np.abs(asked - torque).max() <= pulse.steepest * (0.5 / rate + 1e-9) + 1e-9
+        requested = np.where(fine < duration, definition(pulse, fine), 0.0)
+        assert np.abs(requested - torque).max() <= pulse.steepest * (0.5 / rate + 1e-9) + 1e-9
     impulse = sum(torque * (end - begin) / 1e9 for begin, end, torque in pieces)
-    # Of a kink of slope s a step of length h is wrong by s h^2 / 8 at most; of curvature c by
-    # c h^3 / 24.
+    # A step of length h is wrong by at most s h^2 / 8 at a kink of slope s, and by c h^3 / 24 at
+    # a curvature c.
     kinks = 2 * pulse.steepest * (len(SHARES) + 1) / rate**2 / 8
     curvature = 10.0 * (math.pi / duration) ** 2 * duration / rate**2 / 24
     assert abs(impulse - pulse.impulse) <= kinks + curvature
@@ -150,6 +150,6 @@ def test_each_pulse_begins_and_ends_at_its_nanosecond(first, period, number, sha
         ({"shape": Shape.SAMPLES, "samples": (0.0, 1.1)}, "samples"),
     ],
 )
-def test_a_shape_that_cannot_be_is_refused(shape, words):
+def test_an_impossible_shape_is_refused(shape, words):
     with pytest.raises(LimitError, match=words):
         DeviceLimits().check_pulse(Pulse(0, 5.0, 0.1, **shape))

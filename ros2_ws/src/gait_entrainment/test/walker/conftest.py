@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Lets these tests import the independent references beside them."""
+"""Lets these tests import the independent references next to them."""
 
 import sys
 from pathlib import Path

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Short ways to drive a walker, for the tests beside."""
+"""Shorthands for driving a walker, for the tests next to this file."""
 
 import numpy as np
 from hypothesis import strategies as st

@@ -18,10 +18,10 @@ from scipy.integrate import solve_ivp
 Pulse = tuple[float, float, float]
 """Onset [s], end [s], torque [N m]."""
 
-# Tighter than the 1e-9 s that is compared: near a stall an error grows a thousandfold.
+# Tighter than the 1e-9 s that is compared, because near a stall errors grow a thousandfold.
 TOLERANCE = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-14, "max_step": 0.01}
 
-# Perturbation that has taken all torque from the ankle, which only pushes.
+# Perturbation that has taken all torque from the ankle, which can only push.
 UNLOADED = None
 
 
@@ -45,7 +45,7 @@ class Table1:
         return np.arccos(numerator / (2 * self.L * self.l))
 
     def phi(self, theta):
-        # The paper prints an arctangent; with atan2 it also holds where AC leans past the toe.
+        # The paper prints an arctangent; with atan2 it also holds if AC leans past the toe.
         base = 2 * self.L * math.sin(self.alpha) - self.l - self.L * np.sin(theta)
         return np.arctan2(self.L * np.cos(theta), base)
 
@@ -79,7 +79,7 @@ class Table1:
 
 
 class WithoutKink(Table1):
-    """The same between two kinks: none of the integrator's steps may straddle one."""
+    """The same between two kinks, because no integrator step may straddle one."""
 
     def torque(self, theta, perturbation):
         if perturbation is UNLOADED:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The step-to-step function, by the walker's own transitions, in exact instants."""
+"""The step-to-step function, by the walker's own transitions, at exact times."""
 
 from typing import NamedTuple
 
@@ -24,12 +24,12 @@ from gait_entrainment.walker.transitions import (
 
 
 class Step(NamedTuple):
-    """What the step-to-step function gives; NaN where the walker falls or flies off."""
+    """Result of the step-to-step function; NaN if the walker falls or flies off."""
 
     speed: Floats
     """Speed of the mass right after the next heel strike [m/s]."""
     duration: Floats
-    """Time to it [s]."""
+    """Time to that heel strike [s]."""
 
 
 def step_to_step(

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How a run is asked for must not change a bit of it."""
+"""However a run is requested, its result is the same, bit for bit."""
 
 from itertools import pairwise
 
@@ -19,7 +19,7 @@ CUTS = st.lists(st.integers(1, RUN - 1), max_size=30, unique=True)
 TORQUES = st.floats(-150, 60)
 
 
-def whole(pulses, grid):
+def walk_uncut(pulses, grid):
     walker = Walker(TABLE_1)
     promise(walker, pulses, RUN)
     events = walker.advance(RUN)
@@ -33,9 +33,9 @@ def pieces(pulses, begin, end):
     return borders, [float(torque) for torque in level]
 
 
-def same(one, other):
-    for name in vars(one):
-        a, b = getattr(one, name), getattr(other, name)
+def assert_same(first, second):
+    for name in vars(first):
+        a, b = getattr(first, name), getattr(second, name)
         assert np.array_equal(a, b), name
 
 
@@ -43,12 +43,12 @@ def same(one, other):
 @given(left=pulse_trains(TORQUES), right=pulse_trains(TORQUES), cuts=CUTS, data=st.data())
 def test_cutting_promises_and_advances_changes_nothing(left, right, cuts, data):
     grid = np.arange(0, RUN, 37_000_017)
-    reference, events, samples = whole((left, right), grid)
+    reference, events, samples = walk_uncut((left, right), grid)
 
     walker, cut_events, cut_samples, begin = Walker(TABLE_1), [], [], 0
     for end in [*sorted(cuts), RUN]:
         for side, train in zip(Side, (left, right), strict=True):
-            # Promises run ahead of the walk by different stretches, cut at different places.
+            # Promises run ahead of the walk by different times, cut at different places.
             ahead = data.draw(st.sampled_from([0, 1, 10_000_000, 900_000_000]))
             until = max(walker._promises[side].valid_until, min(RUN, end + ahead))
             since = walker._promises[side].valid_until
@@ -65,10 +65,10 @@ def test_cutting_promises_and_advances_changes_nothing(left, right, cuts, data):
         assert np.array_equal(joined, getattr(samples, name)), name
 
 
-def test_a_promise_that_ends_where_the_walk_stops_is_no_switch():
+def test_a_promise_that_ends_where_the_walk_stops_is_not_a_switch():
     """Torque zero past a promise is provisional until it has been walked through."""
     train = [(0, RUN - 1, 7.0)]
-    _, events, _ = whole(((), train), np.empty(0, np.int64))
+    _, events, _ = walk_uncut(((), train), np.empty(0, np.int64))
     walker, cut_events = Walker(TABLE_1), []
     for begin in range(0, RUN, 20_000_000):
         walker.extend_torque(Side.RIGHT, [begin], [7.0], begin + 20_000_000)
@@ -80,10 +80,10 @@ def test_a_promise_that_ends_where_the_walk_stops_is_no_switch():
 @given(right=pulse_trains(TORQUES), order=st.randoms(use_true_random=False))
 def test_a_sample_does_not_depend_on_the_others(right, order):
     grid = np.arange(0, RUN, 61_000_003)
-    walker, _, samples = whole(((), right), grid)
+    walker, _, samples = walk_uncut(((), right), grid)
     shuffled = list(range(samples.leading.size))
     order.shuffle(shuffled)
-    same(
+    assert_same(
         walker.sample(grid[shuffled]),
         type(samples)(**{name: value[shuffled] for name, value in vars(samples).items()}),
     )
@@ -96,7 +96,7 @@ def test_a_sample_does_not_depend_on_the_others(right, order):
 @given(right=pulse_trains(st.floats(-5, 25)))
 def test_equal_neighbours_are_merged(right):
     """A profile that repeats its torque piece by piece is the profile without the repeats."""
-    _, events, _ = whole(((), right), np.empty(0, np.int64))
+    _, events, _ = walk_uncut(((), right), np.empty(0, np.int64))
     walker = Walker(TABLE_1)
     borders, torques = pieces(right, 0, RUN)
     fine = sorted({*borders, *range(0, RUN, 10_000_000)})
@@ -105,7 +105,7 @@ def test_equal_neighbours_are_merged(right):
     assert walker.advance(RUN) == events
 
 
-def test_events_are_told_once_and_by_their_stamps():
+def test_events_are_returned_once_when_their_stamps_are_reached():
     walker = Walker(TABLE_1)
     first = walker.advance(0)
     assert [(e.kind, e.step, e.stamp, e.side) for e in first] == [(0, 0, 0, Side.RIGHT)]

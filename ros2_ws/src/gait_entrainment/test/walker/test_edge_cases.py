@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The edge cases of the torque, and the reported ends of a walk."""
+"""Edge cases of the torque, and the reported ends of a walk."""
 
 import math
 from types import SimpleNamespace
@@ -47,7 +47,7 @@ def test_the_rest_of_a_pulse_after_toe_off_does_nothing():
     assert heel_strikes(short)[2] < 2 * PERIOD
 
 
-def test_a_pulse_begun_in_single_stance_acts_from_heel_strike_on():
+def test_a_pulse_that_begins_in_single_stance_acts_from_heel_strike_on():
     _, before = walked(right_pulse(0.6, PERIOD + 0.1, 13.0))
     _, again = walked(right_pulse(PERIOD - 0.01, PERIOD + 0.1, 13.0))
     assert before == again
@@ -56,13 +56,13 @@ def test_a_pulse_begun_in_single_stance_acts_from_heel_strike_on():
     assert heel_strikes(before)[2] < 2 * PERIOD - 0.01
 
 
-def test_a_pulse_begun_in_its_legs_leading_double_stance_waits_for_it_to_trail():
+def test_a_pulse_that_begins_while_its_leg_leads_waits_for_it_to_trail():
     _, events = walked(right_pulse(0.1, PERIOD + 0.1, 13.0))
     _, at_strike = walked(right_pulse(PERIOD - 0.01, PERIOD + 0.1, 13.0))
     assert events == at_strike
 
 
-def test_pulses_on_both_legs_each_act_on_their_own():
+def test_pulses_on_both_legs_each_act_on_their_own_leg():
     left, right = (ns(0.1), ns(0.2), 13.0), (ns(PERIOD), ns(PERIOD + 0.1), 13.0)
     _, events = walked(((left,), (right,)), 2.0)
     _, only_left = walked(((left,), ()), 2.0)
@@ -109,7 +109,7 @@ def test_a_negative_pulse_larger_than_the_spring_unloads_the_foot_until_it_ends(
     assert np.all(s.force[after, Side.RIGHT] > 0)
 
 
-def test_a_negative_pulse_unloads_only_from_where_the_spring_is_weaker():
+def test_a_negative_pulse_unloads_only_once_the_spring_is_weaker():
     """k (mu - psi) = 20 N m is crossed within the pulse: the torque goes to zero there."""
     walker, events = walked(right_pulse(PERIOD + 0.15, PERIOD + 0.5, -20.0), 3.0)
     toe_off = events[3]
@@ -176,7 +176,7 @@ def test_fall_in_single_stance():
     assert "J were missing" in ending.message
 
 
-def test_fall_in_double_stance_by_a_negative_pulse():
+def test_fall_in_double_stance_under_a_negative_pulse():
     """Without push-off the mass climbs as far as its kinetic energy carries it."""
     rate = TABLE_1.speed_after_collision
     walker, events = walked((((0, SECOND, -1000.0),), ()), 5.0)
@@ -191,13 +191,13 @@ def test_fall_in_double_stance_by_a_negative_pulse():
     assert ending.missing == pytest.approx(missing, rel=1e-9)
 
 
-def test_fly_off_at_once_by_a_large_pulse():
+def test_fly_off_at_the_onset_of_a_large_pulse():
     walker, _ = walked((((ns(0.1), ns(0.2), 120.0),), ()), 5.0)
     ending = walker.ending
     assert (ending.kind, ending.stance) == (EndingKind.FLY_OFF, Stance.DOUBLE)
     assert ending.time == pytest.approx(0.1, abs=1e-12)
     assert ending.side == Side.RIGHT
-    # Right before the pulse the leg still carries what the pulse takes off it.
+    # Right before the pulse the leg still carries the force that the pulse takes off it.
     before = walker.sample(np.array([ns(0.1)]))
     theta, _ = leg_angle(before)
     psi = before.position[0, 2] + math.pi / 2
@@ -208,8 +208,8 @@ def test_fly_off_at_once_by_a_large_pulse():
     assert "flew off in double stance" in ending.message
 
 
-def test_fly_off_in_between_by_a_pulse_that_is_just_too_large():
-    """The force dips through zero within a segment, where no event and no change is."""
+def test_fly_off_within_a_segment_under_a_pulse_that_is_just_too_large():
+    """The force dips through zero within a segment, away from events and torque changes."""
     long_feet = WalkerParameters(
         leg_angle=0.52, foot_length=0.405, max_plantarflexion=2.79, ankle_stiffness=110.0
     )
@@ -225,22 +225,22 @@ def test_fly_off_in_between_by_a_pulse_that_is_just_too_large():
             low = middle
         else:
             high = middle
-    # The last torque that is walked through leaves no force at some instant in between.
+    # The largest torque that is walked through leaves no force at some time in between.
     walker, events = attempt(low)
     grid = np.arange(onset + 1, events[1].stamp, MILLISECOND // 50)
     force = walker.sample(grid).force[:, Side.RIGHT]
-    instant = grid[np.argmin(force)]
+    dip = grid[np.argmin(force)]
     assert force.min() == pytest.approx(0, abs=1e-4)
-    assert onset + MILLISECOND < instant < events[1].stamp - MILLISECOND
+    assert onset + MILLISECOND < dip < events[1].stamp - MILLISECOND
     ending = attempt(high)[0].ending
     assert (ending.kind, ending.stance) == (EndingKind.FLY_OFF, Stance.DOUBLE)
-    assert ending.time * SECOND == pytest.approx(instant, abs=MILLISECOND)
+    assert ending.time * SECOND == pytest.approx(dip, abs=MILLISECOND)
     assert 0 <= ending.missing < 1e-6
 
 
 @pytest.mark.parametrize("torque", [0.0, 5.0, 20.0, 30.0, 60.0, -20.0])
 def test_fly_off_at_the_speed_where_the_leading_leg_has_no_force_left(torque):
-    """Both where bounds clear a segment without a search and where they do not."""
+    """Both if bounds clear a segment without a search and if they do not."""
     p = TABLE_1
     pulse = (((0, ns(0.05), torque),), ())
     arm = (1 - 0.8 * math.sin(p.leg_angle)) / (0.2 * math.cos(p.leg_angle))
@@ -254,7 +254,7 @@ def test_fly_off_at_the_speed_where_the_leading_leg_has_no_force_left(torque):
     assert ending.missing == pytest.approx(1.0, rel=1e-6)
 
 
-def test_fly_off_in_single_stance_where_gravity_no_longer_holds():
+def test_fly_off_in_single_stance_once_gravity_no_longer_holds():
     """A fast walker whose push-off is held back at first, when it would lift the leg."""
     p = TABLE_1
     walker, events = walked((((0, ns(0.09), -1000.0),), ()), 2.0, initial_speed=math.sqrt(8.4))
@@ -271,7 +271,7 @@ def test_fly_off_in_single_stance_where_gravity_no_longer_holds():
     assert at_end.force[0, Side.RIGHT] == pytest.approx(0, abs=1e-5)
 
 
-def test_a_walk_that_ended_tells_no_more_events():
+def test_a_walk_that_has_ended_returns_no_more_events():
     walker, _ = walked(seconds=60.0, initial_speed=0.2)
     assert walker.time_reached == walker.ending.stamp
     assert walker.advance(61 * SECOND) == []
@@ -287,7 +287,7 @@ def test_slow_start_with_late_toe_off_falls_in_double_stance():
     assert len(events) == 1
 
 
-def test_step_to_step_is_nan_where_the_walker_falls():
+def test_step_to_step_is_nan_if_the_walker_falls():
     step = step_to_step(TABLE_1, [0.2, 0.9], 0.0, 0.1, 0.0)
     assert np.isnan(step.speed).tolist() == [True, False]
     assert np.isnan(step.duration).tolist() == [True, False]
@@ -304,7 +304,7 @@ def test_a_start_at_almost_no_speed_takes_few_panels(monkeypatch, torque):
     """
     Near alpha = pi / 4 the collision leaves a speed whose square is mostly rounding.
 
-    No panel over that converges, and none so narrow: halving them went down to 1e-12 rad.
+    No panel over it converges, however narrow: they used to be halved down to 1e-12 rad.
     """
     parameters = WalkerParameters(
         mass=7.5,
@@ -320,7 +320,7 @@ def test_a_start_at_almost_no_speed_takes_few_panels(monkeypatch, torque):
     walker.advance(SECOND // 10)
     last = walker._log[walker._count - 1]
     assert (last["ends"] == segment.Switch.FALL) == (torque < 0)
-    # The loop as it is written, not compiled, so that its panels can be counted.
+    # The loop in Python, not compiled, so that its panels can be counted.
     fields = SimpleNamespace(**{name: last[name] for name in last.dtype.names})
     calls = []
 

@@ -63,7 +63,7 @@ def test_smallest_force_of_the_leading_leg_is_at_the_start_of_double_stance():
 
 
 def compare(parameters, pulses, speed):
-    """Events up to the end of either walk, and the end itself, within the tolerance."""
+    """Check events up to the end of either walk, and the end itself, within the tolerance."""
     rate = None if speed is None else -speed / parameters.leg_length
     reference = walk(paper_form(parameters), in_seconds(pulses), Side.RIGHT, STEPS, rate)
     walker, events = walked(pulses, 40.0, parameters, initial_speed=speed)
@@ -80,7 +80,7 @@ def compare(parameters, pulses, speed):
         assert ending.kind == reference.ending
         assert len(heel_strikes(events)) == strikes
         assert len(toe_offs(events)) == offs
-        # Where the walker stops, the reference finds the instant no better than this.
+        # If the walker stops, the reference finds the time no better than this.
         assert ending.time == pytest.approx(reference.end_time, abs=1e-7)
         assert ending.angle == pytest.approx(reference.end_angle, abs=1e-7)
 

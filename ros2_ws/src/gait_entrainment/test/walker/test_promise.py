@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Promises of torque: what is refused, late, provisional, cut."""
+"""Promises of torque: refused, late, provisional and cut ones."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ def test_without_a_promise_the_torque_is_zero():
     assert walker.valid_until == 0
 
 
-def test_valid_until_is_what_is_promised_for_both_ankles():
+def test_valid_until_is_the_time_promised_for_both_ankles():
     walker = Walker(TABLE_1)
     walker.extend_torque(Side.RIGHT, [0], [0.0], 5)
     assert walker.valid_until == 0
@@ -39,7 +39,7 @@ def test_a_gap_between_promises_is_zero_torque():
     assert delivered(walker, 5, 10, 11, 20, 21, 30, 31) == [5, 5, 0, 0, 5, 5, 0]
 
 
-def test_a_promise_that_comes_late_acts_from_where_the_walker_is():
+def test_a_late_promise_acts_from_where_the_walker_is():
     walker = Walker(TABLE_1)
     walker.advance(ONSET + 100)
     late = walker.extend_torque(Side.RIGHT, [ONSET - 50, ONSET + 150], [7.0, 8.0], END)
@@ -50,7 +50,7 @@ def test_a_promise_that_comes_late_acts_from_where_the_walker_is():
     assert walker.extend_torque(Side.RIGHT, [END + 1], [1.0], END + 2) == 1
 
 
-def test_a_promise_that_is_over_when_it_comes_changes_nothing():
+def test_a_promise_that_is_over_when_it_arrives_changes_nothing():
     walker = Walker(TABLE_1)
     walker.advance(END)
     assert walker.extend_torque(Side.RIGHT, [0], [50.0], ONSET) == ONSET
@@ -58,7 +58,7 @@ def test_a_promise_that_is_over_when_it_comes_changes_nothing():
     assert delivered(walker, END, END + 1) == [0, 0]
 
 
-def test_stop_voids_what_was_promised_on_both_ankles():
+def test_stop_voids_the_promises_of_both_ankles():
     walker = Walker(TABLE_1)
     for side in Side:
         walker.extend_torque(side, [0, ONSET, END], [1.0, 9.0, 2.0], 3 * SECOND)
@@ -68,13 +68,13 @@ def test_stop_voids_what_was_promised_on_both_ankles():
     walker.advance(2 * SECOND)
     s = walker.sample(np.array([ONSET, ONSET + 1, ONSET + 1000, ONSET + 1001, END + 1]))
     assert s.delivered_torque.tolist() == [[1, 1], [9, 9], [9, 9], [0, 0], [0, 0]]
-    # From the stop on torque can be promised anew.
+    # After the stop, torque can be promised again.
     assert walker.extend_torque(Side.LEFT, [2 * SECOND], [3.0], 3 * SECOND) == pytest.approx(
         SECOND - 1000
     )
 
 
-def test_stop_does_not_reach_into_what_has_been_walked():
+def test_stop_does_not_change_what_has_been_walked():
     walker = Walker(TABLE_1)
     walker.extend_torque(Side.RIGHT, [0], [4.0], 3 * SECOND)
     walker.advance(SECOND)

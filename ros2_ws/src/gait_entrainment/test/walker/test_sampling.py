@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Samples: postures, velocities, torques, forces and energy of the walker in between events."""
+"""Samples: postures, velocities, torques, forces and energy of the walker between events."""
 
 import math
 from itertools import pairwise
@@ -44,7 +44,7 @@ def test_forces_are_those_of_the_paper(parameters, left, right):
     row = np.arange(theta.size)
     both = s.double_stance
     pulse = s.delivered_torque[row, 1 - s.leading]
-    # The linkage is only there in double stance.
+    # The linkage exists only in double stance.
     closed = np.where(both, theta, paper.alpha)
     trailing = paper.trailing_force(closed, paper.torque(closed, pulse))
     assert s.force[row, 1 - s.leading][both] == pytest.approx(trailing[both], rel=1e-7, abs=1e-6)
@@ -93,7 +93,7 @@ def test_energy_changes_by_the_work_of_the_torque_alone(parameters, left, right)
         swing = np.flatnonzero(inside & ~s.double_stance)
         assert np.ptp(energy[swing]) < 1e-10
         work = np.sum(0.5 * (effort[stance][1:] + effort[stance][:-1]) * np.diff(psi[stance]))
-        # The trapezia miss where a pulse begins or ends between two samples, and the bend where
+        # The trapezia miss edges of pulses between two samples, and the bend where
         # the ankle, which can only push, stops pushing.
         widest = np.diff(psi[stance]).max()
         jumps = np.abs(np.diff(s.delivered_torque[stance][:, 1 - s.leading[stance[0]]])).sum()
@@ -152,7 +152,7 @@ def test_a_sample_shows_the_torque_up_to_its_own_stamp():
     assert s.delivered_torque[:, Side.LEFT].tolist() == [0, 0, 0, 0]
 
 
-def test_instants_outside_the_last_stretch_are_refused():
+def test_times_outside_the_last_stretch_are_refused():
     walker = Walker(TABLE_1)
     walker.advance(SECOND)
     walker.advance(2 * SECOND)

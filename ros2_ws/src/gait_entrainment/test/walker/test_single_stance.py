@@ -48,7 +48,7 @@ def test_pendulum_time_is_the_integral(apex, first, last):
     assert pendulum_time(PER_DROP, apex, start, end) == pytest.approx(float(exact), rel=1e-12)
 
 
-def test_pendulum_time_over_nothing_is_zero():
+def test_pendulum_time_over_no_distance_is_zero():
     assert pendulum_time(PER_DROP, 1.0, 0.3, 0.3) == 0.0
 
 

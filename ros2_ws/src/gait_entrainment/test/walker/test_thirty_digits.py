@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Event times to 1e-13 s, against 32-digit integration."""
+"""Event times to 1e-13 s, compared with 32-digit integration."""
 
 from types import SimpleNamespace
 
@@ -22,13 +22,13 @@ def walk(steps, onsets=(), width=0, torque=0.0):
 
 
 def edges_of(events, onsets, width, torque):
-    """Where in each step of the right leg's double stance the torque changes, exactly."""
+    """Exact times at which the torque changes in each double stance of the right leg."""
     edges = {}
     for step in range(1, events.toe_offs.size, 2):
         start, end = events.heel_strikes[step], events.toe_offs[step]
         for onset in onsets:
             for stamp, level in ((onset, torque), (onset + width, 0.0)):
-                # Exact instants, and the changes in single stance left out.
+                # Changes in single stance are left out.
                 if start < stamp / SECOND < end:
                     edges.setdefault(step, []).append((mpf(int(stamp)) / SECOND, level))
             if onset / SECOND <= start < (onset + width) / SECOND:

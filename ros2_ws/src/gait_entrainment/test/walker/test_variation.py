@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A walker that varies: as much as asked, the same however it is driven, and seeded."""
+"""A walker that varies: as much as requested, the same however it is driven, and seeded."""
 
 from dataclasses import replace
 
@@ -29,19 +29,19 @@ def strides_of(walker, until):
 
 
 @pytest.mark.parametrize(
-    ("body", "asked", "exponent"), [(BODY, 0.02, 0.5), (BODY, 0.01, 0.75), (OTHER, 0.03, 0.6)]
+    ("body", "requested", "exponent"), [(BODY, 0.02, 0.5), (BODY, 0.01, 0.75), (OTHER, 0.03, 0.6)]
 )
-def test_strides_vary_as_much_as_asked(body, asked, exponent):
-    walker = Walker(body, variation=Variation(asked, exponent), seed=2)
+def test_strides_vary_as_much_as_requested(body, requested, exponent):
+    walker = Walker(body, variation=Variation(requested, exponent), seed=2)
     periods = strides_of(walker, 2400 * SECOND)
     assert periods.size > 1200
-    # A record of n strides varies less than the process: by n^(2H - 2) of its variance.
-    expected = asked * np.sqrt(1 - periods.size ** (2 * exponent - 2))
-    # Of 1200 strides the figure itself is known to 1 / sqrt(2 n), 2 %; long-range less well.
+    # A record of n strides has less variance than the process, by a share of n^(2H - 2).
+    expected = requested * np.sqrt(1 - periods.size ** (2 * exponent - 2))
+    # From 1200 strides the figure is known to 1 / sqrt(2 n), or 2 %; less well if long-range.
     assert periods.std() / periods.mean() == pytest.approx(expected, rel=0.08)
 
 
-def test_neighbours_resemble_each_other_with_the_exponent():
+def test_neighbouring_strides_correlate_with_the_exponent():
     def correlation(exponent):
         walker = Walker(BODY, variation=Variation(0.01, exponent), seed=5)
         periods = strides_of(walker, 2000 * SECOND)[5:]
@@ -53,10 +53,10 @@ def test_neighbours_resemble_each_other_with_the_exponent():
 
 
 def test_cuts_change_neither_events_nor_samples():
-    whole, cut = (Walker(BODY, variation=Variation(0.05), seed=1) for _ in range(2))
-    events = whole.advance(9 * SECOND)
+    uncut, cut = (Walker(BODY, variation=Variation(0.05), seed=1) for _ in range(2))
+    events = uncut.advance(9 * SECOND)
     times = np.arange(0, 9 * SECOND, SECOND // 40)
-    samples = whole.sample(times)
+    samples = uncut.sample(times)
     found, torques = [], []
     for end in (1, 1_234_567_890, 1_234_567_891, 5 * SECOND, 9 * SECOND):
         begin = cut.time_reached
@@ -81,7 +81,7 @@ def test_each_push_off_has_its_own_stiffness():
     assert np.mean(stiffness) == pytest.approx(BODY.ankle_stiffness, rel=0.2)
 
 
-def test_seeds_differ_and_nothing_asked_is_the_papers_gait():
+def test_seeds_differ_and_no_variation_gives_the_papers_gait():
     protocol = replace(
         DEFAULT_PROTOCOL, baseline=4, pulses=replace(DEFAULT_PROTOCOL.pulses, count=3)
     )
@@ -92,7 +92,7 @@ def test_seeds_differ_and_nothing_asked_is_the_papers_gait():
     assert first == again != other
 
 
-def test_a_walker_that_varies_too_much_falls_and_says_so():
+def test_a_walker_that_varies_too_much_falls_and_reports_it():
     walker = Walker(BODY, variation=Variation(0.2, 0.5))
     walker.advance(600 * SECOND)
     assert walker.ending is not None

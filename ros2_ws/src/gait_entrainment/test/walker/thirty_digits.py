@@ -16,7 +16,7 @@ mp.dps = 32
 
 
 class Reference:
-    """Walks with torque constant between given instants, far from a stall."""
+    """Walks with torque constant between given times, far from a stall."""
 
     def __init__(self):
         # Table 1: the doubles that the walker is given, exactly.
@@ -33,7 +33,7 @@ class Reference:
         )
 
     def work(self, pulse, start, end):
-        """Work of max(0, spring + pulse): nothing once a negative pulse has unloaded the foot."""
+        """Work of max(0, spring + pulse): none once a negative pulse has unloaded the foot."""
         end = max(start, min(end, self.mu + min(pulse, mpf(0)) / self.k))
         return (end - start) * (self.k * (self.mu - (end + start) / 2) + pulse)
 
@@ -57,9 +57,9 @@ class Reference:
 
     def walk(self, steps, edges):
         """
-        Heel strikes and toe-offs; edges[i] = [(instant, torque from then on), ...] for step i.
+        Heel strikes and toe-offs; edges[i] = [(time, torque from then on), ...] for step i.
 
-        The instants are mpf seconds in the double stance that begins step i; None is its start.
+        The times are mpf seconds in the double stance that begins step i; None is its start.
         """
         lift = self.m * self.g * self.L * cos(self.alpha)
         c2 = cos(2 * self.alpha) ** 2
@@ -69,18 +69,18 @@ class Reference:
         for step in range(steps):
             energy = kinetic + lift
             psi, pulse, since = self.psi_0, mpf(0), now
-            for instant, torque in edges.get(step, []):
-                if instant is None:
+            for edge, torque in edges.get(step, []):
+                if edge is None:
                     pulse = mpf(torque)
                     continue
-                span = instant - since
+                span = edge - since
 
                 def late(x, energy=energy, psi=psi, pulse=pulse, span=span):
                     return self.time(energy, pulse, psi, x) - span
 
                 place = findroot(late, (psi + span * 4, psi + span * 5), tol=mpf(10) ** -56)
                 energy += self.work(pulse, psi, place)
-                psi, pulse, since = place, mpf(torque), instant
+                psi, pulse, since = place, mpf(torque), edge
             now = since + self.time(energy, pulse, psi, self.mu)
             energy += self.work(pulse, psi, self.mu)
             offs.append(now)
