@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A study's plan, checked against known results and the Monte Carlo of the verdict."""
+"""Study planning, checked against known results and the Monte Carlo of the verdict."""
 
 import numpy as np
 import pytest

@@ -101,7 +101,7 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(("old", "new", "line", "message"), MISTAKES)
-def test_a_mistake_is_one_message_with_file_line_and_field(write, old, new, line, message):
+def test_a_mistake_is_one_line_naming_file_line_and_field(write, old, new, line, message):
     path = write((old, new))
     with pytest.raises(SessionError) as error:
         read_session(path)

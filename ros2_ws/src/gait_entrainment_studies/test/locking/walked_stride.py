@@ -31,7 +31,7 @@ def walk_a_stride(parameters, speed, onset, torque, width):
         if walker.ending is not None or walker.time_reached > FAR // 10:
             return None
         strikes += [e for e in events if e.kind is EventKind.HEEL_STRIKE and e.step > 0]
-    # The energy in the preceding single stance gives the speed without rounding of time.
+    # The energy in the preceding single stance gives the speed, unaffected by rounded times.
     begin = walker.time_reached - 10**8
     stamps = np.arange(begin, strikes[1].stamp, 10**6, dtype=np.int64)
     if not stamps.size:
