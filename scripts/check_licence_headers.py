@@ -9,7 +9,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 HEADER = Path(__file__).read_text(encoding="utf-8").partition("\n\n")[0] + "\n"
-# Python, launch files among it; shell; CMake, make and Docker.
+# Python, including launch files; shell; CMake, make and Docker.
 PROGRAMS = (
     "*.py",
     "*.sh",
@@ -21,12 +21,12 @@ PROGRAMS = (
     ".ci/*",
     "*/scripts/entrain",
 )
-# What must be the first line of a file to have its meaning.
+# Lines that have their meaning only as the first line of a file.
 FIRST_LINES = ("#!", "# syntax=")
 
 
 def has_header(path: Path) -> bool:
-    """Tell whether a file begins with the header, or is empty."""
+    """Return whether a file begins with the header or is empty."""
     text = path.read_text(encoding="utf-8")
     if text.startswith(FIRST_LINES):
         text = text.partition("\n")[2]
@@ -34,7 +34,7 @@ def has_header(path: Path) -> bool:
 
 
 def main() -> int:
-    """Name each tracked or new program without the header; return the exit code."""
+    """Print each tracked or new program without the header; return the exit code."""
     listed = subprocess.run(
         ["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z", "--"]
         + [f":(glob)**/{pattern}" for pattern in PROGRAMS],

@@ -68,7 +68,7 @@ def long_functions(text: str) -> Iterator[tuple[int, str, int]]:
 
 
 def main() -> int:
-    """Name what is too long, each in one line; return the exit code."""
+    """Print what is too long, one line each; return the exit code."""
     found, totals = [], Counter[str]()
     for name in modules():
         text = (SOURCES / name).read_text(encoding="utf-8")

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Compile the walker, so that nobody who uses it waits for that.
+Compile the walker, so that its users do not have to wait for it.
 
-The machine code is kept beside the sources (gait_entrainment.walker.compiled), that of earlier
-sources is removed. The default experiment takes every kernel but those that sample a walk or make
-a whole one, so both are done for a stride too.
+The machine code is kept next to the sources (gait_entrainment.walker.compiled); that of earlier
+sources is removed. The default experiment uses every kernel except those that sample a walk or
+make a whole one, so both are also done for a stride.
 """
 
 import shutil

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Write HTML pages of the names that outsiders may build on: make_api_pages.py [FOLDER].
+Write HTML pages of the public names: make_api_pages.py [FOLDER].
 
-pdoc does it, and is helped twice: the comment behind a field, which says its unit, becomes the
-field's text (of a setting: its meaning and what is allowed), and pages end with an example.
+pdoc writes them, with two additions: the comment after a field, which gives its unit, becomes the
+field's text (for a setting: its meaning and what is allowed), and pages end with an example.
 """
 
 import dataclasses
@@ -53,7 +53,7 @@ def offered(module: ModuleType) -> list[str]:
 
 
 def field_comments(source: str) -> dict[str, str]:
-    """Return the comment behind each `name: type` or `name = value` that has one."""
+    """Return the comment after each `name: type` or `name = value` that has one."""
     comments, name = {}, ""
     for token, following in pairwise(tokenize.generate_tokens(io.StringIO(source).readline)):
         if token.type == tokenize.NAME and following.string in (":", "=") and not name:
@@ -66,7 +66,7 @@ def field_comments(source: str) -> dict[str, str]:
 
 
 def read_tree_with_comments(thing: Any) -> doc_ast.AstInfo:
-    """Return what pdoc reads from the source of a module or class, and its fields' comments."""
+    """Return what pdoc reads from the source of a module or class, with its fields' comments."""
     found = read_tree(thing)
     texts = field_comments(doc_ast.get_source(thing))
     if dataclasses.is_dataclass(thing):

@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Draw anew the pictures in docs: the run in README.md, and the results.
+Redraw the pictures in docs: the run in README.md, and the results.
 
-    python scripts/make_figures.py        into docs, saying which of them have changed
+    python scripts/make_figures.py        into docs, listing those that have changed
 
-Sweeps walk for longer: their pictures are drawn from the tables that `entrain results` leaves
-beside them. docs/figures/display.png shows RViz's scene and is not drawn here.
+Sweeps take longer, so their pictures are drawn from the tables that `entrain results` leaves next
+to them. docs/figures/display.png shows RViz's scene and is not drawn here.
 """
 
 import contextlib
@@ -38,12 +38,12 @@ RUN = Path("figures/ankle_torque.png")
 # Commands whose pictures take seconds.
 QUICK = ("paper", "lock", "existence", "phase-response", "cohort")
 TABLES = sorted((DOCS / "results").glob("*_tongue.parquet"))
-# Of the pixels. A line moved by its own width changes more.
+# Share of the pixels. A line moved by its own width changes more.
 _MAY_DIFFER = 0.0005
 
 
 def draw_run(out: Path) -> dict[Path, Path]:
-    """Run the paper's example over the nodes; return its picture by the one in docs."""
+    """Run the paper's example on the nodes; return its picture by the one in docs."""
     subprocess.run(["entrain", "run", "--out", out / "run"], check=True, stdout=subprocess.DEVNULL)
     return {RUN: out / "run/ankle_torque.png"}
 
@@ -65,7 +65,7 @@ def draw_results(out: Path, commands: Sequence[str] = QUICK) -> dict[Path, Path]
 
 
 def swept(table: Path) -> tuple[SweepPlan, Any]:
-    """Return plan and table of a sweep that `entrain results` left."""
+    """Return the plan and the table of a sweep that `entrain results` left."""
     rows, provenance = read_sweep(table)
     plan = provenance["plan"]
     axes = {name: Axis(**plan[name]) for name in ("period_offsets", "torque_fractions")}
@@ -89,21 +89,21 @@ def same(picture: Path, other: Path) -> bool:
     """
     Return whether two pictures show the same.
 
-    matplotlib brings its own font and renderer, so one version draws the same pixels everywhere
-    but for the last bits of its arithmetic: few pixels may differ.
+    matplotlib brings its own font and renderer, so one version draws the same pixels everywhere,
+    except for the last bits of its arithmetic: a few pixels may differ.
     """
-    one, two = imread(picture), imread(other)
-    return one.shape == two.shape and np.mean(abs(one - two).max(axis=2) > 0.1) <= _MAY_DIFFER
+    a, b = imread(picture), imread(other)
+    return a.shape == b.shape and np.mean(abs(a - b).max(axis=2) > 0.1) <= _MAY_DIFFER
 
 
 def drawn_by_this_matplotlib(picture: Path) -> bool:
-    """Return whether a picture was drawn by the version that is here."""
+    """Return whether a picture was drawn by the installed version."""
     with Image.open(picture) as opened:
         return f"version{matplotlib.__version__}," in opened.info["Software"]
 
 
 def main() -> int:
-    """Draw all of them; return the exit code."""
+    """Draw all pictures; return the exit code."""
     with tempfile.TemporaryDirectory() as folder:
         drawn = draw_run(Path(folder))
         with contextlib.redirect_stdout(io.StringIO()):

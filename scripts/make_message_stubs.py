@@ -7,9 +7,9 @@ Write type stubs of the ROS messages, services and actions that the project impo
     make_message_stubs.py [FOLDER]
 
 The Python classes that ROS 2 Jazzy generates carry no annotations, but each carries its definition
-(`SLOT_TYPES`), from which its stub is made. A field has the type that it reads as and, where more
+(`SLOT_TYPES`), from which its stub is made. A field has the type that it reads as and, if more
 is accepted, a setter with the type that may be assigned; what is assigned is what the classes
-accept when they check their fields (ROS_PYTHON_CHECK_FIELDS=1). rclpy is linked beside the stubs:
+accept when they check their fields (ROS_PYTHON_CHECK_FIELDS=1). rclpy is linked next to the stubs:
 mypy does not search the folders of a sourced ROS 2.
 """
 
@@ -39,7 +39,7 @@ SOURCES = ROOT / "ros2_ws/src"
 STUBS = ROOT / "ros2_ws/install/stubs"
 KINDS = ("msg", "srv", "action")
 PARTS = ("Request", "Response", "Goal", "Result", "Feedback")
-# Fields may be named like built-in types, in lower case, but like none of what is imported here.
+# Fields may be named like built-in types, in lower case, but not like anything imported here.
 HEAD = """\
 import builtins
 from array import array as Array
@@ -63,7 +63,7 @@ def imported_packages() -> set[str]:
     return names & get_resources("rosidl_interfaces").keys()
 
 
-def one(kind: AbstractType) -> str:
+def single(kind: AbstractType) -> str:
     """Return the annotation of a single value."""
     if isinstance(kind, NamespacedType):
         return ".".join(kind.namespaced_name())
@@ -77,8 +77,8 @@ def one(kind: AbstractType) -> str:
 def read_and_assigned(kind: AbstractType) -> tuple[str, str]:
     """Return the annotations of a field: what it reads as, and what may be assigned to it."""
     if not isinstance(kind, AbstractNestedType):
-        return one(kind), one(kind)
-    value = one(kind.value_type)
+        return single(kind), single(kind)
+    value = single(kind.value_type)
     many = f"Sequence[{value}] | Set[{value}]"
     special = SPECIAL_NESTED_BASIC_TYPES.get(getattr(kind.value_type, "typename", None))
     if special is None:
@@ -105,8 +105,8 @@ def message_stub(message: Any, name: str) -> Iterator[str]:
         yield f"    {constant}: Final = {value!r}"
     yield "    SLOT_TYPES: ClassVar[builtins.tuple[Any, ...]]"
     yield "    @builtins.classmethod"
-    of_names = "builtins.dict[builtins.str, builtins.str]"
-    yield f"    def get_fields_and_field_types(cls) -> {of_names}: ..."
+    names_type = "builtins.dict[builtins.str, builtins.str]"
+    yield f"    def get_fields_and_field_types(cls) -> {names_type}: ..."
     yield "    def __init__("
     yield "        self,"
     yield "        *,"
@@ -172,7 +172,7 @@ def write_packages(stubs: Path, packages: Iterable[str]) -> None:
 
 
 def main(stubs: Path = STUBS) -> None:
-    """Write all stubs anew."""
+    """Rewrite all stubs."""
     shutil.rmtree(stubs, ignore_errors=True)
     write_packages(stubs, imported_packages())
     (stubs / "rclpy").symlink_to(Path(rclpy.__file__).parent)

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-A real browser for tests: headless Chromium of the system, driven by Selenium.
+A real browser for tests: the system's headless Chromium, driven by Selenium.
 
     from browser import browser, chromium      # the fixture, or as many as a test wants
 
-Without Chromium a test fails, it is not skipped: what a person sees was then not tested.
+Without Chromium a test fails; it is not skipped, because what a person sees was not tested.
 """
 
 import shutil
@@ -25,7 +25,7 @@ _CHROMIUM, _DRIVER = "/usr/bin/chromium", "/usr/bin/chromedriver"
 
 @contextmanager
 def chromium(size: tuple[int, int] = DESKTOP, *options: str) -> Iterator[webdriver.Chrome]:
-    """Give a browser with a window of a size [px] and a profile of its own; fails without one."""
+    """Yield a browser with a page of this size [px] and its own profile; fail without Chromium."""
     for program in (_CHROMIUM, _DRIVER):
         if shutil.which(program) is None:
             pytest.fail(f"{program} is missing: apt install chromium chromium-driver")
@@ -41,7 +41,7 @@ def chromium(size: tuple[int, int] = DESKTOP, *options: str) -> Iterator[webdriv
         driver = webdriver.Chrome(chosen, webdriver.ChromeService(_DRIVER))
         try:
             width, height = size
-            # Of what is shown, not of the window around it.
+            # The size of the page, not of the window around it.
             driver.execute_cdp_cmd(
                 "Emulation.setDeviceMetricsOverride",
                 {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False},
@@ -53,6 +53,6 @@ def chromium(size: tuple[int, int] = DESKTOP, *options: str) -> Iterator[webdriv
 
 @pytest.fixture
 def browser() -> Iterator[webdriver.Chrome]:
-    """Give a browser at the size of a desktop."""
+    """Yield a browser the size of a desktop."""
     with chromium() as driver:
         yield driver

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The pages of `make docs` say units and show an example."""
+"""The pages of `make docs` give units and show an example."""
 
 import subprocess
 import sys

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Every command: help, usage for what it refuses, and the exit codes of the README."""
+"""Every command: help, usage when it refuses arguments, and the exit codes of the README."""
 
 import argparse
 import subprocess
@@ -23,7 +23,7 @@ def subparsers(parser):
 
 
 def all_commands():
-    """Return every command, and each of its actions behind it."""
+    """Return every command, with each of its actions if it has any."""
     found = []
     for command in subparsers(make_parser()):
         actions = subparsers(subparsers(make_parser(command))[command])
@@ -32,7 +32,7 @@ def all_commands():
 
 
 def needed(words):
-    """Return words that stand for the arguments that a command cannot do without."""
+    """Return placeholders for the arguments that a command requires."""
     parser = make_parser(words[0])
     for word in words:
         parser = subparsers(parser)[word]
@@ -40,8 +40,8 @@ def needed(words):
     return [next(iter(a.choices or ["x"])) for a in positional]
 
 
-def ended(capsys, *words):
-    """Run a command; return its exit code, and what it printed to people and as errors."""
+def run(capsys, *words):
+    """Run a command; return its exit code, its output and its errors."""
     try:
         code = main([*map(str, words)])
     except SystemExit as end:  # argparse's
@@ -50,12 +50,12 @@ def ended(capsys, *words):
 
 
 @pytest.mark.parametrize("words", all_commands(), ids=" ".join)
-def test_each_command_has_help_and_refuses_an_option_with_its_own_usage(words, capsys):
-    code, out, err = ended(capsys, *words, "--help")
+def test_each_command_has_help_and_refuses_an_unknown_option_with_its_own_usage(words, capsys):
+    code, out, err = run(capsys, *words, "--help")
     assert (code, err) == (0, "")
     usage = f"usage: entrain {' '.join(words)} "
     assert out.startswith(usage)
-    code, out, err = ended(capsys, *words, *needed(words), "--nonsense")
+    code, out, err = run(capsys, *words, *needed(words), "--nonsense")
     assert (code, out) == (2, "")
     assert err.startswith(usage)
     *_, last = err.splitlines()
@@ -63,14 +63,14 @@ def test_each_command_has_help_and_refuses_an_option_with_its_own_usage(words, c
     assert "--nonsense" in last
 
 
-def test_what_is_no_command_shows_them_all(capsys):
+def test_an_unknown_command_shows_the_usage(capsys):
     for words in ([], ["nonsense"], ["--nonsense"]):
-        code, out, err = ended(capsys, *words)
+        code, out, err = run(capsys, *words)
         assert (code, out) == (2, "")
         assert err.startswith("usage: entrain ")
 
 
-# 0 done, 1 it failed, 2 wrong usage.
+# 0: done, 1: failed, 2: wrong usage.
 EXIT_CODES = [
     (0, ["simulate", *SHORT]),
     (0, ["analyze", BAG]),
@@ -119,7 +119,7 @@ EXIT_CODES = [
 )
 def test_exit_codes(code, words, capsys, monkeypatch):
     monkeypatch.chdir(ROOT)
-    found, _, err = ended(capsys, *words)
+    found, _, err = run(capsys, *words)
     assert found == code
     if code != 0 and words[:2] != ["bag", "check"]:  # whose findings are its output
         prog = "entrain " + " ".join(str(word) for word in words[:2] if str(word).isalpha())
@@ -128,8 +128,8 @@ def test_exit_codes(code, words, capsys, monkeypatch):
         assert "[Errno" not in err
 
 
-@pytest.mark.parametrize(("out", "code", "told"), [("full", 1, "No space left"), ("head", 0, "")])
-def test_output_that_nobody_takes_ends_with_such_a_code_too(out, code, told):
+@pytest.mark.parametrize(("out", "code", "error"), [("full", 1, "No space left"), ("head", 0, "")])
+def test_output_that_cannot_be_written_ends_with_such_a_code_too(out, code, error):
     command = "entrain bag info bags/paper_example --json"
     script = {
         "full": f"{command} > /dev/full",
@@ -139,5 +139,5 @@ def test_output_that_nobody_takes_ends_with_such_a_code_too(out, code, told):
         ["bash", "-c", script[out]], cwd=ROOT, capture_output=True, text=True, check=False
     )
     assert done.returncode == code
-    assert told in done.stderr
-    assert len(done.stderr.splitlines()) == bool(told)
+    assert error in done.stderr
+    assert len(done.stderr.splitlines()) == bool(error)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The bag that comes with the project, read by two readers that are not ours."""
+"""The bag that comes with the project, read by two third-party readers."""
 
 from pathlib import Path
 
@@ -25,7 +25,7 @@ def recorded():
 
 
 def test_rosbags_decodes_every_message():
-    # A store without any message: the definitions come from the bag alone.
+    # A store without any messages: the definitions come from the bag alone.
     with AnyReader([BAG], default_typestore=get_typestore(Stores.EMPTY)) as reader:
         topics = []
         for connection, _, data in reader.messages():

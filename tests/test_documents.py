@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""docs/architecture.md says what topics.py says, and names files and packages that exist."""
+"""docs/architecture.md agrees with topics.py, and names files and packages that exist."""
 
 import re
 from enum import Enum
@@ -38,7 +38,7 @@ def type_name(message_type):
     return message_type.__name__ if own else f"{package}/{message_type.__name__}"
 
 
-def test_topics_have_the_type_and_quality_that_the_page_says():
+def test_topics_have_the_type_and_quality_given_on_the_page():
     named = [t if type(t) is tuple else (t,) for t in vars(topics).values()]
     named += map(topics.sensor_topics, (SWITCH, FOOT, SHANK, ENCODER))
     actual = {
@@ -50,14 +50,14 @@ def test_topics_have_the_type_and_quality_that_the_page_says():
     assert {row[0]: (row[1], QUALITIES[row[3]]) for row in rows("topic")} == actual
 
 
-def test_qualities_are_what_the_page_says():
-    said = {row[0]: " ".join(row[1:4]) for row in rows("quality")}
+def test_qualities_are_those_on_the_page():
+    stated = {row[0]: " ".join(row[1:4]) for row in rows("quality")}
     for name, qos in QUALITIES.items():
         history = qos.history.name.lower() + (f" {qos.depth}" if qos.depth else "")
         words = (history, qos.reliability.name.lower(), qos.durability.name.lower())
         durability = "volatile" if words[2] == "system_default" else words[2]
-        assert said.pop(name) == f"{words[0]} {words[1]} {durability}".replace("_", " ")
-    assert said == {}
+        assert stated.pop(name) == f"{words[0]} {words[1]} {durability}".replace("_", " ")
+    assert stated == {}
 
 
 def test_packages_are_those_of_the_workspace():
@@ -66,20 +66,20 @@ def test_packages_are_those_of_the_workspace():
     }
 
 
-def test_fields_of_a_protocol_are_all_there_with_their_defaults():
+def test_all_fields_of_a_protocol_are_listed_with_their_defaults():
     page = (ROOT / "docs/protocols.md").read_text()
-    said = {name: default for name, default, _ in rows("field", page)}
+    stated = {name: default for name, default, _ in rows("field", page)}
     fields = [name for name in FIELDS if not name.startswith(("walker.", "limits."))]
-    assert set(said) == set(fields)
+    assert set(stated) == set(fields)
     for name in fields:
         default = attrgetter(name)(DEFAULT_PROTOCOL)
-        told = default.name.lower() if isinstance(default, Enum) else default
-        told = str(told).lower() if isinstance(told, bool) else told
-        told = "" if told is None else f"{told:g}" if isinstance(told, float) else str(told)
-        assert said[name].removesuffix(" s") == told, name
+        text = default.name.lower() if isinstance(default, Enum) else default
+        text = str(text).lower() if isinstance(text, bool) else text
+        text = "" if text is None else f"{text:g}" if isinstance(text, float) else str(text)
+        assert stated[name].removesuffix(" s") == text, name
 
 
-def test_files_to_look_into_exist():
+def test_files_named_on_the_page_exist():
     paths = re.findall(r"gait_entrainment\w*/[\w/.]*", str(rows("question")))
     assert len(paths) > 15
     for path in paths:

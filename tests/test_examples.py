@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The programs in docs/examples run and say what they should."""
+"""The programs in docs/examples run and print what they should."""
 
 import subprocess
 import sys

@@ -4,10 +4,10 @@
 """
 The pictures in docs are what the code draws now.
 
-That of a run is compared in test_lock_step.py, those of the paper in test_paper.py: there they are
-drawn anyway. Those of sweeps are drawn from the tables beside them, of which some rows are walked.
+The run's picture is compared in test_lock_step.py and the paper's in test_paper.py, which draw
+them anyway. Those of sweeps are drawn from the tables next to them, and one row of each is walked.
 
-They are held to it by the version of matplotlib that has drawn them, which each of them names.
+Only pictures drawn by the installed version of matplotlib are compared; each names its version.
 """
 
 import sys
@@ -47,7 +47,7 @@ def test_pictures_are_what_the_code_draws(drawn):
 
 
 @pytest.mark.parametrize("table", TABLES, ids=lambda table: table.stem)
-def test_table_of_a_sweep_is_what_is_walked_now(table):
+def test_table_of_a_sweep_agrees_with_a_walk_now(table):
     plan, rows = swept(table)
     index = plan.torque_fractions.count // 3
     row = sweep_row(plan, index)
@@ -60,7 +60,7 @@ def test_table_of_a_sweep_is_what_is_walked_now(table):
             assert values.tolist() == kept.tolist(), name
 
 
-def test_a_short_line_elsewhere_is_another_picture(drawn, tmp_path):
+def test_a_picture_with_an_extra_short_line_is_different(drawn, tmp_path):
     picture = next(iter(drawn.values()))
     pixels = (255 * imread(picture)[:, :, :3]).round().astype(np.uint8)
     plain, other = tmp_path / "plain.png", tmp_path / "other.png"

@@ -36,7 +36,7 @@ RunProtocol.Feedback().state.header.stamp.sec
 StartRun.Request()
 Header.get_fields_and_field_types().keys()
 """
-# A text in place of a list of texts is refused by the classes alone: to mypy it is a sequence.
+# Only the classes refuse a string in place of a list of strings: to mypy it is a sequence.
 REFUSED = """\
 Header(time=Time())
 Header(stamp=1.5)

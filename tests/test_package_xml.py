@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Each package.xml says what the package needs: valid by REP 149, no dependency missing or idle.
+Each package.xml is valid by REP 149 and names each dependency of its package, and no other.
 
-Whether rosdep knows a key cannot be asked without a network; docs/installation.md says when and
+Whether rosdep knows a key cannot be checked without a network; docs/installation.md says when and
 against what the keys were looked up.
 """
 
@@ -21,7 +21,7 @@ PACKAGES = [
     *sorted((ROOT / "ros2_ws/src").glob("*/package.xml")),
     *sorted((ROOT / "examples").glob("*/package.xml")),
 ]
-# Modules whose key is not their own name; of most others it is python3-NAME or NAME.
+# Modules whose key is not their own name; for most others it is python3-NAME or NAME.
 KEYS = {
     "lz4": "mcap-ros2-support",
     "mcap": "mcap-ros2-support",
@@ -30,14 +30,14 @@ KEYS = {
     "rosbags": "python3-rosbags-pip",
     "zstandard": "mcap-ros2-support",
 }
-# rosdep knows no key for them; what needs them says so, or its tests are skipped.
-# controller_manager_msgs is used by the driver for ros2_control where it is installed.
-# The page's server comes with nicegui; foxglove is asked for where it is wanted.
+# Modules without a rosdep key; what needs them says so, or its tests are skipped.
+# controller_manager_msgs is used by the driver for ros2_control if it is installed.
+# The page's server comes with nicegui; foxglove is optional.
 WITHOUT_KEY = {
     *("astropy", "controller_manager_msgs", "distributed", "ezc3d", "pyarrow"),
     *("fastapi", "foxglove", "nicegui", "starlette", "uvicorn"),
 }
-# What is needed and not imported, and by what.
+# Dependencies that are needed but not imported, and what needs them.
 NOT_IMPORTED = {
     "python3-msgpack": "python-can, for the bus of processes on one host",
     "diagnostic_msgs": "message definitions for the tests of bags",
@@ -56,7 +56,7 @@ NOT_IMPORTED = {
 
 
 def imported(folders):
-    """Return the outside modules that Python files import, by their first name."""
+    """Return the top-level names of the external modules that Python files import."""
     files = [file for folder in folders for file in folder.rglob("*.py")]
     names = set()
     for file in files:
@@ -65,7 +65,7 @@ def imported(folders):
                 names |= {alias.name.partition(".")[0] for alias in node.names}
             elif isinstance(node, ast.ImportFrom):
                 names.add((node.module or "").partition(".")[0])
-    # Tests of one package may use a reference that stands among those of another.
+    # Tests of one package may use a helper from the tests of another.
     helpers = {file.stem for file in ROOT.glob("ros2_ws/src/*/test/**/*.py")}
     own = {file.stem for file in files} | helpers
     return names - own - set(sys.stdlib_module_names) - WITHOUT_KEY
@@ -87,7 +87,7 @@ def test_package_is_valid_and_named_by_rep_144(package):
     assert package.licenses == ["Apache-2.0"]
 
 
-def test_package_has_what_ros_conventions_ask_for(package):
+def test_package_has_what_ros_conventions_require(package):
     folder = Path(package.filename).parent
     if folder.parent.name == "examples":
         return

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Each protocol in examples/ can be simulated, does what it is named for, and says who does it."""
+"""Each protocol in examples/ can be simulated, does what its name says, and states its origin."""
 
 from pathlib import Path
 
@@ -15,8 +15,8 @@ from gait_entrainment_commands.outcome import outcome_of, summary
 FOLDER = Path(__file__).parents[1] / "examples" / "protocols"
 
 
-def conducted(name):
-    """Simulate a protocol; see what holds of all; return simulation and outcome."""
+def simulated(name):
+    """Simulate a protocol and check what holds for all; return simulation and outcome."""
     path = FOLDER / f"{name}.yaml"
     protocol = read_protocol(path)
     assert protocol.name == name
@@ -31,14 +31,14 @@ def conducted(name):
 
 
 @pytest.mark.parametrize("path", sorted(FOLDER.glob("*.yaml")), ids=lambda path: path.stem)
-def test_its_first_two_lines_say_who_does_it_so(path):
+def test_its_first_two_lines_state_its_origin(path):
     lines = path.read_text().splitlines()
     assert [line.startswith("# ") for line in lines[:3]] == [True, True, False]
     assert f"test_{path.stem}" in globals()
 
 
 def test_entrainment_both_ways():
-    _, outcome = conducted("entrainment_both_ways")
+    _, outcome = simulated("entrainment_both_ways")
     faster, slower = outcome["blocks"]
     assert faster["entrained"]
     assert slower["verdict"] == "drifting"
@@ -46,7 +46,7 @@ def test_entrainment_both_ways():
 
 
 def test_exoskeleton_timing():
-    simulation, outcome = conducted("exoskeleton_timing")
+    simulation, outcome = simulated("exoskeleton_timing")
     assert outcome["blocks"][0]["pulses"] == 0
     for block, phase in zip(simulation.blocks[1:], (0.36, 0.42, 0.48, 0.54), strict=True):
         assert block.name == f"at {phase:.0%}".replace("%", " %")
@@ -56,7 +56,7 @@ def test_exoskeleton_timing():
 
 
 def test_frequency_sweep():
-    simulation, outcome = conducted("frequency_sweep")
+    simulation, outcome = simulated("frequency_sweep")
     periods = outcome["stride_period"]
     # It follows the sweep to the edge of the basin, then falls back to its own period.
     assert min(periods[15:165]) < periods[0] - 0.06
@@ -66,7 +66,7 @@ def test_frequency_sweep():
 
 
 def test_ramped_trapezoid():
-    simulation, outcome = conducted("ramped_trapezoid")
+    simulation, outcome = simulated("ramped_trapezoid")
     torques = [pulse.torque for pulse in simulation.train.pulses]
     assert torques == pytest.approx([min(n / 21, 1) * 8 for n in range(1, 31)])
     assert {pulse.shape for pulse in simulation.train.pulses} == {Shape.TRAPEZOID}
@@ -77,7 +77,7 @@ def test_ramped_trapezoid():
 
 
 def test_sham_controlled():
-    simulation, outcome = conducted("sham_controlled")
+    simulation, outcome = simulated("sham_controlled")
     sham, real = outcome["blocks"]
     assert sham["verdict"] == "drifting"
     assert real["entrained"]
@@ -86,6 +86,6 @@ def test_sham_controlled():
 
 
 def test_single_pulses():
-    simulation, outcome = conducted("single_pulses")
+    simulation, outcome = simulated("single_pulses")
     assert sum(pulse.torque != 0 for pulse in simulation.train.pulses) == 10
     assert not outcome["entrained"]

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The report of the committed run and of a study, in a real browser: whole, on a phone, on A4."""
+"""Reports of the committed run and of a study, in a real browser: complete, on a phone, on A4."""
 
 import base64
 import importlib
@@ -23,7 +23,7 @@ chromium = importlib.import_module("browser").chromium
 ROOT = Path(__file__).parents[1]
 BAG = ROOT / "bags/paper_example"
 PHONE, DESKTOP = (390, 844), (1280, 900)
-PATIENCE = 60.0  # [s]
+TIMEOUT = 60.0  # [s]
 SESSION = """\
 study: pilot
 person: {code: CODE, number: NUMBER, mass: 72, leg_length: 0.91}
@@ -59,20 +59,20 @@ def browser():
 
 
 def shown(browser, page, size):
-    """Show a page at a size; return its text, and how wide and high it is."""
+    """Show a page at a size; return its text and its width."""
     metrics = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": False}
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
     browser.get(page.as_uri())
-    # On a busy computer get returns before the whole page was read, whatever WebDriver promises.
+    # On a busy computer get returns before the page has loaded, whatever WebDriver promises.
     ready = "return document.readyState == 'complete'"
-    WebDriverWait(browser, PATIENCE).until(lambda shows: shows.execute_script(ready))
+    WebDriverWait(browser, TIMEOUT).until(lambda shows: shows.execute_script(ready))
     text = browser.execute_script("return document.body.innerText")
     root = "document.documentElement"
     width = browser.execute_script(f"return {root}.scrollWidth")
     return text, width
 
 
-def test_a_run_is_told_from_its_soundness_to_its_origin(browser, pages):
+def test_a_run_is_reported_from_its_soundness_to_its_origin(browser, pages):
     text, _ = shown(browser, pages["run"], DESKTOP)
     parts = [
         "verdict          entrained since stride 29",
@@ -101,7 +101,7 @@ def test_a_run_is_told_from_its_soundness_to_its_origin(browser, pages):
 def test_a_page_needs_nothing_from_elsewhere(pages, name):
     page = pages[name].read_text()
     referred = re.findall(r'(?:src|href)="([^"]*)"|url\(([^)]*)\)', page)
-    assert all("".join(one).startswith("#") for one in referred)
+    assert all("".join(link).startswith("#") for link in referred)
     assert "<script" not in page
     assert not re.findall(r'="https?:(?!//www\.w3\.org/)[^"]*"', page)
 
@@ -111,7 +111,7 @@ def test_a_page_needs_nothing_from_elsewhere(pages, name):
 def test_a_page_fits_its_screen(browser, pages, tmp_path, name, size):
     _, width = shown(browser, pages[name], size)
     assert width == size[0]
-    # Letters of figures stay readable.
+    # Text in figures stays readable.
     drawn = browser.execute_script(
         "return [...document.querySelectorAll('figure svg text')].map("
         "t => t.getBoundingClientRect().height)"
@@ -130,7 +130,7 @@ def test_a_run_fits_a_few_sheets_of_a4(browser, pages):
     assert {(round(box[2]), round(box[3])) for box in boxes} == {(595, 842)}
 
 
-def test_a_study_begins_with_what_its_runs_say_together(browser, pages):
+def test_a_study_begins_with_what_its_runs_show_together(browser, pages):
     text, _ = shown(browser, pages["study"], DESKTOP)
     for part in (
         "P02, session 1, 1: first",
@@ -144,10 +144,10 @@ def test_a_study_begins_with_what_its_runs_say_together(browser, pages):
     assert browser.title == "pilot: report"
 
 
-def test_a_sealed_session_tells_only_whether_the_data_are_sound(browser, pages):
+def test_a_sealed_session_shows_only_whether_the_data_are_sound(browser, pages):
     text, _ = shown(browser, pages["sealed"], DESKTOP)
     assert "This session is sealed" in text
     assert "Are the data sound?" in text
-    telling = "first|second|entrained|messages|period_offset|stride period|from commanded|rate "
-    assert not re.search(telling, text)
+    revealing = "first|second|entrained|messages|period_offset|stride period|from commanded|rate "
+    assert not re.search(revealing, text)
     assert browser.find_elements("css selector", "svg") == []

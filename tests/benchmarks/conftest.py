@@ -4,5 +4,5 @@
 import sys
 from pathlib import Path
 
-# Benchmarks import the baselines beside them.
+# Benchmarks import the baselines next to them.
 sys.path.insert(0, str(Path(__file__).parent))

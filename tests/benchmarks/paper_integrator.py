@@ -29,7 +29,7 @@ def acceleration(theta, torque, m, length, foot, g, separation, mu, k, double):
 
 @numba.njit(cache=True)
 def walk(strides, rate, first, period, width, torque, m, length, foot, g, alpha, mu, k):
-    """Walk strides with a pulse on every other push-off's leg; returns the time they took."""
+    """Walk strides with a pulse on every other push-off; return the time they took."""
     separation = 2 * length * math.sin(alpha) - foot
     offset = (separation**2 - foot**2) / (2 * length * separation)
     toe_off = math.asin(offset + foot / separation * math.cos(mu))

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Bags: recording at 20,000 messages a second, and one hour at 1 kHz looked into and analyzed."""
+"""Bags: recording at 20,000 messages a second, and one hour at 1 kHz inspected and analyzed."""
 
 import os
 import resource
@@ -161,7 +161,7 @@ def one_hour(folder: Path) -> Path:
 
 
 def measured(*arguments: object) -> tuple[float, float]:
-    """Run a command; return how long it took [s] and the memory that it needed at most [MB]."""
+    """Run a command; return how long it took [s] and its peak memory [MB]."""
     code = (
         "import re, sys; from gait_entrainment_commands import main; code = main(sys.argv[1:]);"
         "status = open('/proc/self/status').read();"

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Strides per second of the exact walker on one core, beside the paper's integrator."""
+"""Strides per second of the exact walker on one core, next to those of the paper's integrator."""
 
 import time
 
@@ -25,7 +25,7 @@ TORQUE = 0.1 * WALKER.peak_torque
 
 
 def fastest(work, rounds):
-    """Least time of several rounds: what the machine does when nobody else is at it."""
+    """Shortest time of several rounds: what the machine does when nothing else runs."""
     times = []
     for _ in range(rounds):
         begin = time.perf_counter()
@@ -60,7 +60,7 @@ def paper_strides_per_second():
 def test_strides():
     stride = float(walk(make_model(WALKER), 2).heel_strikes[2])
     paper = paper_strides_per_second()
-    # A little off the stride's own period the pulses pass through every phase, again and again.
+    # At a period a little off the stride's own, the pulses pass through every phase repeatedly.
     cases = {
         "no pulses": None,
         "a pulse in every stride, locked (period 50 ms short)": pulses(stride - 0.05),

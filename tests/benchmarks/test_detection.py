@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Five detectors at once in real time: what is lost, and how soon an event is published.
+Five detectors together in real time: what is lost, and how soon an event is published.
 
-How late the player of the samples is says something about the machine and the player, not about
-the detectors: an event counts from when the sample that decided it was published. Player and
-listener come before other processes, as the detectors do.
+The delay of an event counts from when the sample that decided it was published, because a late
+player of samples is no fault of the detectors. Player and listener have priority over other
+processes, as the detectors do.
 """
 
 import gc
@@ -50,15 +50,15 @@ DETECTOR = "from gait_entrainment_nodes.nodes.gait_detector import main; raise S
 
 def play(domain, file):
     """
-    Publish what all emulated sensors measure, each sample at its instant.
+    Publish what all emulated sensors measure, each sample at its time.
 
-    The file gets, by detector, the stamps of its samples and when they were published [ns].
+    The file gets the stamps of each detector's samples and when they were published [ns].
     """
     walker = Walker(WalkerParameters())
     events = [GaitEvent(t.stamp, t.kind, t.side, t.step) for t in walker.advance(SECONDS * SECOND)]
     rclpy.init(domain_id=domain)
     node = rclpy.create_node("sensors")
-    due = []  # instant, what makes the message, its publisher, and the values
+    due = []  # stamp, detector, what makes the message, its publisher, and the values
     for name in detector_names():
         kind = USUAL.get(name, name)
         signals = KINDS[kind][0]
@@ -67,38 +67,38 @@ def play(domain, file):
             sensor, writer = EmulatedSensor(kind, side), SensorWriter(source, side, signals)
             offered = f"{name}/{topic.name}"
             publisher = node.create_publisher(topic.type, offered, EVERY_MESSAGE_IN_REAL_TIME)
-            instants = sensor.due(SECONDS * SECOND)
-            measured = sensor.measure(instants, walker.sample(instants), events)
+            stamps = sensor.due(SECONDS * SECOND)
+            measured = sensor.measure(stamps, walker.sample(stamps), events)
             due += [
-                (instant, name, writer, publisher, values)
-                for instant, (_, values) in zip(instants.tolist(), measured, strict=True)
+                (stamp, name, writer, publisher, values)
+                for stamp, (_, values) in zip(stamps.tolist(), measured, strict=True)
             ]
     due.sort(key=lambda sample: sample[0])
     publishers = {id(publisher): publisher for _, _, _, publisher, _ in due}.values()
     while not all(publisher.get_subscription_count() for publisher in publishers):
         time.sleep(0.01)
     print("begins", flush=True)
-    come_before_others(PRIORITY)  # as a sensor does that needs no processor of this host
+    come_before_others(PRIORITY)  # like a sensor that needs no processor of this host
     gc.freeze()
-    gc.disable()  # the samples are many, and none of them is garbage
+    gc.disable()  # there are many samples, and none of them is garbage
     start, published = time.time_ns() + SECOND // 10, []
-    for instant, _, writer, publisher, values in due:
-        early = start + instant - time.time_ns()
+    for stamp, _, writer, publisher, values in due:
+        early = start + stamp - time.time_ns()
         if early > 0:
             time.sleep(early / SECOND)
-        publisher.publish(writer.write([(start + instant, values)])[0])
+        publisher.publish(writer.write([(start + stamp, values)])[0])
         published.append(time.time_ns())
     by_name = {name: [] for _, name, _, _, _ in due}
-    for (instant, name, *_), when in zip(due, published, strict=True):
-        by_name[name].append((start + instant, when))
+    for (stamp, name, *_), when in zip(due, published, strict=True):
+        by_name[name].append((start + stamp, when))
     np.savez(file, **by_name)
-    time.sleep(2.0)  # until the last have arrived, and the detectors have said so
+    time.sleep(2.0)  # until the last have arrived and the detectors have reported them
     rclpy.shutdown()
 
 
-def test_events_come_soon_after_the_sample_that_decides(tmp_path):
+def test_events_are_published_soon_after_the_sample_that_decides_them(tmp_path):
     names = detector_names()
-    found = {name: [] for name in names}  # stamps of what decided, and when it was heard [ns]
+    found = {name: [] for name in names}  # deciding sample's stamp, when the event was heard [ns]
     heard = {}
     with ExitStack() as stack:
         domain = stack.enter_context(claimed_domain())
@@ -137,29 +137,29 @@ def test_events_come_soon_after_the_sample_that_decides(tmp_path):
         for name in names:
             service = f"{name}/walker/start"
             client.service(StartRun, service)
-            begun = StartRun.Request(run=1)
-            client.call(StartRun, service, begun, accept=lambda r: r.success, period=0.5)
+            request = StartRun.Request(run=1)
+            client.call(StartRun, service, request, accept=lambda r: r.success, period=0.5)
         client.wait(lambda: player.poll() is not None, SECONDS + 60.0)
     sent = np.load(tmp_path / "sent.npz")
     start = min(stamps[0, 0] for stamps in sent.values())
     count = sum(map(len, sent.values()))
     print(f"\n{count} samples sent, {sum(heard.values())} heard")
-    tell("samples after their instant", start, np.concatenate([*sent.values()]))
+    print_delays("samples after their stamps", start, np.concatenate([*sent.values()]))
     together = []
     for name, pairs in found.items():
         stamps, published = sent[name].T
         assert pairs, f"{name}: no event"
-        decided, told = np.array(pairs).T
-        # A stamp that has been seconds is off by less than a microsecond.
+        decided, heard_at = np.array(pairs).T
+        # A stamp that was converted to seconds and back is off by less than a microsecond.
         place = np.searchsorted(stamps, decided - MILLISECOND // 10)
-        together.append(np.column_stack([published[place], told]))
-        tell(name, start, together[-1])
-    tell("all events", start, np.concatenate(together))
+        together.append(np.column_stack([published[place], heard_at]))
+        print_delays(name, start, together[-1])
+    print_delays("all events", start, np.concatenate(together))
     assert sum(heard.values()) == count
 
 
-def tell(what, start, pairs):
-    """Print how much later the second of two instants [ns] is, and when it is most."""
+def print_delays(what, start, pairs):
+    """Print how much later the second of two times [ns] is, and when it is late."""
     late = (pairs[:, 1] - pairs[:, 0]) / MILLISECOND
     p50, p99 = np.quantile(late, (0.5, 0.99))
     seconds = np.unique((pairs[late > 5.0, 0] - start) // SECOND)

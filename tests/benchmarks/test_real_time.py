@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How punctual real time is: joint states at 1 kHz for a minute, beside a bare loop of sleeps."""
+"""How punctual real time is: joint states at 1 kHz for a minute, next to a bare loop of sleeps."""
 
 import json
 import subprocess
@@ -20,7 +20,7 @@ SECONDS = 60
 
 
 def lateness_of_sleeping(rate, seconds):
-    """Return how late a loop wakes that only sleeps from deadline to deadline [s]."""
+    """Return how late [s] a loop wakes that only sleeps until each deadline."""
     begin, late = time.monotonic(), []
     for k in range(1, int(rate * seconds)):
         due = begin + k / rate
@@ -29,14 +29,14 @@ def lateness_of_sleeping(rate, seconds):
     return late
 
 
-def lateness_by_rank(seconds):
-    """Return the same of a loop with the priority of a node."""
+def lateness_with_priority(seconds):
+    """Return the same for a loop with the priority of a node."""
     come_before_others()
     return lateness_of_sleeping(RATE, seconds)
 
 
 def quantiles(late):
-    """Return the median, the 99 % quantile and the worst of latenesses [s], in ms."""
+    """Return the median, the 99 % quantile and the worst of some latenesses [s], in ms."""
     late = sorted(late)
     return {
         "p50": 1e3 * late[len(late) // 2],
@@ -47,9 +47,9 @@ def quantiles(late):
 
 def test_joint_states_at_1_khz_for_a_minute(tmp_path):
     strides = round(SECONDS / 1.92)
-    # Only a loop at the same time has to share the processors as the run has to.
+    # Only a loop at the same time has to share the processors as the run does.
     with ProcessPoolExecutor(1) as process:
-        beside = process.submit(lateness_by_rank, SECONDS)
+        during = process.submit(lateness_with_priority, SECONDS)
         done = subprocess.run(
             [
                 *("entrain", "run", "--real-time", "--json", "--no-figures"),
@@ -60,7 +60,7 @@ def test_joint_states_at_1_khz_for_a_minute(tmp_path):
             text=True,
             check=True,
         )
-        after = process.submit(lateness_by_rank, 10).result()
+        after = process.submit(lateness_with_priority, 10).result()
     outcome = json.loads(done.stdout)
     with BagReader(tmp_path / "bag") as reader:
         recorded = reader.counts["/joint_states"]
@@ -73,7 +73,7 @@ def test_joint_states_at_1_khz_for_a_minute(tmp_path):
     )
     for name, late in (
         ("stamp to publish", outcome["publish_lateness_ms"]),
-        ("a loop of sleeps beside the run", quantiles(beside.result())),
+        ("a loop of sleeps during the run", quantiles(during.result())),
         ("a loop of sleeps after it", quantiles(after)),
     ):
         print(

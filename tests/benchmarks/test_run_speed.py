@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How fast whole commands are. Prints, asserts nothing about speed; each beside its baseline."""
+"""How fast whole commands are, each next to its baseline. Asserts nothing about speed."""
 
 import json
 import os
@@ -22,7 +22,7 @@ from gait_entrainment_nodes.nodes.rclpy_internals import RawReader
 
 pytestmark = pytest.mark.benchmark
 
-# As many messages as a run has, sent in bursts as long as a stretch of it.
+# As many messages as a run has, in bursts as long as a stretch of it.
 BURSTS, BURST = 80, 1500
 _PUBLISHER = """
 import sys
@@ -77,7 +77,7 @@ def test_lock_step_with_everything_recorded(tmp_path):
     )
     bare = bare_rate()
     rate = outcome["messages"] / (walked / outcome["real_time_factor"])
-    print(f"floor, ready bytes published, received and thrown away: {bare:.0f} messages/s")
+    print(f"floor, ready bytes published, received and discarded: {bare:.0f} messages/s")
     print(f"that run: {rate:.0f} messages/s, computed, written to disk; {rate / bare:.0%} of it")
     assert outcome["lost"] == 0
 
@@ -89,14 +89,14 @@ def test_lock_step_at_event_rate(tmp_path):
     factor = outcome["real_time_factor"]
     print(
         f"\nentrain run, 1000 strides, states at event rate only: {factor:.0f} times real time"
-        f" (target: 300), {outcome['lost']} lost; {round_trips(outcome, factor):.1f} ms a stride"
+        f" (target: 300), {outcome['lost']} lost; {ms_per_stride(outcome, factor):.1f} ms a stride"
     )
     print(f"baseline, a service call between two processes: {service_call_ms():.2f} ms (median)")
     assert outcome["lost"] == 0
 
 
 class Listener:
-    """A node of this process in a domain of its own, beside one other process."""
+    """A node of this process in its own domain, with one other process."""
 
     def __init__(self, domain):
         self.context = Context()
@@ -116,7 +116,7 @@ class Listener:
 
 
 def bare_rate():
-    """Return how many messages a second go to a process that throws them away."""
+    """Return how many messages a second reach a process that discards them."""
     taken, begin = 0, None
     with claimed_domain() as domain:
         listener = Listener(domain)
@@ -144,18 +144,18 @@ def service_call_ms():
         client = listener.node.create_client(Ready, "gait_analyzer/ready")
         with subprocess.Popen(
             ["gait_analyzer"], env={**os.environ, "ROS_DOMAIN_ID": str(domain)}
-        ) as other:
+        ) as analyzer:
             listener.spin_until(client.service_is_ready)
-            time.sleep(1.0)  # until the other has discovered who asks
+            time.sleep(1.0)  # until the node has discovered this client
             for _ in range(500):
                 begin = time.perf_counter()
                 listener.spin_until(client.call_async(Ready.Request()).done)
                 times.append(time.perf_counter() - begin)
-            other.terminate()
+            analyzer.terminate()
         listener.close()
     return 1e3 * sorted(times)[len(times) // 2]
 
 
-def round_trips(outcome, factor):
-    """Return wall time a stride [ms]."""
+def ms_per_stride(outcome, factor):
+    """Return the wall time per stride [ms]."""
     return 1e3 * sum(outcome["stride_period"]) / factor / len(outcome["stride_period"])

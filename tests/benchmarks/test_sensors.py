@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Detectors beside public data and beside the simulated walker, and what a sample costs."""
+"""Detectors on public data and on the simulated walker, and the cost of a sample."""
 
 import statistics
 import sys
@@ -45,10 +45,10 @@ CHAINS = [
 ]
 
 
-def told(kind, of):
+def shown(kind, total):
     return (
-        f"{kind.name.lower():11} {of.found:3} of {of.events}, {of.false} false, "
-        f"bias {of.bias * 1e3:+5.1f} ms, SD {of.deviation * 1e3:4.1f} ms"
+        f"{kind.name.lower():11} {total.found:3} of {total.events}, {total.false} false, "
+        f"bias {total.bias * 1e3:+5.1f} ms, SD {total.deviation * 1e3:4.1f} ms"
     )
 
 
@@ -56,7 +56,7 @@ def times(events, kind, side):
     return [e.detection.time for e in events if (e.event.kind, e.event.side) == (kind, side)]
 
 
-def test_foot_gyroscopes_beside_motion_capture():
+def test_foot_gyroscopes_against_motion_capture():
     reference = foot_reference()
     for text in ("foot_gyroscope", UPRIGHT):
         events, _ = detect(find_detector(text), foot_rates())
@@ -66,7 +66,7 @@ def test_foot_gyroscopes_beside_motion_capture():
             for sides in ((Side.LEFT,), (Side.RIGHT,), tuple(Side)):
                 found = score((reference[kind, s], times(events, kind, s)) for s in sides)
                 print(
-                    f"{'both' if len(sides) > 1 else sides[0].name.lower():6} {told(kind, found)}"
+                    f"{'both' if len(sides) > 1 else sides[0].name.lower():6} {shown(kind, found)}"
                 )
     for what, least in (
         ("deleted", strides_left(events, delete=True)),
@@ -76,7 +76,7 @@ def test_foot_gyroscopes_beside_motion_capture():
 
 
 def strides_left(events, *, delete=False):
-    """Return the fewest right strides that are left with any one detection changed."""
+    """Return the fewest right strides that remain if any one detection is changed."""
     found, fewest = [e.detection for e in events], []
     for place, detection in enumerate(found):
         late = replace(
@@ -116,7 +116,7 @@ def test_the_default_protocol_through_sensors(kind, detector):
         sensors = Sensors(kind, find_detector(detector), protocol.side, seed=seed)
         try:
             run = rehearse(protocol, sensors)
-        except GaitError:  # no torque follows a gait that is not known
+        except GaitError:  # an unknown gait gets no torque
             verdicts["ended"] += 1
             continue
         seen, exact = (
@@ -141,7 +141,7 @@ def test_the_default_protocol_through_sensors(kind, detector):
         shifts += [a.phase_lag - b.phase_lag for a, b in pairs if seen == exact == "entrained"]
     print(
         f"\n{kind}, {detector}: verdict as of exact events in {verdicts[True]} of {SEEDS}, "
-        f"{verdicts['ended']} ended as if nobody walked"
+        f"{verdicts['ended']} ended as if the gait had stopped"
     )
     for event, found in errors.items():
         mean = sum(found) / max(len(found), 1)
@@ -157,13 +157,13 @@ def test_cost_of_a_sample(kind, detector):
     walker, until = Walker(Protocol().walker), 60_000_000_000
     walker.advance(until)
     sensor = EmulatedSensor(kind, Side.RIGHT)
-    instants = sensor.due(until)
-    samples = sensor.measure(instants, walker.sample(instants), ())
+    stamps = sensor.due(until)
+    samples = sensor.measure(stamps, walker.sample(stamps), ())
     costs = []
     for _ in range(5):
-        one = find_detector(detector).make(Side.RIGHT)
+        instance = find_detector(detector).make(Side.RIGHT)
         begin = time.process_time()
         for stamp, values in samples:
-            one.add(stamp, values)
+            instance.add(stamp, values)
         costs.append((time.process_time() - begin) / len(samples))
     print(f"\n{kind}, {detector}: {min(costs) * 1e6:.2f} microseconds a sample and foot")

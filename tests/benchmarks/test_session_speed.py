@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 EXAMPLE = Path(__file__).parents[2] / "examples/sessions/basin_of_entrainment.yaml"
-# Of walkers whose strides vary, as a person's do.
+# For walkers whose strides vary as a person's do.
 TEXT = EXAMPLE.read_text().replace("protocol:\n", "protocol:\n  variation: {coefficient: 0.02}\n")
 
 pytestmark = pytest.mark.benchmark
@@ -27,8 +27,8 @@ def test_a_session_of_six_blocks_with_its_report(tmp_path):
     path = tmp_path / "session.yaml"
     path.write_text(TEXT)
     walked = seconds("session", path, "--out", tmp_path / "study")
-    told = seconds("report", tmp_path / "study")
-    print(f"\nsix blocks, recorded: {walked:.1f} s, with report {walked + told:.1f} s (below 60)")
+    extra = seconds("report", tmp_path / "study")
+    print(f"\nsix blocks, recorded: {walked:.1f} s, with report {walked + extra:.1f} s (below 60)")
 
 
 def test_the_report_of_an_hour(tmp_path):

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How long commands take to start and end, beside a Python and a ROS node that do nothing."""
+"""How long commands take to start and end, next to a Python and a ROS node that do nothing."""
 
 import statistics
 import subprocess
@@ -41,7 +41,7 @@ def seconds(command, folder):
 
 
 def test_startup(tmp_path):
-    # In turns, so that all meet the same load; the first round loads what is not yet in memory.
+    # In turns, so that all see the same load; the first round loads what is not yet in memory.
     times = {name: [] for name in COMMANDS}
     for number in range(1 + ROUNDS):
         for name, command in COMMANDS.items():

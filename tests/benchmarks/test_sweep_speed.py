@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How fast the tongue is swept, on how many cores, beside the paper's integrator."""
+"""How fast the tongue is swept on one core and on up to two, next to the paper's integrator."""
 
 import os
 import time
@@ -54,7 +54,7 @@ def test_tongue():
     cores = min(len(os.sched_getaffinity(0)), 2)
     alone, together = seconds(lambda: sweep(1)), seconds(lambda: sweep(cores))
     strides = PLAN.walks * PLAN.strides
-    # The sample must be the same gait: its mean stride period lies between pulse and own period.
+    # The sample must be the same gait: its mean stride period is between the pulses' and its own.
     assert 1.88 < by_the_papers_method(20) / 20 < 1.94
     sample = seconds(lambda: by_the_papers_method(SAMPLE_STRIDES))
     paper = sample / SAMPLE_STRIDES * strides

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How late torque commands are at 500 Hz, quiet and beside busy processes, and a bare loop."""
+"""How late torque commands are at 500 Hz, quiet and with busy processes, and a bare loop."""
 
 import contextlib
 import os
@@ -25,9 +25,9 @@ SECONDS = 10.0
 
 
 def lateness_of_commands(port):
-    """Return how late the torque loop sent its commands [s], and what was not permitted it."""
+    """Return how late the torque loop sent its commands [s], and what it was not permitted."""
     bus = f"interface=udp_multicast,channel=239.74.163.2,port={port}"
-    # Patience for a system that does not permit it to come before others.
+    # Long timeouts for a system that does not permit it priority over others.
     driver = find_driver(f"ak_mit_can:{bus},rate={RATE},silence=0.9,lateness=0.9")
     with driver.make(Side.RIGHT, DeviceLimits(silence=60.0)) as robot:
         robot.configure()
@@ -51,11 +51,11 @@ def test_commands_at_500_hz(tmp_path, count):
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(50))
         first = lateness_of_sleeping(RATE, SECONDS)
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
-    print(f"\nbeside {count} busy processes; not permitted: {refused or 'nothing'}")
+    print(f"\nwith {count} busy processes; not permitted: {refused or 'nothing'}")
     for name, lateness in (
         ("torque loop", late),
         ("a bare loop of sleeps", bare),
-        ("the same by SCHED_FIFO, if permitted", first),
+        ("the same with SCHED_FIFO, if permitted", first),
     ):
         found = quantiles(lateness)
         print(f"{name}: " + ", ".join(f"{key} {value:.2f} ms" for key, value in found.items()))

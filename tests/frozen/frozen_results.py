@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Results that no change of structure may move by a digit: hashes of what the commands print.
+Results in which no restructuring may change a digit: hashes of what the commands print.
 
     python tests/frozen/frozen_results.py                  compare with results.json
-    python tests/frozen/frozen_results.py --write          freeze anew: say why in the commit
-    python tests/frozen/frozen_results.py --keep DIR       also keep what was hashed, to diff it
-    python tests/frozen/frozen_results.py --only run       some of them, by a part of the name
+    python tests/frozen/frozen_results.py --write          freeze again: say why in the commit
+    python tests/frozen/frozen_results.py --keep DIR       also keep the hashed output, to diff it
+    python tests/frozen/frozen_results.py --only run       only results with "run" in their names
 
 Only the command line and the mcap library are used, so that the script outlives any refactoring.
 The last bit of a number may differ on another processor: freeze there from a commit that is known
@@ -60,7 +60,7 @@ REPLAY_TOPICS = {"/gait/strides", "/gait/pulse_phases", "/gait/entrainment"}
 
 
 def printed(*words: str) -> bytes:
-    """Return what a command prints; one that fails by design says so in its exit code."""
+    """Return what a command prints, and its exit code, because some fail by design."""
     done = subprocess.run(["entrain", *words], capture_output=True, check=False)
     if done.returncode > 1 or not done.stdout:
         raise SystemExit(f"entrain {' '.join(words)}: {done.stderr.decode()}")
@@ -90,7 +90,7 @@ def sweep(folder: Path) -> bytes:
 
 
 def results(folder: Path) -> Iterator[tuple[str, Callable[[], Iterable[tuple[str, bytes]]]]]:
-    """Yield name and what computes the parts of a result, by the name of the part."""
+    """Yield each result's name and the function that computes its parts by name."""
     for name, options in PROTOCOLS.items():
         yield f"simulate {name}", lambda o=options: [("", printed("simulate", "--json", *o))]
     for name, words in QUESTIONS.items():
@@ -110,11 +110,11 @@ def results(folder: Path) -> Iterator[tuple[str, Callable[[], Iterable[tuple[str
 
 
 def main() -> int:
-    """Freeze or compare; 1 where something differs."""
+    """Freeze or compare; return 1 if anything differs."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
-    parser.add_argument("--write", action="store_true", help="freeze the present results")
-    parser.add_argument("--keep", type=Path, help="folder for what was hashed")
-    parser.add_argument("--only", default="", help="part of the names of those wanted")
+    parser.add_argument("--write", action="store_true", help="freeze the current results")
+    parser.add_argument("--keep", type=Path, help="folder for the hashed output")
+    parser.add_argument("--only", default="", help="only results whose names contain this")
     options = parser.parse_args()
     frozen = json.loads(FROZEN.read_text()) if FROZEN.exists() else {}
     now = {}

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The published numbers: which of ours agree, and that the differences are explained."""
+"""The published numbers: which of ours agree, and what explains the differences."""
 
 import json
 import sys
@@ -34,7 +34,7 @@ DIFFERENT = {
 }
 
 
-def test_everything_published_agrees_but_for_four_known_numbers(published):
+def test_all_published_numbers_agree_except_four_known_ones(published):
     assert {row.name for row in published.values() if row.agrees is False} == set(DIFFERENT)
     for name, value in DIFFERENT.items():
         assert published[name].ours == pytest.approx(value, rel=1e-5)
@@ -48,7 +48,7 @@ def test_k_and_mu_unrounded_together_give_the_papers_digits(explanations, what):
     assert explanations[f"both unrounded: {what}"].agrees
 
 
-def test_neither_of_them_alone_does(explanations):
+def test_k_or_mu_unrounded_alone_does_not(explanations):
     for name in ("k unrounded", "mu unrounded"):
         assert not explanations[f"{name}: 2 tau_0 - 50 ms"].agrees
 
@@ -58,7 +58,7 @@ def test_a_grid_of_4_ms_explains_the_basin_and_rounding_does_not(published, expl
     assert not explanations["both unrounded: basin of entrainment, solved"].agrees
 
 
-def test_less_than_9_percent_is_tight_for_pulses_in_every_step_only(published):
+def test_less_than_9_percent_is_tight_only_for_pulses_in_every_step(published):
     every_stride = published["Fig. 8, pulse in every stride: range of average speeds"]
     every_step = published["Fig. 8, pulse in every step: range of average speeds"]
     assert every_stride.ours == pytest.approx(4.280, abs=1e-3)
@@ -66,7 +66,7 @@ def test_less_than_9_percent_is_tight_for_pulses_in_every_step_only(published):
 
 
 def test_command_draws_every_figure_and_prints_json(tmp_path, capsys, monkeypatch, published):
-    # The numbers are made above; here only what the command does with them.
+    # The numbers are computed above; this tests only what the command does with them.
     rows = list(published.values())
     monkeypatch.setattr("gait_entrainment_studies.commands.paper.compare", lambda: rows)
     assert main(["paper", "--json", "--out", str(tmp_path / "figures")]) == 0

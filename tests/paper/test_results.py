@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""docs/results.md shows what the commands that solve print; walks take too long for a test."""
+"""docs/results.md shows the output of commands that solve; walks take too long for a test."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from gait_entrainment_studies.commands.results import COMMAND, TEMPLATE
 
 PAGE = (Path(__file__).parents[2] / "docs/results.md").read_text()
 COMMANDS = COMMAND.findall(TEMPLATE.read_text())
-SOLVED = [one for one in COMMANDS if one.split()[0] in ("lock", "existence", "phase-response")]
+SOLVED = [c for c in COMMANDS if c.split()[0] in ("lock", "existence", "phase-response")]
 
 
 @pytest.mark.parametrize("command", SOLVED)
@@ -22,7 +22,7 @@ def test_the_page_shows_what_the_command_prints(command, capsys):
     assert f"```text\n{capsys.readouterr().out}```" in part
 
 
-def test_the_page_is_the_template_with_output_put_in():
+def test_the_page_is_the_template_with_output_inserted():
     texts = COMMAND.split(TEMPLATE.read_text())[::2]
     assert all(text.strip() in PAGE for text in texts)
     assert COMMAND.findall(PAGE) == COMMANDS
