@@ -129,7 +129,7 @@ def test_exit_codes(code, words, capsys, monkeypatch):
 
 
 @pytest.mark.parametrize(("out", "code", "error"), [("full", 1, "No space left"), ("head", 0, "")])
-def test_output_that_cannot_be_written_ends_with_such_a_code_too(out, code, error):
+def test_output_that_cannot_be_written_ends_with_the_right_exit_code(out, code, error):
     command = "entrain bag info bags/paper_example --json"
     script = {
         "full": f"{command} > /dev/full",

@@ -37,7 +37,7 @@ WITHOUT_KEY = {
     *("astropy", "controller_manager_msgs", "distributed", "ezc3d", "pyarrow"),
     *("fastapi", "foxglove", "nicegui", "starlette", "uvicorn"),
 }
-# Dependencies that are needed but not imported, and what needs them.
+# Dependencies that are needed but not imported, and why.
 NOT_IMPORTED = {
     "python3-msgpack": "python-can, for the bus of processes on one host",
     "diagnostic_msgs": "message definitions for the tests of bags",
@@ -45,9 +45,9 @@ NOT_IMPORTED = {
     "rosgraph_msgs": "message definitions for the tests of bags",
     "sensor_msgs": "message definitions for the tests of bags",
     "std_msgs": "message definitions for the tests of bags",
-    "ros2launch": "what starts the launch files",
-    "rviz2": "what rviz:=true starts",
-    "python3-pytest": "what runs the tests",
+    "ros2launch": "it starts the launch files",
+    "rviz2": "rviz:=true starts it",
+    "python3-pytest": "it runs the tests",
     "gait_entrainment_drivers": "the plugin of pytest that checks an example's driver",
     "ament_flake8": "test_linters.py",
     "ament_pep257": "test_linters.py",

@@ -130,7 +130,7 @@ def test_a_run_fits_a_few_sheets_of_a4(browser, pages):
     assert {(round(box[2]), round(box[3])) for box in boxes} == {(595, 842)}
 
 
-def test_a_study_begins_with_what_its_runs_show_together(browser, pages):
+def test_a_study_begins_with_the_combined_results_of_its_runs(browser, pages):
     text, _ = shown(browser, pages["study"], DESKTOP)
     for part in (
         "P02, session 1, 1: first",

@@ -103,8 +103,8 @@ def test_a_run_equals_one_uncut_walk_under_the_same_torque(phase, offset, part):
     walker.extend_torque(
         protocol.side, np.array(times), np.array(torques), max(end, times[-1]) + 1
     )
-    whole = walker.advance(end)
-    assert [(t.stamp, t.kind, t.side, t.step) for t in whole] == [
+    uncut = walker.advance(end)
+    assert [(t.stamp, t.kind, t.side, t.step) for t in uncut] == [
         (e.stamp, e.kind, e.side, e.step) for e in cut.events
     ]
 
