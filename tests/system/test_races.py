@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Runs in which nodes hear each other late, by the switch in messaging/delays.py.
+Runs in which nodes hear each other late, changed by late_nodes/sitecustomize.py.
 
-A pair of nodes is matched only once all have been up for a while, and whatever is sent takes a
-time that differs between topics: who sends before it is heard, or counts on the order in which
-topics arrive, loses something or stands still.
+A pair of nodes is matched only once all have been up for a while, and delivery takes a time that
+differs between topics. A node that sends before it is heard, or relies on the order in which
+topics arrive, loses messages or gets stuck.
 """
 
 import json
@@ -14,6 +14,7 @@ import os
 import signal
 import subprocess
 import time
+from pathlib import Path
 
 import pytest
 from harness import (
@@ -27,29 +28,29 @@ from harness import (
 )
 
 from gait_entrainment_bags import BagReader
-from gait_entrainment_nodes.messaging.delays import VARIABLE
 
 SHORT = ("--baseline=3", "--pulses=4", "--washout=1", "--sample-rate=0", "--no-ground-reaction")
 RESULTS = ("/gait/strides", "/gait/pulse_phases", "/gait/entrainment")
-# Of each topic, at most [s].
+# The longest of any topic [s].
 DELIVERY = 0.03
-# By when the nodes are up [s]; where they take longer it is tried again with more.
+# Time allowed for all nodes to be up [s]; if they take longer, the next one is tried.
 UP = (9.0, 25.0)
 
 
 def delays(pair="", matched=0.0):
-    """Return the environment in which a pair is matched at an instant, and all comes late."""
+    """Return an environment in which a pair is matched at this time and every message is late."""
     chosen = {pair: {"matched": matched, "delivery": DELIVERY}, "*>*": {"delivery": DELIVERY}}
-    return {VARIABLE: json.dumps(chosen)}
+    paths = str(Path(__file__).with_name("late_nodes")), os.environ.get("PYTHONPATH", "")
+    return {"LATE_NODES": json.dumps(chosen), "PYTHONPATH": os.pathsep.join(filter(None, paths))}
 
 
-def before_all_were_up(bag, matched):
-    """Return whether a pair was matched before each node had been there for a while."""
+def matched_too_early(bag, matched):
+    """Return whether a pair was matched before all nodes had been up for a while."""
     with BagReader(bag) as reader:
-        said = [(raw, log) for raw, log in reader.decoded(["/rosout"]) if "started" in log.msg]
-        up = max(raw.publish_time for raw, _ in said) / 1e9
-        begun = next(iter(reader.messages(["/gait_events"]))).publish_time / 1e9
-    assert begun > matched
+        starts = [(raw, log) for raw, log in reader.decoded(["/rosout"]) if "started" in log.msg]
+        up = max(raw.publish_time for raw, _ in starts) / 1e9
+        first_event = next(iter(reader.messages(["/gait_events"]))).publish_time / 1e9
+    assert first_event > matched
     return up > matched - 0.5
 
 
@@ -59,18 +60,18 @@ def run_late(tmp_path, pair, *options):
         bag, matched = tmp_path / f"up_in_{up:g}", time.time() + up
         with entrain_run(bag, *options, "--json", **delays(pair, matched)) as run:
             assert run.outcome()["lost"] == 0
-        if not before_all_were_up(bag, matched):
+        if not matched_too_early(bag, matched):
             return bag
     raise AssertionError(f"the nodes were not up within {UP[-1]} s")
 
 
 @pytest.fixture(scope="module")
 def live(tmp_path_factory):
-    """Run what once stood still: acknowledgements were sent before the walker heard them."""
+    """Run a case that once got stuck: acknowledgements were sent before the walker heard them."""
     return run_late(tmp_path_factory.mktemp("late"), "bag_recorder>walker_sim", *SHORT)
 
 
-def test_acknowledgements_wait_until_the_walker_hears(live):
+def test_acknowledgements_wait_until_the_walker_hears_them(live):
     assert events_since_start(live) == simulated_events(live)
 
 
@@ -91,12 +92,12 @@ def test_a_replay_waits_until_it_is_heard(live, tmp_path):
             timeout=2 * PATIENCE,
         )
         assert replayed.returncode == 0, replayed.stderr
-        if not before_all_were_up(again, matched):
+        if not matched_too_early(again, matched):
             break
     assert payloads(again, RESULTS) == payloads(live, RESULTS)
 
 
-def test_an_interruption_is_quiet_when_all_comes_late(tmp_path):
+def test_an_interruption_is_quiet_when_all_messages_are_late(tmp_path):
     with entrain_run(tmp_path / "bag", "--real-time", *LONG, **delays()) as run:
         run.wait_for_stride(1)
         run.process.send_signal(signal.SIGINT)

@@ -11,7 +11,6 @@ from typing import Any
 import rclpy
 from rclpy.duration import Duration
 
-from gait_entrainment_nodes.messaging.delays import unmatched_by_delay
 from gait_entrainment_nodes.messaging.raw_messages import serialize
 from gait_entrainment_nodes.messaging.topics import (
     EVERY_MESSAGE,
@@ -58,8 +57,7 @@ class CountedPublisher:
     @property
     def matched(self) -> int:
         """Number of subscriptions that will receive what is published from now on."""
-        late = unmatched_by_delay(self._node, self.topic_name, time.time())
-        return max(int(self._publisher.get_subscription_count()) - late, 0)
+        return int(self._publisher.get_subscription_count())
 
     @property
     def unmatched(self) -> int:

@@ -39,7 +39,6 @@ from gait_entrainment_bags.definitions import fields_of
 from gait_entrainment_msgs.msg import Progress, PublishedCounts
 from gait_entrainment_nodes.messaging import topics
 from gait_entrainment_nodes.messaging.raw_messages import message_class
-from gait_entrainment_nodes.nodes.late import raw_reader
 from gait_entrainment_nodes.nodes.parameters import texts
 from gait_entrainment_nodes.nodes.participant import Participant
 from gait_entrainment_nodes.nodes.rclpy_internals import RawReader
@@ -181,7 +180,7 @@ class BagRecorder(Participant):
         qos = topics.quality(reliable=reliable, lasting=lasting)
         record = self._writer_for(name, definition)
         if name != self._progress_topic:
-            self._readers.append((raw_reader(self, message_type, name, qos), record))
+            self._readers.append((RawReader(self, message_type, name, qos), record))
             return
 
         def record_progress(data: bytes) -> None:

@@ -25,7 +25,6 @@ from gait_entrainment.errors import EntrainmentError, UsageError
 from gait_entrainment_bags import NothingToPlayError
 from gait_entrainment_commands.signals import STOPPING
 from gait_entrainment_nodes.messaging.environment import come_before_others
-from gait_entrainment_nodes.nodes.late import PERIOD
 from gait_entrainment_nodes.nodes.parameters import HELP, HelpRequestedError
 
 # The longest time [s] that the loop sleeps in the executor, so that signals are handled soon.
@@ -106,8 +105,6 @@ def _serve_once(executor: Any, node: Any) -> None:
     sleep = LONGEST_SLEEP
     if deadline is not None:
         sleep = min(max(deadline - time.monotonic(), 0.0), LONGEST_SLEEP)
-    if node.late:
-        sleep = min(sleep, PERIOD)
     try:
         executor.spin_once(timeout_sec=sleep)
     except RuntimeError as error:  # rclpy's RCLError, which it does not export
@@ -118,8 +115,6 @@ def _serve_once(executor: Any, node: Any) -> None:
         if "value must not be negative" not in str(error):
             raise
         node.get_logger().warning(f"a message is dropped: /clock: {error}")
-    for deliver in node.late:
-        deliver()
     node.publish_state()
     deadline = node.next_deadline()
     if deadline is not None and time.monotonic() >= deadline:

@@ -15,18 +15,15 @@ from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
-from rclpy.serialization import deserialize_message
 
 from gait_entrainment.errors import EntrainmentError
 from gait_entrainment.settings import SettingError
 from gait_entrainment_msgs.msg import PublishedCounts
 from gait_entrainment_msgs.srv import Ready
-from gait_entrainment_nodes.messaging.delays import delay_between, delays_wanted
 from gait_entrainment_nodes.messaging.environment import PRIORITY
 from gait_entrainment_nodes.messaging.publisher import CountedPublisher, StopRequestedError
 from gait_entrainment_nodes.messaging.stamps import header, to_time
 from gait_entrainment_nodes.messaging.topics import DIAGNOSTICS, PUBLISHED_COUNTS, Topic
-from gait_entrainment_nodes.nodes.late import LateClient, LateReader
 from gait_entrainment_nodes.nodes.loop import run_node
 from gait_entrainment_nodes.nodes.parameters import (
     answer_help,
@@ -59,7 +56,6 @@ class Participant(Node):
     failure: str | None = None  # why the node must end with exit code 1
     finished = False  # set to end the loop with exit code 0
     run: Any = None  # the current run, with its ``number``; None between runs
-    late: tuple[Callable[[], None], ...] = ()  # functions that deliver late messages, in tests
 
     def __init__(self, node_name: str, *, fixed: Collection[str] = (), **settings: Any) -> None:
         self._own = f"{node_name}/"  # how the names of its own topics begin in the table
@@ -162,25 +158,12 @@ class Participant(Node):
     ) -> None:
         """Create a subscription with its topic's quality of service, to bytes if ``raw``."""
         name = self.name_of(topic)
-        if delays_wanted():
-            reader = LateReader(self, topic.type, name, topic.qos)
-
-            def deliver() -> None:
-                for _, data in reader.take(100):
-                    callback(data if raw else deserialize_message(data, topic.type))
-
-            self.late += (deliver,)
-            return
         qos = self.quality_of(name, "subscription", topic.qos)
         self.create_subscription(topic.type, name, callback, raw=raw, **qos)
 
     def client(self, service_type: Any, name: str) -> Any:
         """Create a client of another node's service, whose name starts with that node's."""
-        client: Any = self.create_client(service_type, name)
-        if delays_wanted():
-            client = LateClient(client, delay_between(name.partition("/")[0], self.get_name()))
-            self.late += (client.deliver,)
-        return client
+        return self.create_client(service_type, name)
 
     def subscribe_to_run(self, topic: Topic, callback: Callable[[Any, Any], None]) -> None:
         """Subscribe; call ``callback`` with the run and each message of the current run."""
