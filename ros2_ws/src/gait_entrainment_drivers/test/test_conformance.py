@@ -139,6 +139,12 @@ def test_the_command_prints_a_sentence_for_each_promise(capsys):
     assert {check["check"] for check in report["checks"]} == {c.__name__ for c in CHECKS}
 
 
+def test_single_checks_can_be_run_in_any_order(capsys):
+    assert main(["driver", "check", "ideal", "--only", "cuts,pulses", "--json"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert [check["check"] for check in report["checks"]] == ["cuts", "pulses"]
+
+
 def test_a_broken_promise_gives_exit_code_1(capsys, monkeypatch):
     monkeypatch.setitem(OWN_DRIVERS, "late", "late:Late")
     late = next(b for b, check, _ in BROKEN if b.__name__ == "PushesLate")
@@ -156,6 +162,7 @@ def test_a_broken_promise_gives_exit_code_1(capsys, monkeypatch):
         (["nobody"], "'nobody' is unknown; allowed: .*ideal"),
         (["ideal:x=1"], "option 'x=1'; allowed: rate"),
         (["ideal", "--torque", "nan"], "--torque: 'nan'"),
+        (["ideal", "--only", "cuts,cut"], "--only: 'cut' is unknown; allowed: construction, "),
         (["ak_mit_can"], "applies real torque.*--arm"),
         (["ak_mit_can:motor=AK1", "--arm"], "motor: 'AK1'; allowed: AK60-6"),
         (["ak_mit_can:channel=nosuchcan7", "--arm"], "nosuchcan7 cannot be opened"),

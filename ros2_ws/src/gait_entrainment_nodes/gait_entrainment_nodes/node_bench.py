@@ -30,7 +30,7 @@ from gait_entrainment_drivers.conformance.bench import (
     require,
     run_check,
 )
-from gait_entrainment_drivers.conformance.checks import COMMON
+from gait_entrainment_drivers.conformance.checks import COMMON, chosen_checks
 from gait_entrainment_msgs.action import DeliverPulseTrain
 from gait_entrainment_msgs.msg import Horizon
 from gait_entrainment_nodes.messaging.client import Client
@@ -268,17 +268,18 @@ def other_run(bench: NodeBench) -> None:
 
 
 def check_node(
-    name: str, side: Side, tolerances: Tolerances, *, real_time: bool, arm: bool
+    name: str, side: Side, tolerances: Tolerances, *, real_time: bool, arm: bool, only: str = ""
 ) -> Iterator[Result]:
     """
-    Run every check on a node whose robot is on ``side``; yield each result once it is there.
+    Run every check, or ``only`` some, on a node whose robot is on ``side``; yield each result.
 
     With ``real_time`` the stamps are of the wall clock, as the node of a real robot needs them;
     with ``arm`` its service ``~/arm`` is called, and it may deliver torque. Raises DeviceError if
-    there is no such node.
+    there is no such node, UsageError for an unknown check.
     """
+    checks = chosen_checks((*COMMON, other_run), only)
     robot = _NodeRobot(name, simulated=not real_time, arm=arm)
     with robot.client:
         bench = NodeBench(robot, side, tolerances)
-        for check in (*COMMON, other_run):
+        for check in checks:
             yield run_check(check, bench)

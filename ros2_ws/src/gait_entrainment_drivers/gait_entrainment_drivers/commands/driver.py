@@ -16,7 +16,7 @@ from gait_entrainment.errors import EntrainmentError
 from gait_entrainment.robot import DeviceError, LimitError, driver_names, driver_on, find_driver
 from gait_entrainment.settings import Setting, settings_of
 from gait_entrainment_drivers.conformance.bench import DriverBench, Result, Tolerances, run_check
-from gait_entrainment_drivers.conformance.checks import CHECKS, silent_host
+from gait_entrainment_drivers.conformance.checks import CHECKS, Check, chosen_checks, silent_host
 from gait_entrainment_drivers.proof import keep_proof
 
 # Entry point group of the check of a running node: it needs ROS, which this package does not.
@@ -79,6 +79,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="the node drives a real robot: check it on the wall clock",
     )
+    check.add_argument("--only", default="", metavar="CHECK,...", help="run only these checks")
     for action in (check, prove):
         action.add_argument(
             "--arm",
@@ -134,7 +135,8 @@ def check_driver(options: argparse.Namespace) -> int:
     """Run the conformance kit on a driver or a node; return 1 if a promise is broken."""
     if options.node is not None:
         return _report(options.node, _check_node(options, _tolerances(options)), options.json)
-    return _report(options.driver, _check_driver(options, CHECKS), options.json)
+    checks = chosen_checks(CHECKS, options.only)
+    return _report(options.driver, _check_driver(options, checks), options.json)
 
 
 def prove_driver(options: argparse.Namespace) -> int:
@@ -148,9 +150,7 @@ def _tolerances(options: argparse.Namespace) -> Tolerances:
     return Tolerances(torque=_TORQUE.parse("--torque", options.torque))
 
 
-def _check_driver(
-    options: argparse.Namespace, checks: Iterable[Callable[[Any], None]]
-) -> Iterator[Result]:
+def _check_driver(options: argparse.Namespace, checks: Iterable[Check]) -> Iterator[Result]:
     """Check a driver, and store what silent_host proves about a real device."""
     tolerances, driver = _tolerances(options), find_driver(options.driver)
     if not driver.simulated:
@@ -175,8 +175,8 @@ def _check_node(options: argparse.Namespace, tolerances: Tolerances) -> Iterator
     if not found:
         raise DeviceError("--node needs the package gait_entrainment_nodes, and ROS")
     check: Callable[..., Iterator[Result]] = found[0].load()
-    side, real_time = Side[options.side.upper()], options.real_time
-    return check(options.node, side, tolerances, real_time=real_time, arm=options.arm)
+    side, more = Side[options.side.upper()], {"arm": options.arm, "only": options.only}
+    return check(options.node, side, tolerances, real_time=options.real_time, **more)
 
 
 def _report(name: str, results: Iterable[Result], as_json: bool) -> int:

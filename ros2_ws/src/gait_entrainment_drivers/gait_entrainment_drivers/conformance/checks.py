@@ -11,11 +11,13 @@ BrokenPromiseError, with one sentence, if it is broken.
 import itertools
 import math
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import fields, is_dataclass
+from typing import Any
 
 from gait_entrainment.conventions import NANOSECONDS_PER_SECOND, nanoseconds
+from gait_entrainment.errors import UsageError
 from gait_entrainment.robot import DeviceError, DeviceLimits, Pulse, PulseTrain, Shape
 from gait_entrainment.robot.faults import EXPERIMENT_SILENT
 from gait_entrainment_commands.timing import lateness_ms, quantile, timings_of
@@ -27,6 +29,8 @@ from gait_entrainment_drivers.conformance.bench import (
     DriverBench,
     require,
 )
+
+Check = Callable[[Any], None]
 
 
 def construction(bench: DriverBench) -> None:
@@ -385,6 +389,16 @@ def prompt_calls(bench: DriverBench) -> None:
         f"Nine in ten calls took up to {usual:.1f} ms and the slowest {slowest:.0f} ms; "
         f"promised: {most:.0f} and {limit:.0f} ms.",
     )
+
+
+def chosen_checks(checks: Sequence[Check], names: str) -> list[Check]:
+    """Return the checks named in a list with commas, or all; raises UsageError for other names."""
+    known = {check.__name__: check for check in checks}
+    wanted = names.split(",") if names else [*known]
+    for name in wanted:
+        if name not in known:
+            raise UsageError(f"--only: {name!r} is unknown; allowed: {', '.join(known)}")
+    return [known[name] for name in wanted]
 
 
 def _distribution(prefix: str, ms: Iterable[float]) -> dict[str, float]:
