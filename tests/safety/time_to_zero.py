@@ -12,6 +12,7 @@ Each trial is an `entrain run --real-time` with an emulated motor in another pro
 timeout is 0.05 s. The action comes at a random time in a pulse. The motor's own trace then shows
 when its torque fell below 5 % of the pulse for good, and how many pulses followed. Prints a table:
 action, motor, trials, median and worst [ms], further pulses. Each run's first line goes to stderr.
+Exits with 1 if torque lasted, or if a run ended before its action.
 """
 
 import argparse

@@ -59,11 +59,14 @@ def test_an_unproved_watchdog_and_a_missing_stop_fail_by_name(tmp_path):
     assert preflight_of(driver).failed == "watchdog, stop"
 
 
+def test_a_folder_that_cannot_be_written_fails():
+    assert not _record(Path("/proc/study")).passed
+
+
 @pytest.mark.usefixtures("state")
 def test_a_robot_that_does_not_answer_fails():
     options = ("--driver=ak_mit_can:interface=virtual,channel=nobody", "--arm")
     code, out, _ = entrain(None, "preflight", *options)
     assert code == 1
-    assert not _record(Path("/proc/study")).passed
     assert "FAIL  device" in out
     assert "check its power" in out

@@ -42,10 +42,11 @@ def test_how_a_walk_is_cut_changes_no_bit(kind, cuts, jitter):
     assert measured(kind, cuts, usual)[0] == measured(kind, (), usual)[0]
 
 
-def test_samples_repeat_and_depend_on_the_seed():
+def test_samples_repeat_and_depend_on_seed_and_side():
     first, again = measured("insole_force")[0], measured("insole_force")[0]
     assert first == again
     assert measured("insole_force", seed=4)[0] != first
+    assert measured("insole_force", side=Side.LEFT)[0] != first
 
 
 def test_an_ideal_sensor_measures_the_walker():

@@ -51,6 +51,7 @@ def test_events_of_a_closed_form_signal(rate):
     found = fed(detector, sampled(lambda t: (0.01, foot_rate(t), 0.0), UNTIL, rate))
     strikes, toe_offs = times(found, STRIKE), times(found, TOE_OFF)
     assert len(strikes) == 13  # not the first, as no swing comes before it
+    assert len(toe_offs) == 13
     # The slap passes 0.25 rad/s 2 ms after the strike; push-off falls to three quarters in 5 ms.
     for n, time in enumerate(strikes, 1):
         assert time == pytest.approx(OFFSET[Side.RIGHT] + n * STRIDE + 2e-3, abs=6e-3)

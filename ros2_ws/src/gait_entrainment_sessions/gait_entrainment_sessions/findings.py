@@ -183,7 +183,7 @@ class StudyFindings:
 
 def text(value: float, form: str) -> str:
     """Return a value formatted as text, or a remark if it is unknown."""
-    return "cannot be told" if math.isnan(value) else form.format(value)
+    return "unknown" if math.isnan(value) else form.format(value)
 
 
 def shown(estimate: Estimate, unit: str, factor: float = 1.0) -> str:

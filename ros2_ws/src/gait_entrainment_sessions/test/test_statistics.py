@@ -163,13 +163,15 @@ def test_intervals_of_mean_and_deviation_have_their_nominal_coverage():
     assert math.isnan(statistics.deviation([1.0]).value)
 
 
-@pytest.mark.parametrize("count", [5, 12, 40])
+@pytest.mark.parametrize("count", [5, 10, 12, 40])
 def test_rayleigh_agrees_with_another_approximation_and_with_chance(count):
     phases = [0.02 * n for n in range(count)]
     other = rayleightest(2 * np.pi * np.array(phases))
     assert statistics.rayleigh(phases) == pytest.approx(other, abs=0.005)
-    # For ten persons close together, that library's series is negative.
-    assert 0 < statistics.rayleigh([0.65 + phase / count for phase in phases]) < 0.01
+    # For ten persons close together that library's series is negative, which no probability is.
+    close = [0.65 + phase / count for phase in phases]
+    assert 0 < statistics.rayleigh(close) < 0.01
+    assert (rayleightest(2 * np.pi * np.array(close)) < 0) == (count == 10)
     assert 0.02 < rate_of(lambda rng: statistics.rayleigh(rng.uniform(size=count)) < 0.05) < 0.09
     assert math.isnan(statistics.rayleigh([0.5]))
 
