@@ -60,7 +60,7 @@ def main() -> None:
             shown = {"desktop": Look(desktop, port), "tablet": Look(tablet, port)}
             shown["desktop"].note("harness fitted, treadmill at 1.1 m/s")
             for name, look in shown.items():
-                look.until(f"{SHOWN} of 80", patience=150)
+                look.until(f"{SHOWN} of 80", timeout=150)
                 look.browser.save_screenshot(str(FIGURES / f"page_{name}.png"))
 
 

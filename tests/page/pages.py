@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from harness import PATIENCE, Started
+from harness import TIMEOUT, Started
 from selenium.common.exceptions import StaleElementReferenceException, WebDriverException
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
@@ -34,7 +34,7 @@ def request(port: int, path: str = "/", method: str = "GET", **headers: str) -> 
 
 def until_served(port: int, *commands: Started) -> None:
     """Wait until a page is served, while the commands keep running."""
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + TIMEOUT
     while time.monotonic() < deadline:
         for command in commands:
             assert command.process.poll() is None, command.text
@@ -76,9 +76,9 @@ class Look:
         except (StaleElementReferenceException, WebDriverException):
             return ""
 
-    def until(self, *words: str, patience: float = PATIENCE) -> str:
+    def until(self, *words: str, timeout: float = TIMEOUT) -> str:
         """Wait until all words are shown; return the text."""
-        deadline = time.monotonic() + patience
+        deadline = time.monotonic() + timeout
         while not all(word in (text := self.text) for word in words):
             log = self.browser.get_log("browser") if time.monotonic() > deadline else []
             assert time.monotonic() < deadline, f"no {words} in:\n{text}\n{log}"
@@ -87,7 +87,7 @@ class Look:
 
     def until_not(self, *words: str) -> None:
         """Wait until none of the words is shown."""
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + TIMEOUT
         while any(word in (text := self.text) for word in words) or not text:
             assert time.monotonic() < deadline, f"{words} in:\n{text}"
             time.sleep(0.05)
@@ -96,7 +96,7 @@ class Look:
         """Click the button with these words, once it can be clicked."""
         self.until(words)
         path = f"//button[contains(., '{words}') and not(@disabled)]"
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + TIMEOUT
         while not (found := self.browser.find_elements(By.XPATH, path)):
             assert time.monotonic() < deadline, f"{words} cannot be clicked:\n{self.text}"
             time.sleep(0.05)

@@ -37,7 +37,7 @@ from gait_entrainment_nodes.messaging.stamps import header
 from gait_entrainment_nodes.messaging.topics import GROUND_REACTION, STRIDES, Topic
 
 # Long enough for a machine with two shared cores; only a failing test waits this long [s].
-PATIENCE = 60.0
+TIMEOUT = 60.0
 # Dynamically similar to the paper's walker, in sixteenfold gravity: the same angles and torques in
 # a quarter of the time. For tests that have to wait in real time.
 QUICK = ("--gravity=156.96", "--mass=5", "--period-offset=-0.0125", "--width=0.025")
@@ -114,11 +114,9 @@ class Probe:
         self.client = Client("probe", domain=domain)
         self.node = self.client.node
 
-    def until(
-        self, condition: Callable[[], Any], what: str = "", patience: float = PATIENCE
-    ) -> Any:
+    def until(self, condition: Callable[[], Any], what: str = "", timeout: float = TIMEOUT) -> Any:
         """Serve ROS until a condition holds; return its value."""
-        value = self.client.wait(condition, patience)
+        value = self.client.wait(condition, timeout)
         assert value, f"timed out waiting for {what}"
         return value
 
@@ -142,7 +140,7 @@ class Probe:
 
     def result(self, handle: Any) -> Any:
         """Wait for the result of a goal."""
-        answer = self.client.result(handle, PATIENCE)
+        answer = self.client.result(handle, TIMEOUT)
         assert answer, "timed out waiting for a result"
         return answer
 
@@ -246,7 +244,7 @@ class Started:
 
     def wait(self) -> int:
         """Wait for it to end; return its exit code."""
-        self._watcher.join(PATIENCE)
+        self._watcher.join(TIMEOUT)
         code = self.process.poll()
         assert code is not None, self.text
         return code
@@ -259,7 +257,7 @@ class Started:
     def find_nodes(self, names: Sequence[str] = ()) -> dict[str, int]:
         """Return the process ids of all its nodes, once they are running."""
         names = names or self.names
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + TIMEOUT
         while self.nodes.keys() != set(names):
             assert self.process.poll() is None, self.text
             assert time.monotonic() < deadline

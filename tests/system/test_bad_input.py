@@ -10,7 +10,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from harness import LONG, PATIENCE, QUICK, entrain_run, probe
+from harness import LONG, QUICK, TIMEOUT, entrain_run, probe
 
 from gait_entrainment_bags import BagReader
 from gait_entrainment_msgs.srv import Ready
@@ -42,7 +42,7 @@ def entrain(folder, *options, **environment):
         env={**os.environ, **environment},
         capture_output=True,
         text=True,
-        timeout=PATIENCE,
+        timeout=TIMEOUT,
         check=False,
     )
     assert done.stdout == ""
@@ -168,7 +168,7 @@ def test_environment_in_which_ros_cannot_start_gives_one_line(command, tmp_path)
         cwd=tmp_path,
         capture_output=True,
         text=True,
-        timeout=PATIENCE,
+        timeout=TIMEOUT,
         env={**os.environ, "RMW_IMPLEMENTATION": "rmw_nonsense"},
     )
     assert (done.returncode, done.stdout) == (1, "")
@@ -185,7 +185,7 @@ def test_run_needs_neither_home_nor_standard_output(tmp_path):
         env=environment,
         capture_output=True,
         text=True,
-        timeout=PATIENCE,
+        timeout=TIMEOUT,
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert_readable(tmp_path / "bag")
@@ -292,7 +292,7 @@ def test_node_refuses_a_wrong_parameter_in_one_line(node, arguments, named, tmp_
             env={**os.environ, "ROS_DOMAIN_ID": str(domain)},
             capture_output=True,
             text=True,
-            timeout=PATIENCE,
+            timeout=TIMEOUT,
             check=False,
         )
     assert done.returncode == 2
@@ -315,7 +315,7 @@ def test_unknown_parameters_are_warned_about_in_one_line(tmp_path):
             listener.call(Ready, "walker_sim/ready")
         finally:
             node.terminate()
-            _, text = node.communicate(timeout=PATIENCE)
+            _, text = node.communicate(timeout=TIMEOUT)
     assert node.returncode == 0
     warning, started = text.splitlines()
     for word in ("[WARN]", "walker_sim", "ignored: masss (mass?), camera.rate"):
@@ -337,7 +337,7 @@ def test_second_experiment_in_a_domain_is_refused():
                 env=environment,
                 capture_output=True,
                 text=True,
-                timeout=PATIENCE,
+                timeout=TIMEOUT,
                 check=False,
             )
         finally:

@@ -10,7 +10,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import yaml
-from harness import PATIENCE
+from harness import TIMEOUT
 
 from gait_entrainment_bags import BagReader
 from gait_entrainment_bringup.node_list import NODES
@@ -59,7 +59,7 @@ def test_services_conduct_and_record_one_experiment(tmp_path):
             process = subprocess.Popen(
                 words, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, text=True
             )
-            stack.callback(process.wait, PATIENCE)
+            stack.callback(process.wait, TIMEOUT)
             stack.callback(process.terminate)
             return process
 
@@ -70,7 +70,7 @@ def test_services_conduct_and_record_one_experiment(tmp_path):
             kind, program, *words = defined[name]["healthcheck"]["test"]
             assert (kind, words) == ("CMD", ["entrain", "ready", name])
             check = [program.replace(INSIDE, str(ROOT)), *words, "--timeout=30"]
-            return run(check).wait(PATIENCE) == 0
+            return run(check).wait(TIMEOUT) == 0
 
         awaited = defined["experiment"]["depends_on"]
         assert set(awaited) == set(NODES) - {"experiment"}
@@ -78,13 +78,13 @@ def test_services_conduct_and_record_one_experiment(tmp_path):
         assert healthy("perturbator")  # the others' commands differ only in the name
         running["experiment"] = start("experiment")
         for name in defined["outcome"]["depends_on"]:
-            assert running[name].wait(PATIENCE) == 0, name
-        text, _ = start("outcome").communicate(timeout=PATIENCE)
+            assert running[name].wait(TIMEOUT) == 0, name
+        text, _ = start("outcome").communicate(timeout=TIMEOUT)
         assert "strides          9, pulses placed in them: 5" in text
         assert_states_are_not_counted(tmp_path / "bags/from_compose")
         for name in set(NODES) - {"bag_recorder", "experiment"}:
             running[name].terminate()
-            assert running[name].wait(PATIENCE) == 0, name
+            assert running[name].wait(TIMEOUT) == 0, name
 
 
 def test_every_service_drops_its_privileges_and_has_no_network():

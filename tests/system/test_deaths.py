@@ -8,7 +8,7 @@ import signal
 import time
 
 import pytest
-from harness import LONG, PATIENCE, entrain_run
+from harness import LONG, TIMEOUT, entrain_run
 
 from gait_entrainment_bags import BagReader
 from gait_entrainment_bringup.node_list import NODES
@@ -59,7 +59,7 @@ def test_death_ends_the_run(node, tmp_path):
 def test_stalled_process_ends_the_run(mode, stalled, tmp_path):
     # Several at once, because most of the time is spent waiting. Their duration then says nothing
     # about a single run, so the strict limit applies only to a lone run.
-    limit = SILENCE_TIMEOUT + 2 * END_WITHIN if len(stalled) == 1 else PATIENCE
+    limit = SILENCE_TIMEOUT + 2 * END_WITHIN if len(stalled) == 1 else TIMEOUT
     runs = {}
     try:
         for node in stalled:

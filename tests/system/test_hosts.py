@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from harness import PATIENCE, QUICK, events_since_start, simulated_events
+from harness import QUICK, TIMEOUT, events_since_start, simulated_events
 from slow_link import SlowLink, obstacle
 
 from gait_entrainment_bags import BagReader
@@ -44,7 +44,7 @@ def started(command: Sequence[str], variables: dict[str, str]) -> Iterator[Any]:
         yield process
     finally:
         process.terminate()
-        process.wait(PATIENCE)
+        process.wait(TIMEOUT)
 
 
 def run_command(bag: Path, *options: str) -> list[str]:
@@ -64,10 +64,10 @@ def test_lock_step_matches_the_simulation_to_the_nanosecond(link, tmp_path):
         started(link.on(ROBOT_HOST, [*ask, "--timeout=60"]), subnet) as friend,
         started(link.on(ROBOT_HOST, run_command(bag, "--json", *options)), subnet) as run,
     ):
-        text, _ = run.communicate(timeout=PATIENCE)
+        text, _ = run.communicate(timeout=TIMEOUT)
         assert run.returncode == 0
         # A process limited to its own host finds no node elsewhere.
-        assert (friend.wait(PATIENCE), stranger.wait(PATIENCE)) == (0, 1)
+        assert (friend.wait(TIMEOUT), stranger.wait(TIMEOUT)) == (0, 1)
     assert json.loads(text)["lost"] == 0
     events = events_since_start(bag)
     assert len(events) > 4 * 8
@@ -93,7 +93,7 @@ def test_real_time_counts_the_stretches_that_a_slow_network_delays(link, tmp_pat
             time.sleep(0.02)
         # From here to the end of the run, a round trip takes longer than the lead time.
         monkeypatch.setattr(link, "delay", 0.25)
-        text, _ = run.communicate(timeout=PATIENCE)
+        text, _ = run.communicate(timeout=TIMEOUT)
     assert run.returncode == 0, text
     with BagReader(bag) as reader:
         stretches = {

@@ -19,8 +19,8 @@ from pathlib import Path
 import pytest
 from harness import (
     LONG,
-    PATIENCE,
     QUICK,
+    TIMEOUT,
     entrain_run,
     events_since_start,
     payloads,
@@ -89,7 +89,7 @@ def test_a_replay_waits_until_it_is_heard(live, tmp_path):
             env=os.environ | delays("bag_player>gait_analyzer", matched),
             capture_output=True,
             text=True,
-            timeout=2 * PATIENCE,
+            timeout=2 * TIMEOUT,
         )
         assert replayed.returncode == 0, replayed.stderr
         if not matched_too_early(again, matched):

@@ -18,7 +18,7 @@ from typing import Any
 
 import pytest
 import yaml
-from harness import PATIENCE, Probe, probe, session
+from harness import TIMEOUT, Probe, probe, session
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
@@ -98,7 +98,7 @@ class Recorder:
             )
 
     def wait(self) -> int:
-        return self.process.wait(PATIENCE)
+        return self.process.wait(TIMEOUT)
 
     def finish(self, listener: Probe, **counts: int) -> int:
         """Send the recorder the final counts; it ends once it has written all those messages."""
@@ -319,7 +319,7 @@ def test_runs_that_start_together_leave_each_others_bags_alone(
         )
         for _ in range(3)
     ]
-    outputs = [run.communicate(timeout=PATIENCE) for run in runs]
+    outputs = [run.communicate(timeout=TIMEOUT) for run in runs]
     codes = sorted(run.returncode for run in runs)
     assert codes == ([0, 2, 2] if named else [0, 0, 0]), outputs
     bags = list(tmp_path.iterdir()) if named else list((tmp_path / "bags").iterdir())
@@ -376,7 +376,7 @@ def test_another_recorder_hears_a_whole_run_in_lock_step(tmp_path: Path) -> None
                 kind, name, partial(record, name), quality, raw=True
             )
         handle = nodes.conduct()
-        result = nodes.probe.client.result(handle, PATIENCE).result
+        result = nodes.probe.client.result(handle, TIMEOUT).result
         assert result.outcome == RunProtocol.Result.FINISHED, result.message
         nodes.probe.until(
             lambda: (

@@ -15,7 +15,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from harness import PATIENCE, Probe, entrain_run, payloads, probe
+from harness import TIMEOUT, Probe, entrain_run, payloads, probe
 
 from gait_entrainment.gait import VerdictSettings
 from gait_entrainment_bags import BagReader, BagWriter
@@ -55,7 +55,7 @@ def replay(*arguments: object) -> tuple[int, Any]:
         ["entrain", "replay", *map(str, arguments), "--json"],
         capture_output=True,
         text=True,
-        timeout=2 * PATIENCE,
+        timeout=2 * TIMEOUT,
     )
     assert ended.stdout, ended.stderr
     return ended.returncode, json.loads(ended.stdout)
@@ -251,7 +251,7 @@ def test_the_player_obeys_its_services(player: Any) -> None:
 
 def test_nothing_is_played_without_the_expected_subscriptions(player: Any) -> None:
     process, _ = player("expect:=[/gait_events]", "expect_timeout:=0.5")
-    assert process.process.wait(PATIENCE) == 1
+    assert process.process.wait(TIMEOUT) == 1
     assert "no subscriptions of /gait_events within 0.5 s" in process.log.read_text()
 
 
@@ -269,7 +269,7 @@ def test_a_player_reports_a_hanging_reader_and_obeys_a_signal(player: Any) -> No
         listener.until(lambda: "does not keep up" in process.log.read_text(), "a warning")
         terminated_at = time.monotonic()
         process.process.terminate()
-        assert process.process.wait(PATIENCE) == 0
+        assert process.process.wait(TIMEOUT) == 0
         assert time.monotonic() - terminated_at < 5
     finally:
         reader.kill()
@@ -294,7 +294,7 @@ def test_topics_are_remapped_and_played_in_a_loop(player: Any) -> None:
     assert "/joint_states" in topics
     assert not {"/gait_events", "/gait/strides", "/clock"} & topics.keys()
     process.process.terminate()
-    assert process.process.wait(PATIENCE) == 0
+    assert process.process.wait(TIMEOUT) == 0
     assert "messages played" in process.log.read_text()
 
 
@@ -311,7 +311,7 @@ def test_topics_are_remapped_and_played_in_a_loop(player: Any) -> None:
 )
 def test_a_wrong_parameter_gives_one_line(player: Any, parameter: str, words: str) -> None:
     process, _ = player(parameter)
-    assert process.process.wait(PATIENCE) == 2
+    assert process.process.wait(TIMEOUT) == 2
     text = process.log.read_text()
     assert words in text
     assert text.count("\n") == 1

@@ -9,7 +9,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from harness import PATIENCE
+from harness import TIMEOUT
 
 from gait_entrainment_bags import BagReader
 from gait_entrainment_sessions.folder import SessionFolder
@@ -34,7 +34,7 @@ def entrain(*words, **more):
 
 
 def ended(process):
-    out, err = process.communicate(timeout=PATIENCE)
+    out, err = process.communicate(timeout=TIMEOUT)
     return process.returncode, out, err
 
 
@@ -46,7 +46,7 @@ def conducted(tmp_path_factory):
     first = entrain("session", short, "--out", study, stdin=subprocess.DEVNULL)
     assert first.stdout.readline().startswith("block 1 of 2")
     first.kill()
-    first.communicate(timeout=PATIENCE)
+    first.communicate(timeout=TIMEOUT)
     code, out, err = ended(entrain("session", short, "--out", study, stdin=subprocess.DEVNULL))
     assert (code, err) == (0, "")
     assert f"session          {study / FOLDER}" in out
@@ -72,7 +72,7 @@ def test_bags_name_the_session_key_and_not_the_block(conducted):
 
 def test_the_folder_is_a_valid_bids_dataset(conducted):
     command = ["bids-validator-deno", "--format", "json", str(conducted.path.parents[1])]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=TIMEOUT)
     issues = json.loads(done.stdout)["issues"]["issues"]
     errors = [issue for issue in issues if issue["severity"] == "error"]
     assert errors == []

@@ -8,7 +8,7 @@ import pty
 import termios
 import time
 
-from harness import PATIENCE
+from harness import TIMEOUT
 from test_session import FOLDER, ended, entrain, shortened
 
 from gait_entrainment_sessions.folder import SessionFolder
@@ -21,7 +21,7 @@ def test_the_space_bar_stops_a_block(tmp_path):
     os.write(ours, b"\n")  # the answer to the prompt for what is next
     while not process.stdout.readline().endswith("block 1\n"):
         pass
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + TIMEOUT
     while termios.tcgetattr(theirs)[3] & termios.ICANON:  # until keys are read without Enter
         assert time.monotonic() < deadline
         time.sleep(0.02)

@@ -17,7 +17,7 @@ from gait_entrainment_drivers.conformance.bench import DriverBench, Tolerances, 
 from gait_entrainment_drivers.conformance.checks import CHECKS, silent_host
 
 # A shared machine wakes processes up late; the defaults are for a laboratory's own machine.
-PATIENT = Tolerances(
+TOLERANT = Tolerances(
     onset=0.25, zero_within=1.0, watchdog=1.6, call=0.1, slowest_call=2.0, impulse=0.6
 )
 
@@ -43,7 +43,7 @@ def emulated(*options):
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
 def test_a_robot_with_a_watchdog_keeps_every_promise(check):
     with emulated("--timeout=0.3") as text:
-        result = run_check(check, DriverBench(find_driver(text), PATIENT))
+        result = run_check(check, DriverBench(find_driver(text), TOLERANT))
     assert result.kept, result.broken
 
 

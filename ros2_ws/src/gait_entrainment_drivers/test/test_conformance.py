@@ -27,7 +27,7 @@ from .broken_robots import BROKEN
 from .emulator_process import emulator
 
 # A shared machine wakes processes up late; the kit's own limits are for a quiet one.
-PATIENT = Tolerances(
+TOLERANT = Tolerances(
     onset=0.25, zero_within=1.0, watchdog=1.6, call=0.1, slowest_call=2.0, impulse=0.6
 )
 
@@ -54,7 +54,7 @@ def test_the_simulated_drivers_keep_every_promise(text):
 
 def test_the_can_driver_keeps_every_promise():
     with emulator("--timeout", "0.3") as text:
-        results = run_checks(text, PATIENT)
+        results = run_checks(text, TOLERANT)
     assert [result for result in results if not result.kept] == []
     figures = {result.check: result.figures for result in results}
     assert figures["timing"]["median_ms"] > 0
@@ -82,7 +82,7 @@ def test_a_guard_that_misses_silence_is_caught(monkeypatch):
 
     monkeypatch.setattr(GuardedRobot, "_watch", lambda _: None)
     with emulator() as text:
-        result = run_check(checks.stale_commands, DriverBench(find_driver(text), PATIENT))
+        result = run_check(checks.stale_commands, DriverBench(find_driver(text), TOLERANT))
     assert "silence was not noticed" in result.broken
 
 

@@ -33,7 +33,7 @@ from gait_entrainment_drivers.odrive_emulator import EmulatedOdrive
 
 from .emulator_process import emulator, read_trace, until
 from .test_ak_mit_can import enabled, follow, pulses
-from .test_conformance import PATIENT
+from .test_conformance import TOLERANT
 
 NODE = 3
 
@@ -56,7 +56,7 @@ def robot_on(driver):
 def test_the_driver_keeps_its_promises(name):
     check = next(check for check in CHECKS if check.__name__ == name)
     with axis("--timeout", "0.9", "--loss", "0.01") as driver:
-        result = run_check(check, DriverBench(find_driver(driver), PATIENT))
+        result = run_check(check, DriverBench(find_driver(driver), TOLERANT))
     assert result.kept, result.broken
 
 

@@ -26,7 +26,7 @@ from .emulator_process import until
 SECOND = 1_000_000_000
 HEIGHT = 8.0
 # Limits that a loaded machine can keep; each limit has its own test.
-PATIENT = {"lateness": 0.5, "silence": 0.5, "host_silence": 3.0, "rate": 250.0}
+TOLERANT = {"lateness": 0.5, "silence": 0.5, "host_silence": 3.0, "rate": 250.0}
 
 
 class Bench:
@@ -35,7 +35,7 @@ class Bench:
     def __init__(self, tmp_path, **options):
         self.trace = tmp_path / "trace"
         self.trace.touch()
-        options = MisbehavingOptions(**{**PATIENT, **options}, trace=str(self.trace))
+        options = MisbehavingOptions(**{**TOLERANT, **options}, trace=str(self.trace))
         self.driver = MisbehavingRobot(Side.LEFT, options, 0)
         self.robot = GuardedRobot(self.driver, Side.LEFT)
         self.robot.configure()
