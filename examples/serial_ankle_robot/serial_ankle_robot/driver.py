@@ -76,9 +76,15 @@ class SerialDevice(TorqueDevice):
         """Connect, and check that the robot answers without an error."""
         options = self._options
         try:
-            # `exclusive` keeps other programs, which do not know our lock, off the line.
+            # `exclusive` keeps other programs, which do not know our lock, off the line. pyserial
+            # also reports a write as failed if this process was held up meanwhile, for which the
+            # loop has its own limit.
             self._line = serial.Serial(
-                options.port, options.baud, timeout=0, write_timeout=0.1, exclusive=True
+                options.port,
+                options.baud,
+                timeout=0,
+                write_timeout=2 * options.lateness,
+                exclusive=True,
             )
         except (serial.SerialException, ValueError) as error:
             raise DeviceError(

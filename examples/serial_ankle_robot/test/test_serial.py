@@ -3,12 +3,14 @@
 
 """The driver with the emulated robot: every promise, frames, and faults of the line."""
 
+import os
 import subprocess
 import sys
 import time
 from contextlib import contextmanager
 
 import pytest
+from serial import serialposix
 from serial_ankle_robot.frames import TORQUE, Command, Reply, take_frame
 
 from gait_entrainment.conventions import Side
@@ -45,6 +47,27 @@ def test_a_robot_with_a_watchdog_keeps_every_promise(check):
     with emulated("--timeout=0.3") as text:
         result = run_check(check, DriverBench(find_driver(text), TOLERANT))
     assert result.kept, result.broken
+
+
+def test_a_process_that_is_held_up_while_it_writes_is_no_failure_of_the_line(monkeypatch):
+    """The limit on that is the loop's own, `lateness`, 0.5 s here."""
+    write = os.write
+
+    def held_up(file, data):
+        written = write(file, data)
+        time.sleep(0.15)
+        return written
+
+    with emulated() as text:
+        driver = find_driver(text)
+        device = driver.robot.Device(driver.options)
+        device.open()
+        device.enable()
+        monkeypatch.setattr(serialposix.os, "write", held_up)
+        assert device.exchange(0.0, 0.5).faults == ()
+        monkeypatch.undo()
+        device.disable()
+        device.shut()
 
 
 def test_a_robot_without_a_watchdog_holds_its_last_command():

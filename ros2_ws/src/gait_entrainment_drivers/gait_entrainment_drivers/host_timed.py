@@ -108,7 +108,7 @@ class HostTimedRobot(AnkleRobot):
         self._offset = time.time_ns() - time.monotonic_ns()  # from steady time to stamps
         self._done: dict[str, str] = {}  # the loop's answers: error texts
         # The loop ends its torque by itself if it is late, and reports once per period at most.
-        self._patience = max(options.host_silence, options.lateness + 2 / options.rate)
+        self._longest_silence = max(options.host_silence, options.lateness + 2 / options.rate)
         self._streams, self._heard_at = False, 0.0  # whether the loop streams; last heard at [s]
         self._latest = 0  # stamp of its latest sample [ns]
 
@@ -263,7 +263,7 @@ class HostTimedRobot(AnkleRobot):
         now = time.monotonic()
         if messages or not self._streams:
             self._heard_at = now
-        elif now - self._heard_at > self._patience:
+        elif now - self._heard_at > self._longest_silence:
             self._miss(_LOOP_SILENT)
         for kind, *content in messages:
             if kind == "samples":

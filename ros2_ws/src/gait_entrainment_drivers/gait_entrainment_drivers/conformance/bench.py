@@ -291,8 +291,9 @@ class Bench(ABC):
 
     def require_no_faults(self, event: str) -> None:
         """Require that no fault was reported."""
-        names = ", ".join(fault.name for fault in self.robot.faults)
-        require(not names, f"{event}: {names}.")
+        faults = [(fault.name, fault.meaning.rstrip(".")) for fault in self.robot.faults]
+        found = "; ".join(": ".join(filter(None, texts)) for texts in faults)
+        require(not found, f"{event}: {found}.")
 
 
 class DriverBench(Bench):
