@@ -24,7 +24,7 @@ import os
 import sys
 from collections.abc import Sequence
 from contextlib import redirect_stdout, suppress
-from typing import Any
+from typing import Any, NoReturn
 
 from gait_entrainment.errors import EntrainmentError
 from gait_entrainment_commands.printable import PrintableOutput, printable
@@ -104,11 +104,16 @@ def forget_unwritable_output() -> None:
 
 class _Parser(argparse.ArgumentParser):
     """
-    A parser whose actions reject unknown arguments themselves, with their own usage.
+    A parser whose actions reject unknown arguments themselves, in one line.
 
-    argparse leaves that to the top-level parser, whose usage is no help. The options' ``prog`` is
-    the innermost parser's. Failing to write help is an error here; argparse ignores it.
+    argparse leaves that to the top-level parser, and prints the usage first, which may fill the
+    screen. The options' ``prog`` is the innermost parser's. Failing to write help is an error
+    here; argparse ignores it.
     """
+
+    def error(self, message: str) -> NoReturn:
+        _tell(f"{self.prog}: {printable(message)}; see {self.prog} --help")
+        raise SystemExit(2)
 
     def print_help(self, file: Any = None) -> None:
         print(self.format_help(), end="", file=file, flush=True)

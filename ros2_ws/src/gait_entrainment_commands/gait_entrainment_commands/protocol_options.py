@@ -40,7 +40,7 @@ def add_protocol_options(parser: argparse.ArgumentParser) -> None:
 
 def _default_text(field: str) -> str:
     default = attrgetter(field)(DEFAULT_PROTOCOL)
-    if default is None:  # another field sets the same
+    if default in (None, ""):  # another field sets the same, or there is no default
         return ""
     if isinstance(default, Enum):
         default = default.name.lower()
