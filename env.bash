@@ -36,6 +36,8 @@ _gait_entrainment_source() {
     export RMW_IMPLEMENTATION=${RMW_IMPLEMENTATION:-rmw_fastrtps_cpp}
     # Shared memory that takes a stride of samples at once: the file says what that gains.
     export FASTRTPS_DEFAULT_PROFILES_FILE=${FASTRTPS_DEFAULT_PROFILES_FILE:-$root/ros2_ws/install/gait_entrainment_nodes/share/gait_entrainment_nodes/config/fastdds.xml}
+    # What that file needs: Fast DDS's own values, from which our processes depart.
+    export GAIT_ENTRAINMENT_PORT_BASE=7400 GAIT_ENTRAINMENT_PORT_SHIFT=0
 }
 
 _gait_entrainment_source

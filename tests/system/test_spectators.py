@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The gait_entrainment authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A hanging spectator delays no process in real time, and is named in lock-step."""
+"""A hanging spectator delays nobody in real time, is named in lock-step, disturbs no other run."""
 
 import os
 import signal
@@ -17,6 +17,8 @@ from harness import LONG, QUICK, entrain_run
 # After this long, a suspended reader of shared memory used to hold up its writers for seconds [s].
 HUNG_FOR = 12.0
 SILENCE_TIMEOUT = 3.0
+# A process of somebody else, for instance `ros2 topic echo`.
+FOREIGN = "import rclpy; rclpy.init(); rclpy.create_node('foreign'); rclpy.shutdown()"
 
 
 @pytest.fixture
@@ -67,7 +69,9 @@ def test_in_real_time_a_run_with_a_suspended_reader_stops_like_any_other(tmp_pat
         assert run.survivors() == []
 
 
-def test_in_lock_step_a_suspended_reader_is_named(tmp_path, suspend):
+def test_in_lock_step_a_suspended_reader_is_named_and_disturbs_no_other_domain(
+    tmp_path, suspend, monkeypatch
+):
     with entrain_run(tmp_path / "bag", *LONG) as run:
         spectator = suspend()
         begin = time.monotonic()
@@ -75,3 +79,14 @@ def test_in_lock_step_a_suspended_reader_is_named(tmp_path, suspend):
         assert f"held up by process {spectator} " in run.text.splitlines()[0]
         # No process is held up before the queues are full.
         assert run.ended_at - begin < SILENCE_TIMEOUT + 10
+    # The run's processes have left it a port that nobody can open, which Fast DDS reports wherever
+    # a process looks for a free one there: not among results, and never in ours.
+    monkeypatch.setenv("ROS_DOMAIN_ID", "229")
+    foreign = subprocess.run(
+        [sys.executable, "-c", FOREIGN], capture_output=True, text=True, check=False
+    )
+    assert "Failed init_port" in foreign.stderr
+    assert foreign.stdout == ""
+    words = ["entrain", "ready", "nobody", "--timeout=0"]
+    ours = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert ours.stderr == "entrain ready: nobody does not answer\n"

@@ -21,6 +21,9 @@ PACKAGE = "gait_entrainment_nodes"
 # whose messages are judged by their punctuality does not wait for another's turn.
 PRIORITY, PUNCTUAL = 10, 11
 SHARED_MEMORY = Path("/dev/shm")
+# A range of ports for each domain of this many in a row, config/fastdds.xml says for what. The
+# lowest range is above port 5353, which mDNS needs; foreign processes use the one at 7000.
+_PORT_RANGES = 15
 # Without a page for its locks there, Fast DDS dies of SIGBUS; it can do without the rest [bytes].
 _LOCKS = 1_000_000
 
@@ -33,8 +36,8 @@ def require_usable_environment() -> None:
     """
     Check that ROS can start, before it is loaded: it would end the process with its own messages.
 
-    Logs go to a temporary folder if there is no writable home folder. Raises
-    UnusableEnvironmentError.
+    Logs go to a temporary folder if there is no writable home folder, and the ports are chosen on
+    which no process of another domain listens. Raises UnusableEnvironmentError.
     """
     chosen = os.environ.get("RMW_IMPLEMENTATION")
     installed = get_resources("rmw_typesupport").keys() - {"rmw_implementation"}
@@ -61,6 +64,17 @@ def require_usable_environment() -> None:
             "fastrtps_* of processes that have ended"
         )
     _choose_log_folder()
+    os.environ.update(_port_variables())
+
+
+def _port_variables() -> dict[str, str]:
+    """Return the environment variables that config/fastdds.xml reads for ROS_DOMAIN_ID."""
+    domain = os.environ.get("ROS_DOMAIN_ID", "")
+    shift = 1 + (int(domain) if domain.isdigit() else 0) % _PORT_RANGES
+    return {
+        "GAIT_ENTRAINMENT_PORT_BASE": str(7400 - 100 * shift),
+        "GAIT_ENTRAINMENT_PORT_SHIFT": str(shift),
+    }
 
 
 def _choose_log_folder() -> None:
@@ -91,8 +105,9 @@ def dds_variables(*, real_time: bool) -> dict[str, str]:
     """
     Return the environment variables that choose discovery and the Fast DDS profiles.
 
-    They stay as the user has set them. The files say what the profiles are for; those for real
-    time are for one host, so a process that looks for peers on others keeps the common ones.
+    They stay as the user has set them, but for the ports. The files say what the profiles are
+    for; those for real time are for one host, so a process that looks for peers on others keeps
+    the common ones.
     """
     reach, file = "ROS_AUTOMATIC_DISCOVERY_RANGE", "FASTRTPS_DEFAULT_PROFILES_FILE"
     common, paced = (
@@ -108,8 +123,8 @@ def dds_variables(*, real_time: bool) -> dict[str, str]:
             chosen[reach] = "LOCALHOST"
     alone = chosen[reach] == "LOCALHOST" and not os.environ.get("ROS_STATIC_PEERS")
     if real_time and alone and chosen[file] == common:
-        return {reach: "SYSTEM_DEFAULT", file: paced}
-    return chosen
+        chosen = {reach: "SYSTEM_DEFAULT", file: paced}
+    return chosen | _port_variables()
 
 
 def set_environment(domain: int, *, real_time: bool = False) -> dict[str, str]:
@@ -118,11 +133,11 @@ def set_environment(domain: int, *, real_time: bool = False) -> dict[str, str]:
 
     Must be called before ROS is loaded. Raises UnusableEnvironmentError if ROS could not start.
     """
+    os.environ["ROS_DOMAIN_ID"] = str(domain)
     require_usable_environment()
     os.environ.update(dds_variables(real_time=real_time))
     # No node has large matrices: threads for them take longer to start than they save.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    os.environ["ROS_DOMAIN_ID"] = str(domain)
     return dict(os.environ)
 
 
