@@ -69,7 +69,7 @@ def emulated_motor(tmp_path, *options, number=0):
     port = 20_000 + (os.getpid() + number) % 20_000
     trace = tmp_path / f"trace{number}"
     process = subprocess.Popen(
-        ["ak_motor_emulator", f"--port={port}", "--timeout=0.1", f"--trace={trace}", *options],
+        ["ak_motor_emulator", f"--port={port}", "--timeout=0.6", f"--trace={trace}", *options],
         stdout=subprocess.PIPE,
         text=True,
     )

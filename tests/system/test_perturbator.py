@@ -68,6 +68,13 @@ class Conductor:
         self.probe.until(lambda: len(self.profiles) > count, "a profile")
         return self.profiles[-1]
 
+    def feel(self, states):
+        """Wait for measured torque in the robot's states; a fault before that fails the test."""
+        self.probe.until(
+            lambda: self.troubles or (states and states[-1].measured_torque > 0.5), "torque"
+        )
+        assert not self.troubles
+
     def request(self, onset, key=KEY, run=7, **changes):
         """Request a train that starts at a time [s]; return the goal's handle."""
         pulses = {"period": 1.0, "count": 100, "torque": 5.0, "duration": 0.5} | changes
@@ -220,7 +227,7 @@ def test_torque_ends_if_a_required_sender_falls_silent(tmp_path, silent):
         probe.client.each_round = live
         probe.until(lambda: conductor.profiles, "a run")
         assert conductor.request(time.time() + 2, duration=0.3).accepted, conductor.troubles
-        probe.until(lambda: states and states[-1].measured_torque > 0.5, "torque")
+        conductor.feel(states)
         alive.remove(silent)
         probe.until(lambda: conductor.troubles, "the fault")
         assert f": {silent} silent for 2 s" in conductor.troubles[0].message
@@ -241,8 +248,7 @@ def test_torque_ends_if_an_emergency_stop_button_disappears(tmp_path):
         probe.client.each_round = lambda: conductor.horizons.publish(horizon_from(time.time()))
         probe.until(lambda: conductor.profiles, "a run")
         assert conductor.request(time.time() + 1, duration=0.3).accepted, conductor.troubles
-        probe.until(lambda: states and states[-1].measured_torque > 0.5, "torque")
-        assert not conductor.troubles
+        conductor.feel(states)
         probe.node.destroy_publisher(button)
         probe.until(lambda: conductor.troubles, "the fault")
         trouble = conductor.troubles[0]

@@ -23,7 +23,7 @@ def state(tmp_path, monkeypatch):
 
 @pytest.mark.usefixtures("state")
 def test_a_robot_fit_for_a_session_can_be_armed_and_its_bag_records_the_check(tmp_path):
-    with emulated_motor(tmp_path) as (driver, _):
+    with emulated_motor(tmp_path, "--timeout=0.1") as (driver, _):
         keep_proof(driver, 0.1)
         words = ["entrain", "preflight", f"--driver={driver}", "--arm", "--json"]
         checklist = subprocess.Popen(

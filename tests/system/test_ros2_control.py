@@ -89,7 +89,7 @@ OF_THE_DRIVER = {
 
 
 def test_a_controller_that_times_out_keeps_every_promise():
-    with controller("--timeout=0.1") as text:
+    with controller("--timeout=0.4") as text:
         bench = DriverBench(find_driver(text), PATIENT)
         chosen = [check for check in CHECKS if check.__name__ in OF_THE_DRIVER]
         assert len(chosen) == len(OF_THE_DRIVER)

@@ -16,7 +16,6 @@ from harness import LONG, QUICK, entrain_run
 
 # After this long, a suspended reader of shared memory used to hold up its writers for seconds [s].
 HUNG_FOR = 12.0
-SILENCE_TIMEOUT = 3.0
 # A process of somebody else, for instance `ros2 topic echo`.
 FOREIGN = "import rclpy; rclpy.init(); rclpy.create_node('foreign'); rclpy.shutdown()"
 
@@ -74,11 +73,8 @@ def test_in_lock_step_a_suspended_reader_is_named_and_disturbs_no_other_domain(
 ):
     with entrain_run(tmp_path / "bag", *LONG) as run:
         spectator = suspend()
-        begin = time.monotonic()
         assert run.wait() == 1
         assert f"held up by process {spectator} " in run.text.splitlines()[0]
-        # No process is held up before the queues are full.
-        assert run.ended_at - begin < SILENCE_TIMEOUT + 10
     # The run's processes have left it a port that nobody can open, which Fast DDS reports wherever
     # a process looks for a free one there: not among results, and never in ours.
     monkeypatch.setenv("ROS_DOMAIN_ID", "229")
