@@ -20,6 +20,7 @@ QUALITIES = {
     "latest state": topics.LATEST_STATE,
     "viewed": topics.VIEWED,
     "said once": topics.SAID_ONCE,
+    "from a button": topics.FROM_A_BUTTON[0],
     "looking on": topics.LOOKING_ON,
     "heartbeat": topics.HEARTBEAT,
     "from a driver": topics.FROM_A_DRIVER,

@@ -4,6 +4,9 @@
 """The perturbator alone, with the test as its experiment: what it refuses and ends."""
 
 import itertools
+import math
+import os
+import signal
 import time
 from contextlib import contextmanager
 
@@ -224,7 +227,7 @@ def test_torque_ends_if_a_required_sender_falls_silent(tmp_path, silent):
         states = probe.listen(ROBOT_STATE)
         for publisher in (button, heart):
             probe.until(publisher.get_subscription_count, "a reader")
-        probe.client.each_round = live
+        probe.client.each_round = paced(live)
         probe.until(lambda: conductor.profiles, "a run")
         assert conductor.request(time.time() + 2, duration=0.3).accepted, conductor.troubles
         conductor.feel(states)
@@ -245,7 +248,9 @@ def test_torque_ends_if_an_emergency_stop_button_disappears(tmp_path):
         button = probe.node.create_publisher(topic.type, topic.name, topic.qos)
         states = probe.listen(ROBOT_STATE)
         probe.until(button.get_subscription_count, "a reader")
-        probe.client.each_round = lambda: conductor.horizons.publish(horizon_from(time.time()))
+        probe.client.each_round = paced(
+            lambda: conductor.horizons.publish(horizon_from(time.time()))
+        )
         probe.until(lambda: conductor.profiles, "a run")
         assert conductor.request(time.time() + 1, duration=0.3).accepted, conductor.troubles
         conductor.feel(states)
@@ -254,6 +259,19 @@ def test_torque_ends_if_an_emergency_stop_button_disappears(tmp_path):
         trouble = conductor.troubles[0]
         assert trouble.fault == "deadman_silent"
         assert "a node that can press the emergency stop has ended" in trouble.message
+
+
+def paced(send):
+    """Return a function that sends once in 20 ms: one that also answered answers would flood."""
+    sent_at = -math.inf
+
+    def send_if_due():
+        nonlocal sent_at
+        if time.monotonic() - sent_at > 0.02:
+            sent_at = time.monotonic()
+            send()
+
+    return send_if_due
 
 
 def horizon_from(now):
@@ -285,6 +303,26 @@ def test_an_emergency_stop_is_heard_with_any_qos_and_holds_while_it_is_pressed(t
             probe.until(lambda: conductor.transition(Transition.TRANSITION_CONFIGURE), "release")
             assert conductor.transition(Transition.TRANSITION_ACTIVATE)
             probe.node.destroy_publisher(button)
+
+
+@pytest.mark.parametrize("reliable", [True, False])
+def test_a_press_is_heard_although_a_release_follows_at_once(tmp_path, reliable):
+    with session(tmp_path, nodes=("perturbator",), strangers=True) as nodes:
+        conductor, probe = Conductor(nodes), nodes.probe
+        pressed, other = (
+            probe.node.create_publisher(Bool, EMERGENCY_STOP.name, quality(10, reliable=reliable))
+            for _ in range(2)
+        )
+        for button in (pressed, other):
+            probe.until(button.get_subscription_count, "a reader")
+        # Readers that hear neither message before both have come.
+        perturbator = nodes.supervisor._processes["perturbator"].pid
+        os.kill(perturbator, signal.SIGSTOP)
+        pressed.publish(Bool(data=True))
+        other.publish(Bool(data=False))
+        os.kill(perturbator, signal.SIGCONT)
+        probe.until(lambda: conductor.troubles, "the stop")
+        assert "the emergency stop was pressed" in conductor.troubles[-1].message
 
 
 def test_a_stop_while_the_robot_is_being_connected_is_not_forgotten(monkeypatch):

@@ -57,12 +57,15 @@ LATEST_STATE = quality(1000, lasting=True)
 VIEWED = quality(100)
 # What was sent before a reader joined counts too: a description, a button that was pressed.
 SAID_ONCE = quality(1, lasting=True)
+# How a stop button is heard, whatever quality it offers: everything, also what was sent before.
+# With a depth of 1 a release, even of another button, would take the place of a press.
+FROM_A_BUTTON = quality(lasting=True), quality(reliable=False)
 # For onlookers, for which the writer never waits. It holds a stretch of a lock-step run.
 LOOKING_ON = quality(1000, reliable=False)
 # What a sensor's driver sends, whatever quality it offers: 2 s of a force plate.
 FROM_A_DRIVER = quality(2048, reliable=False)
-# Only the latest sign of life counts, and nothing waits.
-HEARTBEAT = quality(1, reliable=False)
+# Signs of life, for which nothing waits. Several senders share the topic, and the reader's depth.
+HEARTBEAT = quality(100, reliable=False)
 
 
 class Topic(NamedTuple):

@@ -122,8 +122,7 @@ class Perturbator(Participant, TolerantLifecycleNode):
 
         self.subscribe(topics.HORIZON, self._on_horizon)
         self.subscribe(topics.OPERATOR_HEARTBEAT, self._on_heartbeat)
-        # A button may keep its message for late joiners, or send it once to present readers.
-        for qos in (topics.SAID_ONCE, topics.HEARTBEAT):
+        for qos in topics.FROM_A_BUTTON:
             self.subscribe(topics.EMERGENCY_STOP._replace(qos=qos), self._on_emergency_stop)
         self.create_service(Trigger, "~/stop", self.on_stop_service)
         self.create_service(Trigger, "~/arm", self._on_arm_service)
