@@ -127,6 +127,18 @@ def test_a_robot_in_the_domain_of_the_run_needs_its_own_names(monkeypatch):
             pushed(robot, 6.0)
 
 
+def test_states_of_other_joints_do_not_take_the_place_of_this_one():
+    with controller("--others") as text:
+        device = ros2_control.EffortJoint(find_driver(text).options)
+        device.open()
+        try:
+            for _ in range(20):
+                time.sleep(0.02)  # for which the loop is busy, while states of both arrive
+                assert device.exchange(0.0, 1e-6) is not None
+        finally:
+            device.shut()
+
+
 @pytest.mark.parametrize(
     ("options", "driver", "words"),
     [

@@ -45,8 +45,11 @@ _SERVICE_TIMEOUT = 0.8
 # How long to wait for a new state before the next command, after the loop was held up [s].
 _FRESH_STATE_TIMEOUT = 0.02
 _CONTROLLER_GONE = Fault("controller_gone", "No process takes commands: the controller has ended.")
-# Only the latest state counts.
-_STATES = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+# Only the latest state counts, but other joints may have their own publishers on the topic, whose
+# states must not take the place of this one's.
+_STATES = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+# Long enough to take a message that has arrived [s].
+_NO_TIME = 1e-6
 # ros2_control's controllers subscribe as reliable. Only one command is kept, never a queue.
 _COMMANDS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 
@@ -96,6 +99,7 @@ class EffortJoint(TorqueDevice):
         self._client: Client | None = None  # while the device is open
         self._manager: list[Any] = []  # clients of controller_manager: to list, to switch
         self._state: JointState | None = None  # not read yet
+        self._heard = 0  # states of any joints
         self._age = math.inf  # of the joint's last state on arrival [s]
         self._place = 0  # of the joint in that state
 
@@ -156,6 +160,11 @@ class EffortJoint(TorqueDevice):
         """Publish a torque; return the joint's state if a new one arrives within the timeout."""
         self._publish(torque / self._options.ratio)
         self._spin(lambda: self._state is not None, timeout)
+        for _ in range(_STATES.depth):  # later ones may have arrived by now
+            heard = self._heard
+            self._spin(lambda: False, _NO_TIME)
+            if self._heard == heard:
+                break
         state, self._state = self._state, None
         return None if state is None else self._reading(state)
 
@@ -181,6 +190,7 @@ class EffortJoint(TorqueDevice):
 
     def _on_state(self, message: JointState) -> None:
         """Take a fresh state that has the joint in it exactly once; ignore others."""
+        self._heard += 1
         if list(message.name).count(self._options.joint) != 1:
             return
         self._age = (
