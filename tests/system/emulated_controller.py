@@ -34,7 +34,6 @@ class Controller(Node):
         self.command = self.torque = 0.0
         self.heard_at = self.now = time.monotonic()
         self.states = self.create_publisher(JointState, options.joint_states, 1)
-        self.others = self.create_publisher(JointState, options.joint_states, 1)
         self.name, _, self.state = options.manager.partition("=")
         if options.manager:
             self.manage()
@@ -90,8 +89,6 @@ class Controller(Node):
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 1_000_000_000)
         message.effort = [] if self.options.no_effort else [math.nan, self.torque]
         self.states.publish(message)
-        if self.options.others:
-            self.others.publish(JointState(header=message.header, name=["hip"], effort=[0.0]))
 
 
 def main():
@@ -106,7 +103,6 @@ def main():
     parser.add_argument("--trace", type=Path, default=os.devnull, help="states switched to")
     parser.add_argument("--silent", action="store_true", help="no service to switch")
     parser.add_argument("--deaf", action="store_true", help="no controller")
-    parser.add_argument("--others", action="store_true", help="publish another joint's states")
     parser.add_argument("--no-effort", action="store_true", help="no torque is measured")
     options = parser.parse_args()
     rclpy.init(args=[], domain_id=options.domain)

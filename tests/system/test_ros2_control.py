@@ -14,6 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from sensor_msgs.msg import JointState
 
 from gait_entrainment.conventions import Side
 from gait_entrainment.robot import DeviceError, LimitError, PulseTrain, find_driver
@@ -22,6 +23,7 @@ from gait_entrainment_drivers.conformance.bench import DriverBench, Tolerances, 
 from gait_entrainment_drivers.conformance.checks import CHECKS
 from gait_entrainment_drivers.proof import proof_of
 from gait_entrainment_nodes import ros2_control
+from gait_entrainment_nodes.messaging.client import Client
 from gait_entrainment_nodes.messaging.domain import claimed_domain
 
 EMULATED = Path(__file__).with_name("emulated_controller.py")
@@ -128,15 +130,20 @@ def test_a_robot_in_the_domain_of_the_run_needs_its_own_names(monkeypatch):
 
 
 def test_states_of_other_joints_do_not_take_the_place_of_this_one():
-    with controller("--others") as text:
-        device = ros2_control.EffortJoint(find_driver(text).options)
+    with controller("--rate=1") as text:
+        options = find_driver(text).options
+        device = ros2_control.EffortJoint(options)
         device.open()
-        try:
+        with Client("broadcasters", domain=options.domain) as client:
+            publisher = client.node.create_publisher(JointState, options.joint_states, 10)
+            assert client.wait(publisher.get_subscription_count, 10)
             for _ in range(20):
-                time.sleep(0.02)  # for which the loop is busy, while states of both arrive
-                assert device.exchange(0.0, 1e-6) is not None
-        finally:
-            device.shut()
+                for name in (options.joint, "hip"):
+                    message = JointState(name=[name], effort=[0.0])
+                    message.header.stamp = client.node.get_clock().now().to_msg()
+                    publisher.publish(message)
+                assert device.exchange(0.0, 0.2) is not None
+        device.shut()
 
 
 @pytest.mark.parametrize(

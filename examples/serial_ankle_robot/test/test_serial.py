@@ -35,7 +35,7 @@ def emulated(*options):
     try:
         port = process.stdout.readline().strip()
         assert port
-        yield f"serial:port={port},rate=250,silence=0.3,lateness=0.5"
+        yield f"serial:port={port},rate=250,silence=0.9,lateness=0.9"
     finally:
         process.terminate()
         process.wait(10)
@@ -44,13 +44,13 @@ def emulated(*options):
 
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
 def test_a_robot_with_a_watchdog_keeps_every_promise(check):
-    with emulated("--timeout=0.3") as text:
+    with emulated("--timeout=0.6") as text:
         result = run_check(check, DriverBench(find_driver(text), TOLERANT))
     assert result.kept, result.broken
 
 
 def test_a_process_that_is_held_up_while_it_writes_is_no_failure_of_the_line(monkeypatch):
-    """The limit on that is the loop's own, `lateness`, 0.5 s here."""
+    """The limit on that is the loop's own, `lateness`, 0.9 s here."""
     write = os.write
 
     def held_up(file, data):

@@ -368,6 +368,7 @@ def timing(bench: Bench) -> None:
     bench.wait_for(lambda: bench.states and bench.states[-1].stamp >= train.end)
     late = lateness_ms(timings_of(train.pulses, bench.states), "measured")
     missing = count - len(late)
+    bench.require_no_faults("Timing pulses led to a fault")
     require(not missing, f"{missing} of {count} pulses do not appear in the states.")
     bench.figures |= _distribution("", late)
     early, most = -1e3 * bench.tolerances.early, 1e3 * bench.tolerances.onset
