@@ -120,7 +120,7 @@ def test_torque_and_angle_are_those_of_the_ankle():
 
 
 def test_a_robot_in_the_domain_of_the_run_needs_its_own_names(monkeypatch):
-    with controller("--namespace=exo", "--joint-states=exo_states", "--timeout=0.2") as text:
+    with controller("--namespace=exo", "--joint-states=exo_states", "--timeout=0.6") as text:
         domain = re.search(r"domain=(\d+)", text)[1]
         monkeypatch.setenv("ROS_DOMAIN_ID", domain)
         with pytest.raises(DeviceError, match=r"is that of the run .*allowed: another d"):
@@ -174,7 +174,7 @@ def test_what_is_missing_is_reported_in_one_line(options, driver, words, monkeyp
 def test_controller_manager_activates_and_deactivates_the_controller(state, tmp_path):
     trace = tmp_path / "trace"
     options = (f"--manager=effort_controller={state}", f"--trace={trace}")
-    with controller("--timeout=0.2", *options) as text, robot_on(text) as robot:
+    with controller("--timeout=0.6", *options) as text, robot_on(text) as robot:
         pushed(robot, 6.0)
         robot.deactivate()
         robot.activate()
@@ -202,7 +202,7 @@ def test_controller_manager_activates_and_deactivates_the_controller(state, tmp_
     ],
 )
 def test_what_controller_manager_refuses_is_reported_in_one_line(options, words):
-    with controller("--timeout=0.2", *options) as text, robot_on(text) as robot:
+    with controller("--timeout=0.6", *options) as text, robot_on(text) as robot:
         robot.configure()
         with pytest.raises(DeviceError, match=words) as error:
             robot.activate()
@@ -210,7 +210,7 @@ def test_what_controller_manager_refuses_is_reported_in_one_line(options, words)
 
 
 def test_a_second_master_is_a_named_fault():
-    with controller("--timeout=0.2") as text, robot_on(text) as robot:
+    with controller("--timeout=0.6") as text, robot_on(text) as robot:
         pushed(robot, 6.0)
         domain = re.search(r"domain=(\d+)", text)[1]
         other = subprocess.Popen(
@@ -242,7 +242,7 @@ rclpy.spin(node)
 
 
 def test_only_one_of_our_drivers_may_command_a_controller():
-    with controller("--timeout=0.2") as text, robot_on(text) as first:
+    with controller("--timeout=0.6") as text, robot_on(text) as first:
         pushed(first, 6.0)
         with pytest.raises(DeviceError, match=r"effort_controller in ROS domain \d+ is in use by"):
             robot_on(f"{text},joint=knee").configure()

@@ -35,7 +35,7 @@ def emulated(*options):
     try:
         port = process.stdout.readline().strip()
         assert port
-        yield f"serial:port={port},rate=250,silence=0.9,lateness=0.9"
+        yield f"serial:port={port},rate=250,silence=0.9,lateness=0.9,host_silence=5"
     finally:
         process.terminate()
         process.wait(10)
