@@ -126,7 +126,8 @@ def test_another_process_can_play_the_walker(tmp_path, monkeypatch):
         outside.send_signal(signal.SIGINT)
         stderr = outside.communicate()[1]
     assert outside.returncode == 0
-    assert "Traceback" not in stderr
+    # Fast DDS may report a port of a suspended process, as the example is not one of ours.
+    assert [line for line in stderr.splitlines() if "RTPS_TRANSPORT_SHM" not in line] == []
     assert outcome["lost"] == 0
     assert outcome["stride_period"] == pytest.approx([0.8] * 7, abs=1e-9)
     assert outcome["final_phase_lag_uncertainty"] == 0.001

@@ -99,5 +99,11 @@ def test_what_a_run_has_set_is_not_the_users_choice_for_the_next(left_over, work
     assert dds_variables(real_time=True) == paced
     variables.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET")
     variables.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", "/mine.xml")
+    variables.setenv("ROS_DOMAIN_ID", "17")
     for real_time in (False, True):
-        assert {"SUBNET", "/mine.xml"} < set(dds_variables(real_time=real_time).values())
+        assert set(dds_variables(real_time=real_time).values()) == {
+            "SUBNET",
+            "/mine.xml",
+            "7100",
+            "3",
+        }

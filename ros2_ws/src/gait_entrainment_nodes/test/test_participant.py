@@ -133,7 +133,9 @@ def test_dumped_parameters_start_the_node_again_without_a_warning(make, tmp_path
     with node(make, "--params-file", str(file)) as made:
         made.offer_ready()
         assert {n: made.get_parameter(n).value for n in values} == values
-    assert "[WARN]" not in capfd.readouterr().err
+    # Fast DDS may report a port of a suspended process, as this process is not one of ours.
+    printed = capfd.readouterr().err.splitlines()
+    assert [line for line in printed if "RTPS_TRANSPORT_SHM" not in line] == []
 
 
 @pytest.mark.parametrize(
